@@ -1,0 +1,121 @@
+"""How the commands behave: one sentence for bad input, progress on a terminal, plain lines in a log.
+
+Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted. Set PCII_TRACEBACK=1 to see tracebacks.
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from pcii.errors import InputError
+
+if TYPE_CHECKING:
+    from cyclopts import App
+    from rich.progress import Progress, TaskID
+
+LOG_EVERY_S = 10.0
+
+
+def run(app: "App", arguments: Sequence[str] | None = None) -> int:
+    """Run a command line and return its exit code; the only place where errors become messages."""
+    from cyclopts import CycloptsError
+
+    tokens = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+    except CycloptsError as fault:
+        return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
+    except InputError as fault:
+        return _fail(2, str(fault))
+    except KeyboardInterrupt:
+        return _fail(130, "interrupted; what is finished is kept, run the same command to go on")
+    except MemoryError as fault:
+        return _fail(1, f"not enough memory: {fault}")
+    except Exception as fault:
+        return _fail(1, f"{type(fault).__name__}: {' '.join(str(fault).split())}")
+    return 0
+
+
+def _fail(code: int, sentence: str) -> int:
+    if os.environ.get("PCII_TRACEBACK"):
+        raise  # noqa: PLE0704 - called from an except clause
+    print(f"error: {sentence}", file=sys.stderr, flush=True)
+    return code
+
+
+def say(text: str) -> None:
+    """One line of result or log on standard output."""
+    print(text, flush=True)
+
+
+class Stages(AbstractContextManager["Stages"]):
+    """Progress of named stages: bars with time left on a terminal, else a line now and then.
+
+    Call it as stages(name, done, total); a stage ends when done reaches total.
+    """
+
+    def __init__(self) -> None:
+        self._rich: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._started: dict[str, float] = {}
+        self._logged: dict[str, float] = {}
+
+    def __enter__(self) -> "Stages":
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
+
+            self._rich = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                console=Console(stderr=True),
+            )
+            self._rich.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._rich is not None:
+            self._rich.stop()
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        if self._rich is not None:
+            if stage not in self._tasks:
+                self._tasks[stage] = self._rich.add_task(stage, total=total)
+            self._rich.update(self._tasks[stage], completed=done, total=total)
+            return
+        now = time.monotonic()
+        start = self._started.setdefault(stage, now)
+        last = self._logged.get(stage, start)
+        if done == total or now - last >= LOG_EVERY_S:
+            self._logged[stage] = now
+            elapsed = now - start
+            left = f", {elapsed / done * (total - done):.0f} s left" if 0 < done < total else ""
+            print(f"{stage}: {done}/{total}, {elapsed:.1f} s{left}", file=sys.stderr, flush=True)
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """The progress of whoever does not want any."""
+
+
+Report = Callable[[str, int, int], None]
+"""Called as report(stage, done, total) by whatever takes long."""

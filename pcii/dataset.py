@@ -1,0 +1,113 @@
+"""Opening a dataset folder: counts, truth and radiance as the package's types, checked as read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.bayer import check_cfa
+from pcii.errors import InputError
+from pcii.store import COUNTS, RADIANCE, TRUTH, check_file, radiance_name, read_exr, read_manifest
+from pcii.types import CameraGrid, PhotonCounts, Truth, Views
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """A finished dataset folder; its parts are read, and their hashes checked, on first use."""
+
+    path: Path
+    manifest: Mapping[str, Any]
+    grid: CameraGrid
+    cfa: str | None
+
+    @cached_property
+    def counts(self) -> PhotonCounts:
+        """The photon counts; `InputError` if the recipe asked for none."""
+        arrays = self._arrays(COUNTS, "counts")
+        if "dense" in arrays:
+            return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
+        columns = [arrays[name] for name in "klijn"]
+        return PhotonCounts.from_events(*columns, self.grid, cfa=self.cfa)
+
+    @cached_property
+    def truth(self) -> Truth | None:
+        """Depth and object of every pixel of the virtual centre, or None where it is not known."""
+        if not self.has(TRUTH):
+            return None
+        arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id"))
+        names = {int(key): value for key, value in self.manifest["objects"].items()}
+        return Truth(arrays["z_mm"], arrays["object_id"], names)
+
+    @cached_property
+    def views(self) -> Views | None:
+        """Radiance of the views, read from disk one view at a time, or None if not stored."""
+        if not self.has(RADIANCE):
+            return None
+        channels = int(self.manifest["radiance_channels"])
+        cfa = self.cfa if channels == 1 else None
+        return Views(_ExrStack(self, channels), self.grid, cfa)
+
+    def has(self, part: str) -> bool:
+        """Whether the manifest lists files under `part`."""
+        return any(name == part or name.startswith(f"{part}/") for name in self.manifest["files"])
+
+    def check(self, name: str, *, content: bool = True) -> Path:
+        """Path of a listed file, after its size (and hash, if `content`) were compared."""
+        entry = self.manifest["files"].get(name)
+        if entry is None:
+            raise InputError(f"{self.path}: the manifest lists no {name}")
+        check_file(self.path, name, entry, content=content)
+        return self.path / name
+
+    def _arrays(
+        self, part: str, product: str, only: tuple[str, ...] | None = None
+    ) -> dict[str, np.ndarray]:
+        import zarr
+
+        if not self.has(part):
+            raise InputError(
+                f"{self.path}: this dataset has no {product}; its recipe left them out"
+            )
+        keep = [part] if only is None else [f"{part}/{name}" for name in only]
+        for name in self.manifest["files"]:
+            if any(name.startswith(f"{prefix}/") for prefix in keep):
+                self.check(name)
+        group = zarr.open_group(self.path / part, mode="r", zarr_format=3)
+        names = list(group.array_keys()) if only is None else only
+        return {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
+
+
+class _ExrStack:
+    """Radiance (K, L, H, W, C) on disk, one EXR a view, read when indexed by [k, l]."""
+
+    def __init__(self, dataset: Dataset, channels: int) -> None:
+        self._dataset = dataset
+        self.shape = (*dataset.grid.shape_KLHW, channels)
+
+    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+        path = self._dataset.check(radiance_name(*index))
+        image = read_exr(path)
+        if image.shape != self.shape[2:]:
+            raise InputError(f"{path}: expected an image {self.shape[2:]}, got {image.shape}")
+        return image
+
+
+def open_dataset(path: str | Path) -> Dataset:
+    """Open a dataset folder; every listed file must be there and have the size it was written with.
+
+    Contents are compared with their SHA-256 when they are read. Raises `InputError` for a folder
+    that is no finished dataset, or a file that is missing or truncated.
+    """
+    root = Path(path)
+    manifest = read_manifest(root)
+    try:
+        grid = CameraGrid(**manifest["grid"])
+        cfa, files = check_cfa(manifest["cfa"]), manifest["files"]
+    except (KeyError, TypeError) as fault:
+        raise InputError(f"{root}: its manifest lacks or misspells {fault}") from None
+    for name, entry in files.items():
+        check_file(root, name, entry, content=False)
+    return Dataset(root, manifest, grid, cfa)

@@ -1,0 +1,69 @@
+"""Depth of every pixel of the virtual centre, from where the photons agree best."""
+
+import numpy as np
+
+from pcii.errors import InputError
+from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
+from pcii.likelihood import cells_to_pixels, focus_scores
+from pcii.types import DepthMap, PhotonCounts, check_z_mm
+
+PLANE_STEP_PX = 1.0
+"""Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""
+SIGMA_PX = 14.0
+LEAST_CONFIDENCE = 0.5
+NEIGHBOURS = 2
+"""Planes on either side of the best whose likelihood counts for it: about the focus depth."""
+
+
+def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthMap:
+    """Depth per pixel, (H, W) float64 in mm within `z_range_mm`, NaN where the method abstains.
+
+    Planes of equal disparity steps are compared by their Poisson likelihood over a window; between
+    planes a parabola is fitted. `confidence` (H, W) is the posterior probability, all planes being
+    equally likely beforehand, that the depth lies within 2 planes of the best; below one half the
+    method abstains. Raises `InputError` for a range that is not 0 < near < far, or a single view.
+    """
+    if len(z_range_mm) != 2:
+        raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
+    near, far = check_z_mm(z_range_mm)
+    if near >= far:
+        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    grid = counts.grid
+    if grid.view_count < 2:
+        raise InputError("counts: one view has no depth; depth needs at least 2 cameras")
+    z = depths_of_equal_spread_mm(grid, near, far, PLANE_STEP_PX)
+    scores = focus_scores(counts, z, sigma_px=SIGMA_PX)
+    best = np.argmax(scores, axis=0)
+    spread = _refined(disparity_spread_px(grid, z), scores, best)
+    confidence = _posterior_near_best(scores, best)
+    depth = np.clip(float(disparity_spread_px(grid, 1.0)) / spread, near, far)
+    # A patch without photons has the same score at all planes.
+    silent = np.ptp(scores, axis=0) < 1e-6
+    abstains = silent | (confidence < LEAST_CONFIDENCE)
+    depth = np.where(abstains, np.nan, depth)
+    confidence = np.where(abstains, 0.0, confidence)
+    return DepthMap(cells_to_pixels(depth, counts), cells_to_pixels(confidence, counts))
+
+
+def _refined(spread: np.ndarray, scores: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """Disparity spread at the top of a parabola through the best plane and its neighbours."""
+    inner = np.clip(best, 1, max(scores.shape[0] - 2, 1))
+    if scores.shape[0] < 3:
+        return spread[best]
+    before, at, after = (
+        np.take_along_axis(scores, (inner + step)[None], axis=0)[0] for step in (-1, 0, 1)
+    )
+    curvature = before - 2 * at + after
+    offset = np.where(
+        curvature < 0, (before - after) / (2 * np.where(curvature < 0, curvature, 1)), 0
+    )
+    offset = np.where(best == inner, np.clip(offset, -0.5, 0.5), 0.0)
+    step_px = spread[1] - spread[0]
+    return spread[best] + offset * step_px
+
+
+def _posterior_near_best(scores: np.ndarray, best: np.ndarray) -> np.ndarray:
+    weight = np.exp(scores - scores.max(axis=0))
+    plane = np.arange(scores.shape[0])[:, None, None]
+    near = np.abs(plane - best) <= NEIGHBOURS
+    return (weight * near).sum(axis=0) / weight.sum(axis=0)

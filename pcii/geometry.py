@@ -1,0 +1,94 @@
+"""Parallel-camera geometry: where a point appears, and how far a section shifts each view.
+
+Notation: d disparity in px per camera step; (k, l) camera; (K, L) grid; z planar depth.
+A point (X, Y, Z) appears in camera (k, l) at column (W-1)/2 + (focal / pixel) (X - X_l) / Z and
+likewise in rows, so a camera further right sees it further LEFT.
+"""
+
+import numpy as np
+
+from pcii.types import CameraGrid
+
+
+def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:  # noqa: E741
+    """(X, Y) of camera (k, l) in the plane Z = 0; the virtual centre is ((K-1)/2, (L-1)/2)."""
+    x = (l - (grid.cols - 1) / 2) * grid.pitch_mm[0]
+    y = (k - (grid.rows - 1) / 2) * grid.pitch_mm[1]
+    return x, y
+
+
+def project_px(
+    grid: CameraGrid,
+    point_mm: tuple[float, float, float],
+    k: float,
+    l: float,  # noqa: E741
+) -> tuple[float, float]:
+    """(row, column) at which camera (k, l) sees the point (X, Y, Z), pixel centres at integers."""
+    X, Y, Z = point_mm
+    x_camera, y_camera = camera_position_mm(grid, k, l)
+    scale_px = grid.focal_mm / grid.pixel_mm
+    i = (grid.height - 1) / 2 + scale_px * (Y - y_camera) / Z
+    j = (grid.width - 1) / 2 + scale_px * (X - x_camera) / Z
+    return i, j
+
+
+def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """(horizontal, vertical) disparity at depth z in px per camera step; 0 at infinity."""
+    per_mm = grid.focal_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
+    return per_mm * grid.pitch_mm[0], per_mm * grid.pitch_mm[1]
+
+
+def nearest_shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Whole-pixel shifts (rows (K,), columns (L,)), int64, that bring each view to the centre.
+
+    Row i of camera row k belongs to row i + floor((k - (K-1)/2) d + 1/2) of the virtual centre.
+    `floor(x + 1/2)` and not `round`, which rounds half to even and makes half-pixel shifts
+    alternate.
+    """
+    d_x, d_y = disparity_px(grid, z_mm)
+    rows = np.floor((np.arange(grid.rows) - (grid.rows - 1) / 2) * d_y + 0.5)
+    cols = np.floor((np.arange(grid.cols) - (grid.cols - 1) / 2) * d_x + 0.5)
+    return rows.astype(np.int64), cols.astype(np.int64)
+
+
+def target_indices(grid: CameraGrid, z_mm: float, subpixel: int) -> tuple[np.ndarray, np.ndarray]:
+    """Voxel rows (K, H) and columns (L, W), int64, to which each pixel of each camera belongs.
+
+    With `subpixel` = 1 every camera moves by a whole number of pixels; with M > 1 the centre of
+    pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M). Indices outside the section are
+    outside the voxel grid.
+    """
+    i, j = np.arange(grid.height), np.arange(grid.width)
+    if subpixel == 1:
+        row_shift, col_shift = nearest_shifts_px(grid, z_mm)
+        return i + row_shift[:, None], j + col_shift[:, None]
+    d_x, d_y = disparity_px(grid, z_mm)
+    k, l = np.arange(grid.rows)[:, None], np.arange(grid.cols)[:, None]  # noqa: E741
+    rows = np.floor((i + 0.5 + (k - (grid.rows - 1) / 2) * d_y) * subpixel)
+    cols = np.floor((j + 0.5 + (l - (grid.cols - 1) / 2) * d_x) * subpixel)
+    return rows.astype(np.int64), cols.astype(np.int64)
+
+
+def disparity_spread_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
+    """Total disparity over the longer axis of the grid in px, (N - 1) d: the scale of depth errors."""
+    d_x, d_y = disparity_px(grid, z_mm)
+    return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
+
+
+def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
+    """Half-extent in px of the blur that a point at z has in the section at z0."""
+    spread = disparity_spread_px(grid, z_mm) - disparity_spread_px(grid, z0_mm)
+    return np.abs(spread) / 2
+
+
+def depths_of_equal_spread_mm(
+    grid: CameraGrid, z_near_mm: float, z_far_mm: float, step_px: float
+) -> np.ndarray:
+    """Depths from near to far whose total disparity differs by at most `step_px` from one to the next.
+
+    Depth resolution is uniform in disparity, so planes uniform in z would waste work far away.
+    """
+    near, far = disparity_spread_px(grid, z_near_mm), disparity_spread_px(grid, z_far_mm)
+    count = max(2, int(np.ceil((near - far) / step_px)) + 1)
+    scale = disparity_spread_px(grid, 1.0)
+    return scale / np.linspace(near, far, count)

@@ -1,0 +1,125 @@
+"""Focus from the Poisson likelihood: where do the photons say that the surface is?
+
+Let K be the count at a voxel of the section at z and V its coverage. If the surface is at z, all
+samples of the voxel share one rate, and the profile log-likelihood over a window is the sum of
+K log(K / V) - K. Maximising it over z is minimising the entropy of where the photons land, Eq. 9 of
+Muniraj et al. 2017 with the right statistics. From it we take what a flat patch of the same mean
+would give, so that the score of a patch without texture has mean 0 and a known spread.
+
+References: Muniraj et al. 2017 for Eq. 9; the identity of likelihood and entropy follows from
+setting each voxel's rate to its maximum-likelihood value K / V.
+"""
+
+from functools import cache
+
+import numpy as np
+
+from pcii.geometry import nearest_shifts_px
+from pcii.reconstruct import coverage_of
+from pcii.statistics import colour_of_events
+from pcii.types import PhotonCounts
+
+BLOCK_PX = 2
+"""Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
+
+Single pixels are not. At depths where all shifts are even a colour falls on every fourth voxel only,
+where photons have four times as many partners, and textured patches would be drawn to such depths.
+"""
+CELL_PX = 4
+"""Scores are kept on cells of 4 x 4 pixels: windows are far larger."""
+BLOCKS = CELL_PX // BLOCK_PX
+LARGEST_RATE = 64.0
+"""Above this rate the expectation for a flat patch follows its asymptotic form."""
+
+
+def focus_scores(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> np.ndarray:
+    """Log-likelihood ratio of depth z against a flat patch, (Z, H / 4, W / 4) float64, in nats.
+
+    Summed over the colours and over a Gaussian window of `sigma_px` (weight 1 at its centre), on
+    cells of 4 x 4 pixels; H and W are rounded up to whole cells.
+    """
+    return np.stack([_plane_score(counts, depth, sigma_px) for depth in z_mm])
+
+
+def _plane_score(counts: PhotonCounts, z_mm: float, sigma_px: float) -> np.ndarray:
+    from scipy.ndimage import gaussian_filter
+    from scipy.special import xlogy
+
+    K = _block_counts(counts, z_mm)
+    V = _block_coverage(counts, z_mm)
+    occupied = np.nonzero(K)
+    information = np.zeros(K.shape)
+    information[occupied] = K[occupied] * np.log(K[occupied] / V[occupied])
+    sigma = sigma_px / CELL_PX
+    score = np.zeros((K.shape[1] // BLOCKS, K.shape[2] // BLOCKS))
+    for colour in range(counts.channel_count):
+        own, photons, samples = (
+            gaussian_filter(_sum_on_cells(values[colour]), sigma, mode="constant")
+            for values in (information, K, V)
+        )
+        rate = photons / np.maximum(samples, 1e-9)
+        # Coverage varies slowly, so one block's stands for its cell.
+        coverage = _sum_on_cells(V[colour]) / BLOCKS**2
+        flat = flat_information(rate * coverage) - xlogy(rate * coverage, coverage)
+        score += own - BLOCKS**2 * flat
+    # The filter's weights sum to 1; with weight 1 at the centre they sum to 2 pi sigma^2.
+    return 2 * np.pi * sigma**2 * score
+
+
+def _block_counts(counts: PhotonCounts, z_mm: float) -> np.ndarray:
+    """Photons of the section at z by colour and block, (C, blocks, blocks) float64."""
+    grid, events = counts.grid, counts.events
+    row_shift, col_shift = nearest_shifts_px(grid, z_mm)
+    row, col = events.i + row_shift[events.k], events.j + col_shift[events.l]
+    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    height, width = (n * BLOCKS for n in cell_shape(counts))
+    block = (row[inside] // BLOCK_PX) * width + col[inside] // BLOCK_PX
+    flat = colour_of_events(counts)[inside] * (height * width) + block
+    size = counts.channel_count * height * width
+    return np.bincount(flat, events.n[inside], minlength=size).reshape(-1, height, width)
+
+
+def _block_coverage(counts: PhotonCounts, z_mm: float) -> np.ndarray:
+    """Samples of the section at z by colour and block, (C, blocks, blocks) float64."""
+    coverage = coverage_of(counts.grid, counts.cfa, counts.channel_count, z_mm, 1)
+    _, H, W = coverage.shape
+    height, width = (n * CELL_PX for n in cell_shape(counts))
+    whole = np.pad(coverage, ((0, 0), (0, height - H), (0, width - W)))
+    pairs = whole.reshape(-1, height // BLOCK_PX, BLOCK_PX, width // BLOCK_PX, BLOCK_PX)
+    return pairs.sum(axis=(2, 4), dtype=np.float64)
+
+
+def _sum_on_cells(blocks: np.ndarray) -> np.ndarray:
+    height, width = blocks.shape[0] // BLOCKS, blocks.shape[1] // BLOCKS
+    return blocks.reshape(height, BLOCKS, width, BLOCKS).sum(axis=(1, 3))
+
+
+def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
+    """Cells of the coarse grid, (H / 4, W / 4) rounded up."""
+    return -(-counts.grid.height // CELL_PX), -(-counts.grid.width // CELL_PX)
+
+
+def cells_to_pixels(cells: np.ndarray, counts: PhotonCounts) -> np.ndarray:
+    """Values on cells (H / 4, W / 4) as values on pixels (H, W), each cell constant."""
+    full = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
+    return full[: counts.grid.height, : counts.grid.width]
+
+
+def flat_information(rate: np.ndarray) -> np.ndarray:
+    """E[K log K] of a Poisson variable K with this mean: the information of a flat patch, in nats."""
+    rates, values = _information_table()
+    inside = np.interp(rate, rates, values)
+    # Expanding K log K about the mean: r log r + 1/2 + 1 / (12 r), good to 1e-5 from 64 on.
+    large = np.maximum(rate, LARGEST_RATE)
+    asymptotic = large * np.log(large) + 0.5 + 1 / (12 * large)
+    return np.where(rate < LARGEST_RATE, inside, asymptotic)
+
+
+@cache
+def _information_table() -> tuple[np.ndarray, np.ndarray]:
+    from scipy.special import gammaln, xlogy
+
+    rates = np.linspace(0, np.sqrt(LARGEST_RATE), 4096) ** 2
+    k = np.arange(0, int(LARGEST_RATE + 14 * np.sqrt(LARGEST_RATE)))
+    log_probability = xlogy(k, rates[:, None]) - rates[:, None] - gammaln(k + 1)
+    return rates, np.exp(log_probability) @ xlogy(k, k)

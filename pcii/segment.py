@@ -1,0 +1,67 @@
+"""Removal of defocused points: which points of each section are in focus there."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pcii.errors import InputError
+from pcii.foreground import brightness, foreground, roberts_magnitude, without_specks
+from pcii.likelihood import cells_to_pixels, focus_scores
+from pcii.planes import with_probes
+from pcii.reconstruct import reconstruct
+from pcii.statistics import pooled_estimate
+from pcii.three_step import three_step
+from pcii.types import PhotonCounts, Segmented, check_z_mm
+
+FOCUS_SIGMA_PX = 14.0
+SMOOTHING_PX = 5
+SMALLEST_REGION_PX = 100
+
+
+def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -> Segmented:
+    """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
+
+    `method` is "three-step" (Muniraj et al. 2017, Eqs. 7-9) or "likelihood". Neither is told how
+    many objects there are, their colours or their depths. Without photons nothing is in focus.
+    Raises `InputError` for a depth not above 0, an unknown method, or a single view.
+
+    >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
+    >>> focus.in_focus.shape                                  # doctest: +SKIP
+    (2, 1024, 1024)
+    """
+    z = check_z_mm(z_mm)
+    if method not in METHODS:
+        raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
+    if counts.grid.view_count < 2:
+        raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")
+    return METHODS[method](counts, z)
+
+
+def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+    """A point is in focus at z if it is bright there and no other depth explains its photons better.
+
+    `steps` holds `score` (the log-likelihood ratio in nats) and `bright`.
+    """
+    sections = reconstruct(counts, z_mm)
+    compared = with_probes(counts.grid, z_mm)
+    scores = focus_scores(counts, compared, sigma_px=FOCUS_SIGMA_PX)
+    best = cells_to_pixels(np.argmax(scores, axis=0), counts)
+    pooled = pooled_estimate(sections, SMOOTHING_PX)
+    masks = []
+    for plane, coverage in zip(pooled, sections.coverage, strict=True):
+        samples = SMOOTHING_PX**2 * float(coverage.mean()) * plane.shape[-1]
+        bright = brightness(plane, samples)
+        mask = foreground(bright, roberts_magnitude(bright))
+        masks.append(without_specks(mask, SMALLEST_REGION_PX))
+    in_focus = np.stack([mask & (best == plane) for plane, mask in enumerate(masks)])
+    steps = {
+        "score": np.stack([cells_to_pixels(score, counts) for score in scores[: z_mm.size]]),
+        "bright": np.stack(masks),
+    }
+    return Segmented(z_mm, in_focus, "likelihood", sections, steps)
+
+
+METHODS: dict[str, Callable[[PhotonCounts, np.ndarray], Segmented]] = {
+    "three-step": three_step,
+    "likelihood": likelihood,
+}

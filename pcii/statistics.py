@@ -1,0 +1,139 @@
+"""Statistics of photon counts: pooled samples, entropy, and what Poisson noise alone would give.
+
+At 1000 photons per view a voxel's own samples are degenerate: nine voxels of ten have no photon and
+hardly any has two different non-zero samples. So samples are pooled over small neighbourhoods, which
+is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.bayer import colour_cells
+from pcii.geometry import nearest_shifts_px
+from pcii.types import PhotonCounts, Sections
+
+GREY_LEVELS = 256
+"""Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
+
+
+def entropy_bits(values: np.ndarray, top: float) -> float:
+    """Entropy of the grey-level histogram of `values`, in bits (Eq. 9).
+
+    Levels are 256 equal steps from 0 to `top`; the histogram is normalised, 0 log 0 = 0, and an
+    empty region has entropy 0.
+
+    >>> entropy_bits(np.array([0.0, 0.0, 1.0, 1.0]), top=1.0)
+    1.0
+    """
+    if values.size == 0 or top <= 0:
+        return 0.0
+    levels = np.clip(values * (GREY_LEVELS / top), 0, GREY_LEVELS - 1).astype(np.int64)
+    histogram = np.bincount(levels.ravel())
+    share = histogram[histogram > 0] / values.size
+    return float(abs((share * np.log2(share)).sum()))  # abs: -0.0 is 0
+
+
+def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
+    """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
+
+    Sums before it divides, so that each sample weighs the same; a window that no sample reaches is 0.
+    """
+    from scipy.ndimage import uniform_filter
+
+    size = (0, window_px, window_px, 0)
+    options = {"size": size[1:3], "axes": (1, 2), "mode": "constant"}
+    counts = uniform_filter(sections.counts.astype(np.float64), **options)
+    samples = uniform_filter(sections.coverage.astype(np.float64), **options)
+    # Running sums leave a residue of rounding where there is nothing.
+    floor = 0.5 / window_px**2
+    mean = np.zeros_like(counts)
+    np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
+    return mean
+
+
+def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:
+    """Entropy of one section inside a region (H, W), the mean over its colours.
+
+    `pooled` (H, W, C) is one plane of `pooled_estimate`; `tops` (C,) the brightest level of each
+    colour, the same for all planes that are to be compared.
+    """
+    bits = [entropy_bits(pooled[..., c][region], tops[c]) for c in range(pooled.shape[-1])]
+    return float(np.mean(bits))
+
+
+@dataclass(frozen=True)
+class ViewSamples:
+    """The samples that the views contribute to pooled voxels of one section.
+
+    A cell is `cell_px` pixels wide and a window `window_cells` cells; each view's photons in the
+    window are one sample. All arrays are (H / cell_px, W / cell_px), rounded up.
+    """
+
+    number: np.ndarray
+    """Views whose sample is not zero."""
+    mean: np.ndarray
+    """Mean of the non-zero samples; 0 where there is none."""
+    variance: np.ndarray
+    """Unbiased variance of the non-zero samples; 0 below two samples."""
+
+
+def view_samples(
+    counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int
+) -> ViewSamples:
+    """Mean and variance of the non-zero samples of each pooled voxel at depth z (for Eq. 7).
+
+    In focus all views see the same piece of surface, so their samples differ by Poisson noise only;
+    out of focus they see different pieces, and the variance grows. A window of an even number of
+    pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
+    """
+    from scipy.ndimage import uniform_filter
+
+    grid, events = counts.grid, counts.events
+    row_shift, col_shift = nearest_shifts_px(grid, z_mm)
+    row, col = events.i + row_shift[events.k], events.j + col_shift[events.l]
+    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
+    cell = (row[inside] // cell_px) * shape[1] + col[inside] // cell_px
+    view = events.k[inside] * grid.cols + events.l[inside]
+    per_view = np.bincount(
+        view * (shape[0] * shape[1]) + cell,
+        weights=events.n[inside],
+        minlength=grid.view_count * shape[0] * shape[1],
+    ).reshape(grid.view_count, *shape)
+    number = np.zeros(shape, dtype=np.int64)
+    total = np.zeros(shape, dtype=np.int64)
+    squares = np.zeros(shape, dtype=np.int64)
+    for image in per_view:
+        pooled = uniform_filter(image, window_cells, mode="constant") * window_cells**2
+        sample = np.rint(pooled).astype(np.int64)
+        number += sample > 0
+        total += sample
+        squares += sample * sample
+    mean = total / np.maximum(number, 1)
+    # n Q - S^2 in integers cannot cancel.
+    spread = number * squares - total * total
+    variance = spread / np.maximum(number * (number - 1), 1)
+    return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
+
+
+def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
+    """Variance of the non-zero samples of a Poisson variable whose non-zero samples have this mean.
+
+    If the rate is r, non-zero samples have the mean m = r / (1 - exp(-r)) and the variance
+    m (1 + r - m). The rate is found from the mean by Newton's method; a mean of 1 or less is rate 0.
+    """
+    m = np.maximum(np.asarray(mean, dtype=np.float64), 1.0)
+    rate = np.maximum(2 * (m - 1), 1e-9)  # exact to second order at small rates; m itself at large
+    rate = np.where(rate > 1.5, m, rate)
+    for _ in range(30):
+        decay = np.exp(-rate)
+        value = rate - m * (1 - decay)
+        slope = 1 - m * decay
+        rate = np.maximum(rate - value / np.where(np.abs(slope) < 1e-12, 1e-12, slope), 1e-9)
+    return np.where(m > 1 + 1e-9, m * np.maximum(1 + rate - m, 0.0), 0.0)
+
+
+def colour_of_events(counts: PhotonCounts) -> np.ndarray:
+    """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
+    return colour_cells(counts.cfa)[counts.events.i % 2, counts.events.j % 2]

@@ -1,0 +1,409 @@
+"""The nouns of the package: frozen, checked on construction, arrays read-only.
+
+Axes, always in this order: (K, L, H, W, C) for views, (Z, H, W, C) for sections; C is R, G, B.
+Lengths are millimetres and carry `_mm`; `z` is planar depth from the camera plane, never ray length.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from pcii.bayer import channel_count, check_cfa
+from pcii.errors import InputError
+
+Normalisation = Literal["overlap", "views"]
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """A view of `array` that refuses to be written to."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def check_z_mm(z_mm: object) -> np.ndarray:
+    """Depths as a float64 array (Z,); each must be a finite number above 0, at least one."""
+    try:
+        z = np.atleast_1d(np.asarray(z_mm, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise InputError(f"z_mm: expected depths in millimetres, got {z_mm!r}") from None
+    if z.ndim != 1 or z.size == 0:
+        raise InputError("z_mm: expected one depth or a list of depths in millimetres")
+    if not np.all(np.isfinite(z) & (z > 0)):
+        bad = z[~(np.isfinite(z) & (z > 0))][0]
+        raise InputError(f"z_mm: a depth must be a finite number above 0 mm, got {bad:g}")
+    return z
+
+
+def _check_size(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
+
+
+def _check_length(name: str, value: object) -> None:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if isinstance(value, bool) or not number or not (math.isfinite(value) and value > 0):
+        raise InputError(f"{name}: expected a finite length above 0 mm, got {value!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraGrid:
+    """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
+
+    Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
+    Y = (k - (rows-1)/2) pitch_y. `pitch_mm` is (pitch_x, pitch_y). Each image has `height` x `width`
+    square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
+    ((height-1)/2, (width-1)/2). Raises `InputError` for a size below 1 or a length not above 0.
+    """
+
+    rows: int
+    cols: int
+    pitch_mm: tuple[float, float]
+    focal_mm: float
+    pixel_mm: float
+    height: int
+    width: int
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "cols", "height", "width"):
+            _check_size(name, getattr(self, name))
+        pitch = self.pitch_mm
+        if not isinstance(pitch, tuple | list) or len(pitch) != 2:
+            raise InputError(f"pitch_mm: expected two lengths (x, y) in mm, got {pitch!r}")
+        for name, value in (("pitch_mm", pitch[0]), ("pitch_mm", pitch[1])):
+            _check_length(name, value)
+        for name in ("focal_mm", "pixel_mm"):
+            _check_length(name, getattr(self, name))
+        object.__setattr__(self, "pitch_mm", (float(pitch[0]), float(pitch[1])))
+
+    @property
+    def view_count(self) -> int:
+        """Number of cameras, rows x cols."""
+        return self.rows * self.cols
+
+    @property
+    def shape_KLHW(self) -> tuple[int, int, int, int]:
+        """Shape (K, L, H, W) of one monochrome stack of views."""
+        return (self.rows, self.cols, self.height, self.width)
+
+
+class ArrayLike5D(Protocol):
+    """What `Views` needs of its pixels: a shape and one view at a time, so that they may stay on disk."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def __getitem__(self, index: Any) -> Any: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
+
+    `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel
+    holds all C channels. `radiance` may be any object with `shape` and `[k, l]` (an array, or a
+    reader that loads one view at a time).
+    """
+
+    radiance: ArrayLike5D
+    grid: CameraGrid
+    cfa: str | None = None
+
+    def __post_init__(self) -> None:
+        check_cfa(self.cfa)
+        shape = tuple(self.radiance.shape)
+        if len(shape) != 5 or shape[:4] != self.grid.shape_KLHW or shape[4] not in (1, 3):
+            raise InputError(
+                f"radiance: expected shape {(*self.grid.shape_KLHW, '1 or 3')}, got {shape}"
+            )
+        if self.cfa is not None and shape[4] != 1:
+            raise InputError("radiance: a Bayer mosaic has one channel per pixel, C = 1")
+        if isinstance(self.radiance, np.ndarray):
+            if self.radiance.dtype.kind not in "fiu":
+                raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
+            object.__setattr__(self, "radiance", read_only(self.radiance))
+
+    @property
+    def channel_count(self) -> int:
+        """Colours that sections of these views will have."""
+        return 3 if self.cfa is not None else self.radiance.shape[4]
+
+    def view(self, k: int, l: int) -> np.ndarray:  # noqa: E741 - l is the field's column index
+        """Image (H, W, C) of camera (k, l); raises `InputError` if it holds NaN or infinity."""
+        image = np.asarray(self.radiance[k, l])
+        if not np.all(np.isfinite(image)):
+            raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
+        return image
+
+
+@dataclass(frozen=True)
+class PhotonEvents:
+    """Pixels that caught photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,)."""
+
+    k: np.ndarray
+    l: np.ndarray  # noqa: E741
+    i: np.ndarray
+    j: np.ndarray
+    n: np.ndarray
+
+
+def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
+    """Counts as they are if integer and >= 0, floats only if whole; else `InputError`."""
+    array = np.asarray(values)
+    if array.dtype.kind == "f":
+        whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
+        if not whole or (array.size and np.abs(array).max() > 2**53):
+            raise InputError(f"{name}: photon counts must be whole numbers")
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iub":
+        raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
+    if array.dtype.kind == "b":
+        array = array.astype(np.uint8)
+    if array.size and array.min() < 0:
+        raise InputError(f"{name}: photon counts must not be negative")
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class PhotonCounts:
+    """Photon counts of every elemental image, as sparse events or as a dense stack.
+
+    Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.
+    There is no truth in it: this is all that a camera would deliver.
+    """
+
+    grid: CameraGrid
+    cfa: str | None
+    _events: PhotonEvents | None = field(default=None, repr=False)
+    _dense: np.ndarray | None = field(default=None, repr=False)
+
+    @classmethod
+    def from_dense(
+        cls, counts_KLHW: np.ndarray, grid: CameraGrid, *, cfa: str | None = None
+    ) -> "PhotonCounts":
+        """Counts from a dense stack (K, L, H, W) of whole numbers >= 0; raises `InputError`."""
+        check_cfa(cfa)
+        counts = _whole_counts("counts", counts_KLHW)
+        if counts.shape != grid.shape_KLHW:
+            raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
+        return cls(grid, cfa, _dense=read_only(counts))
+
+    @classmethod
+    def from_events(
+        cls,
+        k: np.ndarray,
+        l: np.ndarray,  # noqa: E741
+        i: np.ndarray,
+        j: np.ndarray,
+        n: np.ndarray,
+        grid: CameraGrid,
+        *,
+        cfa: str | None = None,
+    ) -> "PhotonCounts":
+        """Counts from five equal-length lists: camera (k, l), pixel (i, j), photons n.
+
+        A pixel may appear more than once; its photons add up. Raises `InputError` for an index
+        outside the grid, a negative or fractional count, or lists of different lengths.
+        """
+        check_cfa(cfa)
+        columns: list[np.ndarray] = []
+        limits = (("k", k, grid.rows), ("l", l, grid.cols), ("i", i, grid.height))
+        for name, values, limit in (*limits, ("j", j, grid.width)):
+            column = _whole_counts(name, np.atleast_1d(values))
+            if column.ndim != 1:
+                raise InputError(f"{name}: expected a one-dimensional list")
+            if column.size and column.max() >= limit:
+                raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
+            columns.append(column.astype(np.int32))
+        photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
+        if len({column.shape for column in (*columns, photons)}) != 1:
+            raise InputError("k, l, i, j, n: the five lists must have the same length")
+        return cls(grid, cfa, _events=_canonical_events(*columns, photons, grid))
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the counts are kept as events."""
+        return self._events is not None
+
+    @cached_property
+    def events(self) -> PhotonEvents:
+        """The counts as events, one per pixel that caught photons, in (k, l, i, j) order."""
+        if self._events is not None:
+            return self._events
+        assert self._dense is not None
+        k, l, i, j = (a.astype(np.int32) for a in np.nonzero(self._dense))  # noqa: E741
+        n = self._dense[k, l, i, j].astype(np.int64)
+        return PhotonEvents(*(read_only(a) for a in (k, l, i, j, n)))
+
+    def view(self, k: int, l: int) -> np.ndarray:  # noqa: E741
+        """Dense counts (H, W) of camera (k, l)."""
+        if self._dense is not None:
+            return self._dense[k, l]
+        events = self.events
+        image = np.zeros((self.grid.height, self.grid.width), dtype=np.int64)
+        here = (events.k == k) & (events.l == l)
+        image[events.i[here], events.j[here]] = events.n[here]
+        return image
+
+    @cached_property
+    def total(self) -> int:
+        """Photons in all views together."""
+        if self._dense is not None:
+            return int(self._dense.sum(dtype=np.int64))
+        return int(self.events.n.sum())
+
+    @property
+    def channel_count(self) -> int:
+        """Colours that sections of these counts will have: 3, or 1 for monochrome."""
+        return channel_count(self.cfa)
+
+
+def _canonical_events(
+    k: np.ndarray,
+    l: np.ndarray,  # noqa: E741
+    i: np.ndarray,
+    j: np.ndarray,
+    n: np.ndarray,
+    grid: CameraGrid,
+) -> PhotonEvents:
+    """Sort by (k, l, i, j), add up repeats, drop zeros: one form per content."""
+    flat = np.ravel_multi_index((k, l, i, j), grid.shape_KLHW)
+    where, inverse = np.unique(flat, return_inverse=True)
+    photons = np.zeros(where.size, dtype=np.int64)
+    np.add.at(photons, inverse, n)
+    where, photons = where[photons > 0], photons[photons > 0]
+    indices = (a.astype(np.int32) for a in np.unravel_index(where, grid.shape_KLHW))
+    return PhotonEvents(*(read_only(a) for a in indices), read_only(photons))
+
+
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """Sections of the scene at depths `z_mm`, in the frame of the virtual centre camera.
+
+    `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
+    float64 for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
+    the voxel grid is M times finer in both axes.
+    """
+
+    grid: CameraGrid
+    z_mm: np.ndarray
+    counts: np.ndarray
+    coverage: np.ndarray
+    subpixel: int = 1
+    normalisation: Normalisation = "overlap"
+
+    def __post_init__(self) -> None:
+        z = check_z_mm(self.z_mm)
+        H, W = self.grid.height * self.subpixel, self.grid.width * self.subpixel
+        if self.counts.shape[:3] != (z.size, H, W) or self.counts.ndim != 4:
+            raise InputError(f"counts: expected ({z.size}, {H}, {W}, C), got {self.counts.shape}")
+        if self.coverage.shape != self.counts.shape:
+            raise InputError("coverage: must have the shape of counts")
+        object.__setattr__(self, "z_mm", read_only(z))
+        object.__setattr__(self, "counts", read_only(self.counts))
+        object.__setattr__(self, "coverage", read_only(self.coverage))
+
+    @cached_property
+    def estimate(self) -> np.ndarray:
+        """Mean per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
+
+        For photon counts it is the maximum-likelihood estimate of the photons per pixel and view;
+        Eq. 3 divides it further by the photon budget n. Under `normalisation` "overlap" the sum is
+        divided by the coverage, under "views" by R S, the number of cameras. A voxel that no
+        sample reaches is 0.
+        """
+        if self.normalisation == "views":
+            return read_only(self.counts / self.grid.view_count)
+        mean = np.zeros(self.counts.shape, dtype=np.float64)
+        np.divide(self.counts, self.coverage, out=mean, where=self.coverage > 0)
+        return read_only(mean)
+
+
+@dataclass(frozen=True, eq=False)
+class Segmented:
+    """Which points of each section are in focus: `in_focus` (Z, H, W) bool.
+
+    `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at.
+    """
+
+    z_mm: np.ndarray
+    in_focus: np.ndarray
+    method: str
+    sections: Sections
+    steps: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        expected = self.sections.counts.shape[:3]
+        if self.in_focus.dtype != np.bool_ or self.in_focus.shape != expected:
+            raise InputError(f"in_focus: expected bool {expected}, got {self.in_focus.shape}")
+        object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
+        object.__setattr__(self, "in_focus", read_only(self.in_focus))
+
+    @property
+    def cleaned(self) -> np.ndarray:
+        """Section estimates with what is defocused set to zero, (Z, H, W, C)."""
+        return self.sections.estimate * self.in_focus[..., None]
+
+
+@dataclass(frozen=True, eq=False)
+class DepthMap:
+    """Depth per pixel of the virtual centre: `z_mm` (H, W), NaN where the method abstains.
+
+    `confidence` (H, W) is in [0, 1]: 0 where it abstains.
+    """
+
+    z_mm: np.ndarray
+    confidence: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.z_mm.ndim != 2 or self.confidence.shape != self.z_mm.shape:
+            raise InputError("z_mm, confidence: expected two maps (H, W) of the same shape")
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "confidence", read_only(self.confidence))
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What the virtual centre camera really sees, from first hits at pixel centres.
+
+    `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
+    backdrop and for nothing, else a key of `names`.
+    """
+
+    z_mm: np.ndarray
+    object_id: np.ndarray
+    names: Mapping[int, str]
+
+    def __post_init__(self) -> None:
+        if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
+            raise InputError("z_mm, object_id: expected two maps (H, W) of the same shape")
+        if np.isnan(self.z_mm).any():
+            raise InputError("z_mm: the truth has no NaN; a miss is +inf")
+        unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
+        if unknown:
+            raise InputError(f"object_id: id {min(unknown)} has no name")
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "object_id", read_only(self.object_id))
+
+
+@dataclass(frozen=True)
+class Score:
+    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map."""
+
+    planes: tuple[Mapping[str, Any], ...]
+    objects: tuple[Mapping[str, Any], ...]
+    depth: Mapping[str, float | None]
+    dataset: str | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The score as plain Python values, in the spelling of `score.json`."""
+        return {
+            "dataset": self.dataset,
+            "planes": [dict(row) for row in self.planes],
+            "objects": [dict(row) for row in self.objects],
+            "depth": dict(self.depth),
+        }

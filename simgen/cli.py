@@ -1,0 +1,152 @@
+"""The `simgen` command."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from pcii import __version__, console
+from pcii.console import Stages, say
+
+app = App(
+    name="simgen",
+    help="Make photon-limited elemental images from physics, with their truth.",
+    version=__version__,
+)
+
+
+@app.command
+def doctor(*, require_compiled: bool = False) -> None:
+    """Say which backend will run and why, and what to install for a faster one.
+
+    Example:  simgen doctor
+
+    Parameters
+    ----------
+    require_compiled
+        Leave with exit code 1 if neither CUDA nor LLVM works (for scripts that install LLVM).
+    """
+    from simgen import backend
+
+    chosen = backend.choose()
+    say(f"Rendering will run with {chosen.line()}")
+    for candidate in backend.survey():
+        mark = "works" if candidate.works else "no"
+        say(f"  {mark:5}  {candidate.kind:6}  {candidate.library or '-'}: {candidate.detail}")
+    hint = backend.advice()
+    if hint:
+        say(hint)
+    if require_compiled and chosen.kind == "scalar":
+        raise RuntimeError("no compiled backend works here")
+
+
+@app.command
+def scenes() -> None:
+    """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
+
+    Example:  simgen scenes
+    """
+    from simgen.scene import load_scene, scene_names
+
+    for name in scene_names():
+        scene, _ = load_scene(name)
+        things = ", ".join(thing.name for thing in scene.objects) or "no objects"
+        say(f"{name:20} {scene.title} ({things})")
+
+
+@app.command
+def schema(what: Literal["scene", "recipe"]) -> None:
+    """Print the JSON Schema of scene or recipe files, for completion in editors.
+
+    Example:  simgen schema recipe > recipe.schema.json
+    """
+    from simgen.recipe import Recipe
+    from simgen.scene import Scene
+
+    model = {"scene": Scene, "recipe": Recipe}[what]
+    json.dump(model.model_json_schema(), sys.stdout, indent=2)
+    say("")
+
+
+@app.command
+def preview(
+    scene: str,
+    *,
+    out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    samples_per_pixel: int = 32,
+) -> None:
+    """Draw a scene from the virtual centre, with its depth and its objects, in one PNG.
+
+    Example:  simgen preview two_objects -o look.png
+
+    Parameters
+    ----------
+    scene
+        Name of a scene that ships, or path of a scene folder.
+    out
+        The picture to write.
+    samples_per_pixel
+        Light paths per pixel; more is slower and less noisy.
+    """
+    from simgen.preview import write_preview
+
+    write_preview(scene, out, samples_per_pixel)
+    say(f"{out}")
+
+
+@app.command
+def generate(
+    recipe: str,
+    *,
+    out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+) -> None:
+    """Make the dataset of a recipe; run again to resume.
+
+    Examples:
+
+        simgen generate data_recipes/paper.toml -o out/paper
+
+        simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
+
+    Parameters
+    ----------
+    recipe
+        Path of a recipe file, or name of one that ships.
+    out
+        Folder for the dataset: new, empty, or the same recipe's unfinished one.
+    set
+        Override one value of the recipe, such as photons.budget=300; may be repeated.
+    """
+    from simgen import backend
+    from simgen.generate import generate as make
+    from simgen.recipe import load_recipe
+
+    resolved, near = load_recipe(recipe, set)
+    say(f"backend: {backend.choose().line()}")
+    with Stages() as report:
+        manifest = make(resolved, near, out, report)
+    seconds = sum(manifest["timings_s"].values())
+    photons = manifest["photons"]
+    caught = f", {photons['total']} photons" if photons else ""
+    say(f"{out}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s")
+
+
+@app.command
+def verify(dataset: Path) -> None:
+    """Compare every file of a dataset with the sizes and hashes in its manifest.
+
+    Example:  simgen verify out/paper
+    """
+    from simgen.generate import verify as compare
+
+    with Stages() as report:
+        count = compare(dataset, report)
+    say(f"{dataset}: {count} files match the manifest")
+
+
+def main() -> int:
+    """Entry point of the `simgen` command."""
+    return console.run(app)

@@ -1,0 +1,118 @@
+"""What scene and recipe files share: strict models, TOML, and errors that point at the field."""
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pcii.errors import InputError
+
+
+class Strict(BaseModel):
+    """Frozen; an unknown key, NaN or infinity is an error."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=1)]
+Vector = tuple[float, float, float]
+Colour = Annotated[
+    tuple[
+        Annotated[float, Field(ge=0, le=1)],
+        Annotated[float, Field(ge=0, le=1)],
+        Annotated[float, Field(ge=0, le=1)],
+    ],
+    Field(description="sRGB, three numbers from 0 to 1"),
+]
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as a dict; `InputError` if it is missing or not TOML."""
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder, not a TOML file") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
+        raise InputError(f"{path}: not valid TOML: {fault}") from None
+
+
+def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
+    """Build a model, or raise `InputError` with one sentence that names the field and the remedy."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as fault:
+        raise InputError(f"{source}: {_sentence(model, fault)}") from None
+
+
+def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
+    """The first error, told; and how many more there are."""
+    errors = fault.errors(include_url=False)
+    # An unknown key is most often the cause of the missing one, so it is told first.
+    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    where = _dotted(first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(model, first["loc"])
+        text = f"unknown key '{where}'{suggestion(str(first['loc'][-1]), known)}"
+    elif first["type"] == "missing":
+        text = f"'{where}' is missing"
+    elif first["type"] == "value_error":
+        text = f"'{where}': " if where else ""
+        text += str(first["ctx"]["error"])
+    else:
+        message = first["msg"][0].lower() + first["msg"][1:]
+        text = f"'{where}': {message}, got {first['input']!r}"
+    more = len(errors) - 1
+    return text + (f" (and {more} more)" if more else "")
+
+
+def _dotted(location: Iterable[int | str]) -> str:
+    """`objects[1].shape.radius_mm` from pydantic's location, without its union tags."""
+    text = ""
+    for part in location:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += f".{part}" if text else part
+    return text
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """'; did you mean ...?' for the nearest known word, else the list of what is known."""
+    words = sorted(known)
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    if near:
+        return f"; did you mean '{near[0]}'?"
+    return f"; known are {', '.join(words)}" if words else ""
+
+
+def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:
+    """Keys allowed at the place of an unknown one: walk the models along its location."""
+    candidates: list[type[BaseModel]] = [model]
+    for part in location[:-1]:
+        if isinstance(part, int):
+            continue
+        following: list[type[BaseModel]] = []
+        for candidate in candidates:
+            if part in candidate.model_fields:
+                following += _models_in(candidate.model_fields[part].annotation)
+            elif part == getattr(candidate.model_fields.get("type"), "default", None):
+                following.append(candidate)  # a union's tag is part of the location
+        candidates = following
+    return {key for candidate in candidates for key in candidate.model_fields}
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]

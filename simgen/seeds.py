@@ -1,0 +1,26 @@
+"""Random streams, keyed (scene, view, stage): the same for any number of workers and any order.
+
+The key is a `SeedSequence.spawn_key` of fixed length, since seeds given as lists of numbers collide
+when one list is another with zeros appended.
+"""
+
+from typing import Literal
+
+import numpy as np
+
+Stage = Literal["radiance", "photons", "totals"]
+_STAGES: tuple[Stage, ...] = ("radiance", "photons", "totals")
+
+
+def _sequence(seed: int, view: int, stage: Stage, scene: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=(scene, view, _STAGES.index(stage)))
+
+
+def generator(seed: int, *, view: int, stage: Stage, scene: int = 0) -> np.random.Generator:
+    """NumPy's generator of one view and stage."""
+    return np.random.default_rng(_sequence(seed, view, stage, scene))
+
+
+def integer(seed: int, *, view: int, stage: Stage, scene: int = 0) -> int:
+    """A 32-bit seed of one view and stage, for the renderer."""
+    return int(_sequence(seed, view, stage, scene).generate_state(1)[0])
