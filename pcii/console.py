@@ -42,7 +42,7 @@ def run(app: "App", arguments: Sequence[str] | None = None) -> int:
 
 def _fail(code: int, sentence: str) -> int:
     if os.environ.get("PCII_TRACEBACK"):
-        raise  # noqa: PLE0704 - called from an except clause
+        raise
     print(f"error: {sentence}", file=sys.stderr, flush=True)
     return code
 

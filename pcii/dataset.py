@@ -62,15 +62,11 @@ class Dataset:
         check_file(self.path, name, entry, content=content)
         return self.path / name
 
-    def _arrays(
-        self, part: str, product: str, only: tuple[str, ...] | None = None
-    ) -> dict[str, np.ndarray]:
+    def _arrays(self, part: str, product: str, only: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
         import zarr
 
         if not self.has(part):
-            raise InputError(
-                f"{self.path}: this dataset has no {product}; its recipe left them out"
-            )
+            raise InputError(f"{self.path}: this dataset has no {product}; its recipe left them out")
         keep = [part] if only is None else [f"{part}/{name}" for name in only]
         for name in self.manifest["files"]:
             if any(name.startswith(f"{prefix}/") for prefix in keep):

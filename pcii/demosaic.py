@@ -63,9 +63,7 @@ def _green(raw: np.ndarray, colour: np.ndarray) -> np.ndarray:
     return np.where(colour == GREEN, raw, green)
 
 
-def _difference(
-    minus_green: np.ndarray, colour: np.ndarray, chroma: int, row_parity: int
-) -> np.ndarray:
+def _difference(minus_green: np.ndarray, colour: np.ndarray, chroma: int, row_parity: int) -> np.ndarray:
     """Chroma minus green at every pixel, from its values at the chroma's own sites."""
     at = _neighbours(minus_green, 1)
     horizontal = (at(0, -1) + at(0, 1)) / 2

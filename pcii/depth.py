@@ -50,13 +50,9 @@ def _refined(spread: np.ndarray, scores: np.ndarray, best: np.ndarray) -> np.nda
     inner = np.clip(best, 1, max(scores.shape[0] - 2, 1))
     if scores.shape[0] < 3:
         return spread[best]
-    before, at, after = (
-        np.take_along_axis(scores, (inner + step)[None], axis=0)[0] for step in (-1, 0, 1)
-    )
+    before, at, after = (np.take_along_axis(scores, (inner + step)[None], axis=0)[0] for step in (-1, 0, 1))
     curvature = before - 2 * at + after
-    offset = np.where(
-        curvature < 0, (before - after) / (2 * np.where(curvature < 0, curvature, 1)), 0
-    )
+    offset = np.where(curvature < 0, (before - after) / (2 * np.where(curvature < 0, curvature, 1)), 0)
     offset = np.where(best == inner, np.clip(offset, -0.5, 0.5), 0.0)
     step_px = spread[1] - spread[0]
     return spread[best] + offset * step_px

@@ -47,9 +47,7 @@ def reconstruct(
         sums = np.zeros(shape, dtype=np.int64)
         for plane, depth in zip(sums, z, strict=True):
             _add_events(plane, data, depth, subpixel)
-    return Sections(
-        grid, z, np.moveaxis(sums, 1, -1), np.moveaxis(coverage, 1, -1), subpixel, normalisation
-    )
+    return Sections(grid, z, np.moveaxis(sums, 1, -1), np.moveaxis(coverage, 1, -1), subpixel, normalisation)
 
 
 def _add_events(plane: np.ndarray, data: PhotonCounts, z_mm: float, subpixel: int) -> None:
@@ -109,9 +107,7 @@ def _strided(target: np.ndarray) -> slice:
     return slice(int(target[0]), int(target[-1]) + 1, step)
 
 
-def coverage_of(
-    grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, subpixel: int
-) -> np.ndarray:
+def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, subpixel: int) -> np.ndarray:
     """How many samples of each colour meet at each voxel, (C, H M, W M) uint32, in closed form.
 
     The samples of Bayer phase (a, b) at voxel (r, c) are (camera rows whose pixel of row parity a

@@ -13,7 +13,7 @@ from pcii.statistics import pooled_estimate
 from pcii.three_step import three_step
 from pcii.types import PhotonCounts, Segmented, check_z_mm
 
-FOCUS_SIGMA_PX = 14.0
+FOCUS_SIGMA_PX = 20.0
 SMOOTHING_PX = 5
 SMALLEST_REGION_PX = 100
 

@@ -78,9 +78,7 @@ class ViewSamples:
     """Unbiased variance of the non-zero samples; 0 below two samples."""
 
 
-def view_samples(
-    counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int
-) -> ViewSamples:
+def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
     """Mean and variance of the non-zero samples of each pooled voxel at depth z (for Eq. 7).
 
     In focus all views see the same piece of surface, so their samples differ by Poisson noise only;

@@ -140,15 +140,11 @@ def read_manifest(root: Path) -> dict[str, Any]:
     if not root.is_dir():
         raise InputError(f"{root}: there is no such dataset folder")
     if not path.is_file():
-        raise InputError(
-            f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`"
-        )
+        raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError) as fault:
-        raise InputError(
-            f"{path}: damaged, it is not valid JSON ({fault}); generate it again"
-        ) from None
+        raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); generate it again") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: not the manifest of a {FORMAT}")
     if manifest.get("format_version") != FORMAT_VERSION:

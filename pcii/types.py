@@ -117,9 +117,7 @@ class Views:
         check_cfa(self.cfa)
         shape = tuple(self.radiance.shape)
         if len(shape) != 5 or shape[:4] != self.grid.shape_KLHW or shape[4] not in (1, 3):
-            raise InputError(
-                f"radiance: expected shape {(*self.grid.shape_KLHW, '1 or 3')}, got {shape}"
-            )
+            raise InputError(f"radiance: expected shape {(*self.grid.shape_KLHW, '1 or 3')}, got {shape}")
         if self.cfa is not None and shape[4] != 1:
             raise InputError("radiance: a Bayer mosaic has one channel per pixel, C = 1")
         if isinstance(self.radiance, np.ndarray):

@@ -93,9 +93,7 @@ def choose() -> Backend:
                 reason = candidate.detail + (f" ({why})" if why else "")
                 return Backend(kind, VARIANTS[kind], candidate.library, reason)
             tried.append(candidate.detail)
-    raise InputError(
-        f"SIMGEN_BACKEND: {asked} does not work here: {'; '.join(tried) or 'no such library'}"
-    )
+    raise InputError(f"SIMGEN_BACKEND: {asked} does not work here: {'; '.join(tried) or 'no such library'}")
 
 
 def survey() -> list[Candidate]:
@@ -174,9 +172,7 @@ def _probe(kind: Kind, library: str) -> tuple[bool, str]:
         environment["DRJIT_LIBLLVM_PATH"] = library
     command = [sys.executable, "-c", _PROBE, VARIANTS[kind]]
     try:
-        run = subprocess.run(
-            command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S
-        )
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S)
     except subprocess.TimeoutExpired:
         return False, f"did not answer within {PROBE_LIMIT_S} s"
     if run.returncode == 0 and "rendered" in run.stdout:

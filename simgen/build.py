@@ -51,9 +51,7 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
         # Without optimisation: it merges shapes, and merged shapes lose their names.
         loaded = mi.load_dict(plugins, optimize=False)
     except RuntimeError as fault:
-        raise InputError(
-            f"{folder}: the renderer refuses this scene: {_last_line(fault)}"
-        ) from None
+        raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
     return Built(mi, loaded, _object_of_shape(loaded), names)
 
 
@@ -72,9 +70,7 @@ def _object_id(shape_id: str) -> int:
 def _object(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     T = mi.ScalarTransform4f
     pose = T().translate(list(thing.position_mm))
-    for axis, degrees in zip(
-        ((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True
-    ):
+    for axis, degrees in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True):
         pose = pose @ T().rotate(list(axis), degrees)
     return {**_shape(mi, thing.shape, pose, folder), "bsdf": _material(mi, thing.material, folder)}
 

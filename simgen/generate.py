@@ -132,9 +132,7 @@ def _finished(out: Path, identity: str) -> dict[str, Any] | None:
         raise InputError(f"{out}: holds something else; name a new or empty folder")
     manifest = read_manifest(out)
     if manifest.get("identity") != identity:
-        raise InputError(
-            f"{out}: holds the dataset of another recipe or scene; name a new or empty folder"
-        )
+        raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
     for name, entry in manifest["files"].items():
         check_file(out, name, entry, content=False)
     return manifest
@@ -223,9 +221,7 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
     views = list(np.ndindex(grid.rows, grid.cols))
     energies = np.array([scope_energies(raw(k, l), cfa, photons.scope) for k, l in views])
     dark = int((energies <= 0).all(axis=1).sum())
-    normalisers = (
-        np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
-    )
+    normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
     totals = fixed_totals(photons, energies, seeds.generator(recipe.seed, view=0, stage="totals"))
     columns: list[list[np.ndarray]] = []
     for done, (k, l) in enumerate(views, start=1):  # noqa: E741
@@ -239,9 +235,7 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
     k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))  # noqa: E741
     events = PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa).events
     small = {name: getattr(events, name).astype(np.uint16) for name in "klij"}
-    write_arrays_safely(
-        out / COUNTS, {**small, "n": events.n.astype(np.uint32)}, {"layout": "events"}
-    )
+    write_arrays_safely(out / COUNTS, {**small, "n": events.n.astype(np.uint32)}, {"layout": "events"})
     return {
         "method": "dense",
         "total": int(events.n.sum()),

@@ -15,9 +15,7 @@ from simgen.schema import suggestion
 
 # IEC 61966-2-1: luminance of the sRGB primaries, and XYZ to linear sRGB.
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_XYZ_TO_SRGB = np.array(
-    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
-)
+_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 
 
 def light_plugin(mi: Any, light: AreaLight | UniformLight) -> dict[str, Any]:
@@ -29,9 +27,7 @@ def light_plugin(mi: Any, light: AreaLight | UniformLight) -> dict[str, Any]:
         case AreaLight():
             towards = np.subtract(light.target_mm, light.position_mm)
             if not np.any(towards):
-                raise InputError(
-                    "lights: an area light's target_mm must differ from its position_mm"
-                )
+                raise InputError("lights: an area light's target_mm must differ from its position_mm")
             up = [0.0, -1.0, 0.0] if abs(towards[1]) < 0.99 * np.linalg.norm(towards) else [0, 0, 1]
             pose = mi.ScalarTransform4f().look_at(
                 origin=list(light.position_mm), target=list(light.target_mm), up=up
@@ -54,9 +50,7 @@ def _tint(illuminant: str) -> np.ndarray:
 
     table = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]
     if illuminant not in table:
-        raise InputError(
-            f"lights: no illuminant {illuminant!r}{suggestion(illuminant, list(table))}"
-        )
+        raise InputError(f"lights: no illuminant {illuminant!r}{suggestion(illuminant, list(table))}")
     x, y = table[illuminant]
     rgb = np.clip(_XYZ_TO_SRGB @ [x / y, 1.0, (1 - x - y) / y], 0, None)
     return rgb / (LUMINANCE @ rgb)

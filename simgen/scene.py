@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pcii.errors import InputError
-from simgen.locations import scene_roots, find
+from simgen.locations import find, scene_roots
 from simgen.schema import (
     Colour,
     NonNegative,
@@ -159,16 +159,12 @@ def find_scene(name_or_path: str, near: Path | None = None) -> Path:
     shipped = find(scene_roots, f"{name_or_path}/scene.toml")
     if shipped is not None:
         return shipped
-    raise InputError(
-        f"scene: there is no scene {name_or_path!r}{suggestion(name_or_path, scene_names())}"
-    )
+    raise InputError(f"scene: there is no scene {name_or_path!r}{suggestion(name_or_path, scene_names())}")
 
 
 def scene_names() -> list[str]:
     """Names of the scenes that ship or stand in the working directory."""
-    return sorted(
-        {file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")}
-    )
+    return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})
 
 
 def asset(folder: Path, name: str, where: str) -> Path:

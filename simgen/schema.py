@@ -14,9 +14,7 @@ from pcii.errors import InputError
 class Strict(BaseModel):
     """Frozen; an unknown key, NaN or infinity is an error."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
 
 Model = TypeVar("Model", bound=BaseModel)

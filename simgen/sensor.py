@@ -34,9 +34,7 @@ def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
     return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
 
 
-def photon_rates(
-    raw: np.ndarray, cfa: str | None, photons: Photons, energies: np.ndarray
-) -> np.ndarray:
+def photon_rates(raw: np.ndarray, cfa: str | None, photons: Photons, energies: np.ndarray) -> np.ndarray:
     """Expected photons per pixel, (H, W) float64: the budget shared out in proportion to `raw`.
 
     `energies` are those of `scope_energies`, for scope "scene" summed over all views. A scope with
@@ -50,9 +48,7 @@ def photon_rates(
     return raw * share[colour_index(*raw.shape, cfa)]
 
 
-def fixed_totals(
-    photons: Photons, energies: np.ndarray, rng: np.random.Generator
-) -> np.ndarray | None:
+def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
     """Photons of each view (V, C or 1) for multinomial statistics, None for Poisson.
 
     `energies` (V, C or 1) are those of `scope_energies`. With scope "scene" the budget is shared

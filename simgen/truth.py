@@ -36,6 +36,4 @@ def _first_hits(built: Built, grid: CameraGrid, x_mm: float, y_mm: float) -> Fir
     integrator = mi.load_dict({"type": "aov", "aovs": "hit:position,shape:shape_index"})
     passes = np.array(mi.render(built.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
     z, shape = passes[..., -2], passes[..., -1].astype(np.int64)  # shape 0 is a miss
-    return FirstHits(
-        np.where(shape > 0, z, np.inf).astype(np.float32), built.object_of_shape[shape]
-    )
+    return FirstHits(np.where(shape > 0, z, np.inf).astype(np.float32), built.object_of_shape[shape])
