@@ -23,6 +23,16 @@ class Dataset:
     grid: CameraGrid
     cfa: str | None
 
+    @property
+    def name(self) -> str:
+        """Name of the dataset's folder."""
+        return self.path.resolve().name
+
+    @property
+    def analysis(self) -> Mapping[str, Any]:
+        """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests, if it does."""
+        return self.manifest.get("analysis") or {}
+
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; `InputError` if the recipe asked for none."""

@@ -9,6 +9,7 @@ import numpy as np
 DARK_SIGMAS = 2.0
 BRIGHT_SIGMAS = 6.0
 """How far from the dark, in standard deviations of its noise, a pixel is surely dark or bright."""
+NEARBY_PX = 25
 EDGE_SMOOTHING_PX = 1.0
 
 
@@ -38,15 +39,17 @@ def foreground(bright: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
     `bright` is from `brightness`, `edges` the Roberts magnitude of it. Pixels that are surely dark
     and pixels that are surely not are flooded along the edges until they meet (watershed). The dark
-    is the lower quintile of the picture; its noise on the square-root scale is 1/2.
+    is the lower quintile of the picture; its noise on the square-root scale is 1/2. Surely bright is
+    what exceeds it by `BRIGHT_SIGMAS` and is no mere skirt of something brighter nearby.
     """
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, maximum_filter
     from skimage.segmentation import watershed
 
     above = (bright - np.quantile(bright, 0.2)) / 0.5
+    nearby = maximum_filter(above, NEARBY_PX)
     markers = np.zeros(bright.shape, dtype=np.int32)
     markers[above < DARK_SIGMAS] = 1
-    markers[above > BRIGHT_SIGMAS] = 2
+    markers[(above > BRIGHT_SIGMAS) & (above > nearby / 2)] = 2
     return watershed(gaussian_filter(edges, EDGE_SMOOTHING_PX), markers) == 2
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pcii.types import CameraGrid
 
 
-def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:  # noqa: E741
+def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:
     """(X, Y) of camera (k, l) in the plane Z = 0; the virtual centre is ((K-1)/2, (L-1)/2)."""
     x = (l - (grid.cols - 1) / 2) * grid.pitch_mm[0]
     y = (k - (grid.rows - 1) / 2) * grid.pitch_mm[1]
@@ -21,7 +21,7 @@ def project_px(
     grid: CameraGrid,
     point_mm: tuple[float, float, float],
     k: float,
-    l: float,  # noqa: E741
+    l: float,
 ) -> tuple[float, float]:
     """(row, column) at which camera (k, l) sees the point (X, Y, Z), pixel centres at integers."""
     X, Y, Z = point_mm
@@ -63,7 +63,7 @@ def target_indices(grid: CameraGrid, z_mm: float, subpixel: int) -> tuple[np.nda
         row_shift, col_shift = nearest_shifts_px(grid, z_mm)
         return i + row_shift[:, None], j + col_shift[:, None]
     d_x, d_y = disparity_px(grid, z_mm)
-    k, l = np.arange(grid.rows)[:, None], np.arange(grid.cols)[:, None]  # noqa: E741
+    k, l = np.arange(grid.rows)[:, None], np.arange(grid.cols)[:, None]
     rows = np.floor((i + 0.5 + (k - (grid.rows - 1) / 2) * d_y) * subpixel)
     cols = np.floor((j + 0.5 + (l - (grid.cols - 1) / 2) * d_x) * subpixel)
     return rows.astype(np.int64), cols.astype(np.int64)

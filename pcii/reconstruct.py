@@ -68,7 +68,7 @@ def _add_views(sums: np.ndarray, data: Views, z: np.ndarray, subpixel: int) -> N
     cells = colour_cells(data.cfa)
     targets = [target_indices(grid, depth, subpixel) for depth in z]
     for k in range(grid.rows):
-        for l in range(grid.cols):  # noqa: E741
+        for l in range(grid.cols):
             image = data.view(k, l)
             for plane, (rows, cols) in zip(sums, targets, strict=True):
                 if data.cfa is None:

@@ -6,6 +6,7 @@ is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from pcii.types import PhotonCounts, Sections
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
+SECTION_WINDOW_PX = 5
+"""Sections are pooled over 5 x 5 pixels before edges and entropies are taken."""
 
 
 def entropy_bits(values: np.ndarray, top: float) -> float:
@@ -93,17 +96,16 @@ def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cell
     inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
     cell = (row[inside] // cell_px) * shape[1] + col[inside] // cell_px
-    view = events.k[inside] * grid.cols + events.l[inside]
-    per_view = np.bincount(
-        view * (shape[0] * shape[1]) + cell,
-        weights=events.n[inside],
-        minlength=grid.view_count * shape[0] * shape[1],
-    ).reshape(grid.view_count, *shape)
+    photons = events.n[inside].astype(np.float64)
+    # Events are sorted by view, so each view's are one run.
+    view = events.k[inside].astype(np.int64) * grid.cols + events.l[inside]
+    ends = np.searchsorted(view, np.arange(grid.view_count + 1))
     number = np.zeros(shape, dtype=np.int64)
     total = np.zeros(shape, dtype=np.int64)
     squares = np.zeros(shape, dtype=np.int64)
-    for image in per_view:
-        pooled = uniform_filter(image, window_cells, mode="constant") * window_cells**2
+    for first, last in pairwise(ends):
+        image = np.bincount(cell[first:last], photons[first:last], minlength=shape[0] * shape[1])
+        pooled = uniform_filter(image.reshape(shape), window_cells, mode="constant") * window_cells**2
         sample = np.rint(pooled).astype(np.int64)
         number += sample > 0
         total += sample

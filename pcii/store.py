@@ -35,7 +35,7 @@ RADIANCE = "radiance"
 CHUNK_ELEMENTS = 1 << 20
 
 
-def radiance_name(k: int, l: int) -> str:  # noqa: E741
+def radiance_name(k: int, l: int) -> str:
     """Path of one view's radiance inside the dataset."""
     return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
 

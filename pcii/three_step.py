@@ -19,6 +19,7 @@ from pcii.geometry import blur_half_extent_px
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
+    SECTION_WINDOW_PX,
     ViewSamples,
     pooled_estimate,
     region_entropy_bits,
@@ -27,14 +28,16 @@ from pcii.statistics import (
 )
 from pcii.types import PhotonCounts, Sections, Segmented
 
-CELL_PX = 4
 WINDOW_CELLS = 4
-"""Eq. 7 pools over 4 x 4 cells of 4 pixels: 16 px, a few photons per view at 1000 photons."""
-SMOOTHING_PX = 5
-"""Sections are pooled over 5 x 5 pixels before edges and entropies are taken."""
+PHOTONS_PER_SAMPLE = 5.0
+LARGEST_CELL_PX = 8
+"""Eq. 7 pools over 4 x 4 cells, wide enough for about 5 photons per view where it is bright."""
+SAME_SURFACE = 0.15
+"""Views of one surface in focus may differ by this share: it is neither flat nor quite at z."""
 SIGMAS = 3.0
 FEWEST_SAMPLES = 8
-SMALLEST_REGION_PX = 400
+SMALLEST_REGION_PX = 100
+LARGEST_MARGIN_PX = 16
 
 
 def three_step(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
@@ -47,16 +50,17 @@ def three_step(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
         raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")
     compared = with_probes(counts.grid, z_mm)
     everything = reconstruct(counts, compared)
-    pooled = pooled_estimate(everything, SMOOTHING_PX)
-    samples_per_window = SMOOTHING_PX**2 * float(everything.coverage.mean()) * pooled.shape[-1]
+    pooled = pooled_estimate(everything, SECTION_WINDOW_PX)
+    samples_per_window = SECTION_WINDOW_PX**2 * float(everything.coverage.mean()) * pooled.shape[-1]
     bright = [brightness(plane, samples_per_window) for plane in pooled]
     edges = [roberts_magnitude(plane) for plane in bright]
     masks = [foreground(b, e) for b, e in zip(bright, edges, strict=True)]
     masks = [without_specks(mask, SMALLEST_REGION_PX) for mask in masks]
 
     count = z_mm.size
-    winner = _sharpest_plane(counts, compared, pooled, masks)
-    kept, answered = zip(*(adaptive_threshold(counts, z) for z in z_mm), strict=True)
+    winner = _sharpest_plane(counts, compared, pooled, masks[:count])
+    cell_px = _cell_px(pooled[:count], masks[:count])
+    kept, answered = zip(*(adaptive_threshold(counts, z, cell_px) for z in z_mm), strict=True)
     in_focus = np.stack([masks[p] & (winner == p) & kept[p] for p in range(count)])
     requested = Sections(counts.grid, z_mm, everything.counts[:count], everything.coverage[:count])
     steps = {
@@ -68,27 +72,38 @@ def three_step(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     return Segmented(z_mm, in_focus, "three-step", requested, steps)
 
 
-def adaptive_threshold(counts: PhotonCounts, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
+def adaptive_threshold(counts: PhotonCounts, z_mm: float, cell_px: int) -> tuple[np.ndarray, np.ndarray]:
     """Step 1: where the variance of the non-zero samples is at most T, and where that is known.
 
     Two masks (H, W). T is the variance of non-zero Poisson samples of the same mean, plus `SIGMAS`
-    times the sampling error of a variance, about var sqrt(2 / (n - 1)) for n samples. Where there
-    are fewer than `FEWEST_SAMPLES` the step does not object.
+    times the sampling error of a variance, about var sqrt(2 / (n - 1)) for n samples, plus the
+    square of `SAME_SURFACE` times the mean. Where there are fewer than `FEWEST_SAMPLES` the step
+    does not object.
     """
-    samples = view_samples(counts, z_mm, cell_px=CELL_PX, window_cells=WINDOW_CELLS)
+    samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
     known = samples.number >= FEWEST_SAMPLES
     kept = ~known | (samples.variance <= _threshold(samples))
     shape = (counts.grid.height, counts.grid.width)
-    return _to_pixels(kept, shape), _to_pixels(known, shape)
+    return tuple(
+        mask.repeat(cell_px, axis=0).repeat(cell_px, axis=1)[: shape[0], : shape[1]] for mask in (kept, known)
+    )  # type: ignore[return-value]
 
 
 def _threshold(samples: ViewSamples) -> np.ndarray:
-    expected = truncated_poisson_variance(samples.mean)
-    return expected * (1 + SIGMAS * np.sqrt(2 / np.maximum(samples.number - 1, 1)))
+    noise = truncated_poisson_variance(samples.mean)
+    noise = noise * (1 + SIGMAS * np.sqrt(2 / np.maximum(samples.number - 1, 1)))
+    return noise + (SAME_SURFACE * samples.mean) ** 2
 
 
-def _to_pixels(cells: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    return cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)[: shape[0], : shape[1]]
+def _cell_px(pooled: np.ndarray, masks: list[np.ndarray]) -> int:
+    """Cell size at which a window of what is bright holds `PHOTONS_PER_SAMPLE` photons per view."""
+    bright = np.stack(masks)
+    if not bright.any():
+        return LARGEST_CELL_PX
+    # A Bayer window holds each colour in proportion to its sites; green's double share hardly matters.
+    per_pixel = float(pooled.mean(axis=-1)[bright].mean())
+    window_px = np.sqrt(PHOTONS_PER_SAMPLE / max(per_pixel, 1e-12))
+    return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
 
 
 def _sharpest_plane(
@@ -96,7 +111,7 @@ def _sharpest_plane(
 ) -> np.ndarray:
     """Step 3: for every pixel the plane (index) at which its region's entropy is lowest; -1 outside.
 
-    A region is a connected piece of what is bright at any plane. Its entropy is taken over the
+    A region is a connected piece of what is bright at any requested plane. Its entropy is taken over the
     region grown by the blur that it could have, so that all planes show the same object and light.
     """
     from scipy.ndimage import binary_dilation, find_objects, label
@@ -104,13 +119,14 @@ def _sharpest_plane(
     winner = np.full(masks[0].shape, -1, dtype=np.int64)
     regions, _ = label(np.logical_or.reduce(masks))
     margin = int(np.ceil(max(blur_half_extent_px(counts.grid, compared, compared[0]))))
-    margin = min(margin, 16)
+    margin = min(margin, LARGEST_MARGIN_PX)
     for number, box in enumerate(find_objects(regions), start=1):
         rows, cols = (slice(max(s.start - margin, 0), s.stop + margin) for s in box)
         here = regions[rows, cols] == number
         grown = binary_dilation(here, iterations=margin) if margin else here
+        grown &= here | (regions[rows, cols] == 0)
         part = pooled[:, rows, cols]
-        tops = part.max(axis=(0, 1, 2))
+        tops = part[:, grown].max(axis=(0, 1))
         entropies = [region_entropy_bits(plane, grown, tops) for plane in part]
         winner[rows, cols][here] = int(np.argmin(entropies))
     return winner

@@ -130,7 +130,7 @@ class Views:
         """Colours that sections of these views will have."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
 
-    def view(self, k: int, l: int) -> np.ndarray:  # noqa: E741 - l is the field's column index
+    def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it holds NaN or infinity."""
         image = np.asarray(self.radiance[k, l])
         if not np.all(np.isfinite(image)):
@@ -143,7 +143,7 @@ class PhotonEvents:
     """Pixels that caught photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,)."""
 
     k: np.ndarray
-    l: np.ndarray  # noqa: E741
+    l: np.ndarray
     i: np.ndarray
     j: np.ndarray
     n: np.ndarray
@@ -194,7 +194,7 @@ class PhotonCounts:
     def from_events(
         cls,
         k: np.ndarray,
-        l: np.ndarray,  # noqa: E741
+        l: np.ndarray,
         i: np.ndarray,
         j: np.ndarray,
         n: np.ndarray,
@@ -233,11 +233,11 @@ class PhotonCounts:
         if self._events is not None:
             return self._events
         assert self._dense is not None
-        k, l, i, j = (a.astype(np.int32) for a in np.nonzero(self._dense))  # noqa: E741
+        k, l, i, j = (a.astype(np.int32) for a in np.nonzero(self._dense))
         n = self._dense[k, l, i, j].astype(np.int64)
         return PhotonEvents(*(read_only(a) for a in (k, l, i, j, n)))
 
-    def view(self, k: int, l: int) -> np.ndarray:  # noqa: E741
+    def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l)."""
         if self._dense is not None:
             return self._dense[k, l]
@@ -262,7 +262,7 @@ class PhotonCounts:
 
 def _canonical_events(
     k: np.ndarray,
-    l: np.ndarray,  # noqa: E741
+    l: np.ndarray,
     i: np.ndarray,
     j: np.ndarray,
     n: np.ndarray,

@@ -183,7 +183,7 @@ def _write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> Non
     if recipe.products.view_truth:
         z = arrays["view_z_mm"] = np.empty((K, L, H, W), np.float32)
         ids = arrays["view_object_id"] = np.empty((K, L, H, W), np.int16)
-        for done, (k, l) in enumerate(np.ndindex(K, L), start=1):  # noqa: E741
+        for done, (k, l) in enumerate(np.ndindex(K, L), start=1):
             hits = first_hits_of_view(built, grid, k, l)
             z[k, l], ids[k, l] = hits.z_mm, hits.object_id
             report("truth of views", done, K * L)
@@ -194,7 +194,7 @@ def _render_views(recipe: Recipe, built: Built, out: Path, report: Report) -> No
     """Radiance of every view that is not on disk yet."""
     grid = recipe.grid.camera_grid()
     colour = recipe.products.radiance == "rgb"
-    for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):  # noqa: E741
+    for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
         path = out / radiance_name(k, l)
         if not path.is_file():
             image = render_view(
@@ -214,7 +214,7 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
     """Draw the photons of all views and write them; what the manifest says of them."""
     grid, cfa, photons = recipe.grid.camera_grid(), recipe.cfa, recipe.photons
 
-    def raw(k: int, l: int) -> np.ndarray:  # noqa: E741
+    def raw(k: int, l: int) -> np.ndarray:
         image = read_exr(out / radiance_name(k, l))
         return sense(image, cfa) if image.shape[2] == 3 else image[..., 0]
 
@@ -224,7 +224,7 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
     normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
     totals = fixed_totals(photons, energies, seeds.generator(recipe.seed, view=0, stage="totals"))
     columns: list[list[np.ndarray]] = []
-    for done, (k, l) in enumerate(views, start=1):  # noqa: E741
+    for done, (k, l) in enumerate(views, start=1):
         number = done - 1
         rates = photon_rates(raw(k, l), cfa, photons, normalisers[number])
         rng = seeds.generator(recipe.seed, view=number, stage="photons")
@@ -232,7 +232,7 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
         i, j = np.nonzero(counts)
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", done, len(views))
-    k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))  # noqa: E741
+    k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))
     events = PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa).events
     small = {name: getattr(events, name).astype(np.uint16) for name in "klij"}
     write_arrays_safely(out / COUNTS, {**small, "n": events.n.astype(np.uint32)}, {"layout": "events"})
@@ -270,6 +270,7 @@ def _manifest(
         "radiance_channels": {"none": None, "mosaic": 1, "rgb": 3}[recipe.products.radiance],
         "radiance_unit": "linear sRGB whose luminance is in cd/m^2",
         "objects": {str(number): name for number, name in built.names.items()},
+        "analysis": recipe.analysis.model_dump(mode="json"),
         "recipe": recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),
         "backend": engine,

@@ -77,6 +77,15 @@ class Products(Strict):
     """Full-light images as float32 EXR: behind the Bayer pattern, or all three colours."""
 
 
+class Analysis(Strict):
+    """Where whoever opens the dataset should look; nothing of it is rendered."""
+
+    z_mm: tuple[Positive, ...] = ()
+    """Depths of the sections that `pcii run` reconstructs unless told otherwise."""
+    z_range_mm: tuple[Positive, Positive] | None = None
+    """Nearest and farthest depth that a depth map considers."""
+
+
 class Recipe(Strict):
     """A dataset: which scene, seen by which cameras, in how much light, and what is kept."""
 
@@ -89,6 +98,7 @@ class Recipe(Strict):
     photons: Photons = Photons()
     render: Render = Render()
     products: Products = Products()
+    analysis: Analysis = Analysis()
 
     @property
     def cfa(self) -> str | None:

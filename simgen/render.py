@@ -11,7 +11,7 @@ def render_view(
     built: Built,
     grid: CameraGrid,
     k: int,
-    l: int,  # noqa: E741
+    l: int,
     *,
     samples_per_pixel: int,
     seed: int,

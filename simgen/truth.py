@@ -22,7 +22,7 @@ def first_hits_at_centre(built: Built, grid: CameraGrid) -> FirstHits:
     return _first_hits(built, grid, 0.0, 0.0)
 
 
-def first_hits_of_view(built: Built, grid: CameraGrid, k: int, l: int) -> FirstHits:  # noqa: E741
+def first_hits_of_view(built: Built, grid: CameraGrid, k: int, l: int) -> FirstHits:
     """First hits of camera (k, l)."""
     return _first_hits(built, grid, float(camera_x_mm(grid)[l]), float(camera_y_mm(grid)[k]))
 

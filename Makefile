@@ -1,0 +1,49 @@
+# make demo   the paper's experiment, from scene to report
+# make test   style, types and tests
+# make bench  run time against error
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out
+
+.PHONY: demo test bench format clean llvm
+.DEFAULT_GOAL := demo
+
+$(VENV)/.ready: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+# Mitsuba's fast mode needs LLVM 17 or newer. Where there is none, root on Debian or Ubuntu gets it;
+# anyone else is told what to type, and everything goes on in the slower scalar mode.
+llvm: $(VENV)/.ready
+	@if $(BIN)/simgen doctor --require-compiled >/dev/null 2>&1; then :; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null; then \
+	  echo "installing libllvm19 (for fast rendering) ..."; \
+	  export DEBIAN_FRONTEND=noninteractive; \
+	  { apt-get install -y -qq libllvm19 || { apt-get update -qq && apt-get install -y -qq libllvm19; }; } \
+	    >/dev/null 2>&1 || echo "libllvm19 could not be installed; going on without it"; \
+	fi; \
+	$(BIN)/simgen doctor
+
+demo: llvm
+	$(BIN)/simgen generate data_recipes/paper.toml --out $(OUT)/paper
+	$(BIN)/pcii run $(OUT)/paper --out $(OUT)/paper-results
+	@echo "Open $(OUT)/paper-results/report.html in a browser."
+
+test: llvm
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+bench: llvm
+	$(BIN)/python -m benchmarks
+
+format: $(VENV)/.ready
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) $(OUT) build dist

@@ -1,0 +1,170 @@
+"""The `pcii` command."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from pcii import __version__, console, results
+from pcii.console import Stages, say
+from pcii.dataset import open_dataset
+
+app = App(
+    name="pcii",
+    help="Reconstruct photon-counted integral images, remove what is out of focus, and score it.",
+    version=__version__,
+)
+
+Out = Annotated[Path, Parameter(name=("--out", "-o"))]
+Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
+
+
+@app.command
+def run(dataset: Path, *, out: Out, z_mm: Depths = ()) -> None:
+    """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
+
+    Example:  pcii run out/paper -o out/paper-results
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder, as made by `simgen generate`.
+    out
+        Folder for the results: new, empty, or that of earlier results of the same dataset.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    """
+    from pcii.pipeline import run as run_all
+
+    with Stages() as report:
+        outcome = run_all(open_dataset(dataset), out, z_mm, report)
+    for row in outcome.score.planes:
+        if row["truth"] == "object" and row["iou"] is not None:
+            say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
+    say(f"report: {out / 'report.html'}")
+
+
+@app.command
+def reconstruct(dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1) -> None:
+    """Reconstruct sections from the photon counts, with a picture of each.
+
+    Example:  pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    subpixel
+        Divide each pixel into this many voxels per axis.
+    """
+    from pcii.picture import to_srgb8, white_level, write_png
+    from pcii.pipeline import planes_of
+    from pcii.reconstruct import reconstruct as make
+
+    data = open_dataset(dataset)
+    sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel)
+    results.claim(out, data)
+    say(f"{results.save_sections(out, sections)}")
+    for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
+        path = out / f"section_{z:g}mm.png"
+        write_png(path, to_srgb8(estimate, white_level(estimate, (slice(None), slice(None)))))
+        say(f"{path}")
+
+
+@app.command
+def depth(dataset: Path, *, out: Out) -> None:
+    """Map the depth of every pixel of the virtual centre, with a picture.
+
+    Example:  pcii depth out/paper -o out/depth
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    """
+    from pcii.depth import estimate_depth
+    from pcii.picture import depth_image, write_png
+    from pcii.pipeline import depth_range_of
+
+    data = open_dataset(dataset)
+    z_range = depth_range_of(data)
+    found = estimate_depth(data.counts, z_range)
+    results.claim(out, data)
+    say(f"{results.save_depth(out, found)}")
+    write_png(out / "depth.png", depth_image(found.z_mm, *z_range))
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm yellow to {z_range[1]:g} mm violet, black no answer")
+
+
+@app.command
+def segment(
+    dataset: Path,
+    *,
+    out: Out,
+    z_mm: Depths = (),
+    method: Literal["three-step", "likelihood"] = "likelihood",
+) -> None:
+    """Remove defocused points from sections, with a picture of each mask.
+
+    Example:  pcii segment out/paper --z-mm 540 --method three-step -o out/removed
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    method
+        The paper's three steps, or the Poisson likelihood.
+    """
+    from pcii.picture import mask_image, write_png
+    from pcii.pipeline import planes_of
+    from pcii.segment import segment as remove
+
+    data = open_dataset(dataset)
+    focus = remove(data.counts, planes_of(data, z_mm), method=method)
+    results.claim(out, data)
+    say(f"{results.save_segmented(out, focus)}")
+    for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+        path = out / f"in_focus_{method}_{z:g}mm.png"
+        write_png(path, mask_image(mask))
+        say(f"{path}: {mask.mean():.2%} of the section in focus")
+
+
+@app.command
+def score(dataset: Path, out: Path) -> None:
+    """Compare the results in a folder with the dataset's truth; writes score.json there.
+
+    Example:  pcii score out/paper out/paper-results
+
+    Parameters
+    ----------
+    dataset
+        The dataset folder, with truth.
+    out
+        The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
+    """
+    from pcii.errors import InputError
+    from pcii.score import score as compare
+
+    data = open_dataset(dataset)
+    if not out.is_dir():
+        raise InputError(f"{out}: there is no such folder of results")
+    results.claim(out, data)
+    focus = results.load_segmented(out, data)
+    if not focus:
+        raise InputError(f"{out}: holds no in-focus masks; make them with `pcii segment` or `pcii run`")
+    result = compare(focus, results.load_depth(out), data.truth, dataset=data.name)
+    say(f"{results.save_score(out, result)}")
+
+
+def main() -> int:
+    """Entry point of the `pcii` command."""
+    return console.run(app)

@@ -1,0 +1,129 @@
+"""The method from dataset to score, in the order of the paper's sections 2 and 3."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii import results
+from pcii.console import Report, silent
+from pcii.dataset import Dataset
+from pcii.depth import estimate_depth
+from pcii.errors import InputError
+from pcii.reconstruct import reconstruct
+from pcii.score import score
+from pcii.segment import METHODS, segment
+from pcii.types import ArrayLike5D, DepthMap, Score, Sections, Segmented, Views, check_z_mm
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that a run of the method on one dataset gives."""
+
+    dataset: Dataset
+    full_light: Sections | None
+    """Eq. 2, where the dataset has radiance."""
+    sections: Sections
+    """Eq. 3, from the photon counts."""
+    focus: tuple[Segmented, ...]
+    depth: DepthMap
+    score: Score
+    timings_s: dict[str, float] = field(default_factory=dict)
+
+
+def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = silent) -> Outcome:
+    """Reconstruct sections, remove defocused points by every method, map depth, score.
+
+    `z_mm` defaults to the depths that the dataset's recipe names. Raises `InputError` where there
+    are none, or no counts.
+    """
+    seconds: dict[str, float] = {}
+    z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
+    counts = dataset.counts
+    total = 4 + len(METHODS)
+    done = 0
+
+    def finished(name: str, start: float) -> None:
+        nonlocal done
+        done += 1
+        seconds[name] = round(time.perf_counter() - start, 3)
+        report("analysis", done, total)
+
+    start = time.perf_counter()
+    full_light = _full_light(dataset, z, report)
+    finished("sections at full light", start)
+
+    start = time.perf_counter()
+    sections = reconstruct(counts, z)
+    finished("sections", start)
+
+    focus: list[Segmented] = []
+    for method in METHODS:
+        start = time.perf_counter()
+        focus.append(segment(counts, z, method=method))
+        finished(f"removal, {method}", start)
+
+    start = time.perf_counter()
+    depth = estimate_depth(counts, z_range)
+    finished("depth", start)
+
+    start = time.perf_counter()
+    result = score(focus, depth, dataset.truth, dataset=dataset.name)
+    finished("score", start)
+    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
+
+
+def run(dataset: Dataset, out: Path, z_mm: Sequence[float] | None, report: Report = silent) -> Outcome:
+    """Analyse and write everything into `out`: sections, masks, depth, score.json, report.html."""
+    from pcii.report import write_report
+
+    results.claim(out, dataset)
+    outcome = analyse(dataset, z_mm, report)
+    results.save_sections(out, outcome.sections)
+    for focus in outcome.focus:
+        results.save_segmented(out, focus)
+    results.save_depth(out, outcome.depth)
+    results.save_score(out, outcome.score)
+    write_report(out / "report.html", outcome)
+    return outcome
+
+
+def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> np.ndarray:
+    """The depths to reconstruct: those asked for, else those that the recipe names."""
+    asked = z_mm or dataset.analysis.get("z_mm") or ()
+    if not len(asked):
+        raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
+    return check_z_mm(asked)
+
+
+def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
+    """Nearest and farthest depth to consider: the recipe's, else 4/5 to 5/4 of the planes' depths."""
+    named = dataset.analysis.get("z_range_mm")
+    if named:
+        return float(named[0]), float(named[1])
+    z = planes_of(dataset, z_mm)
+    return 0.8 * float(z.min()), 1.25 * float(z.max())
+
+
+def _full_light(dataset: Dataset, z: np.ndarray, report: Report) -> Sections | None:
+    views = dataset.views
+    if views is None:
+        return None
+    counted = _Counted(views.radiance, views.grid.view_count, report)
+    return reconstruct(Views(counted, views.grid, views.cfa), z)
+
+
+class _Counted:
+    """Radiance that reports each view as it is read."""
+
+    def __init__(self, radiance: ArrayLike5D, total: int, report: Report) -> None:
+        self._radiance, self._total, self._report, self._done = radiance, total, report, 0
+        self.shape = radiance.shape
+
+    def __getitem__(self, index: Any) -> Any:
+        self._done += 1
+        self._report("views at full light", self._done, self._total)
+        return self._radiance[index]

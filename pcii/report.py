@@ -1,0 +1,180 @@
+"""report.html: the paper's Figures 6 and 7 and Table 1 from this dataset, the truth beside them.
+
+One file without scripts and without anything fetched: it can be mailed, archived and printed.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pcii import __version__, picture
+from pcii.demosaic import demosaic
+from pcii.pipeline import depth_range_of
+from pcii.score import object_masks, pixel_masks
+from pcii.store import write_bytes_safely
+from pcii.types import Sections
+
+if TYPE_CHECKING:
+    from pcii.pipeline import Outcome
+
+PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
+
+
+def write_report(path: Path, outcome: "Outcome") -> None:
+    """Write the report of one run as a self-contained HTML file."""
+    from jinja2 import Environment, PackageLoader, select_autoescape
+
+    environment = Environment(
+        loader=PackageLoader("pcii"),
+        autoescape=select_autoescape(),
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = _number
+    page = environment.get_template("report.html.j2").render(**_content(outcome))
+    write_bytes_safely(path, page.encode())
+
+
+def _number(value: float | None, digits: int = 3) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def _content(outcome: "Outcome") -> dict[str, Any]:
+    dataset = outcome.dataset
+    box = picture.crop_box(picture.interesting_part(dataset.truth, list(outcome.focus)))
+    manifest = dataset.manifest
+    return {
+        "title": manifest.get("title") or dataset.name,
+        "version": __version__,
+        "dataset": dataset.name,
+        "grid": dataset.grid,
+        "cfa": dataset.cfa,
+        "photons_total": dataset.counts.total,
+        "photons_per_view": dataset.counts.total / dataset.grid.view_count,
+        "crop": f"rows {box[0].start} to {box[0].stop - 1}, columns {box[1].start} to {box[1].stop - 1}",
+        "crop_width": box[1].stop - box[1].start,
+        "figure6": _figure6(outcome, box),
+        "figure7": _figure7(outcome, box),
+        "depth": _depth_panels(outcome, box),
+        "depth_range": depth_range_of(dataset, outcome.sections.z_mm.tolist()),
+        "z_mm": [f"{z:g}" for z in outcome.sections.z_mm],
+        "score": outcome.score,
+        "table1": _table1(outcome.score.objects),
+        "table1_holds": table1_holds(outcome.score.objects, outcome.score.planes),
+        "paper_table1": PAPER_TABLE_1,
+        "timings": outcome.timings_s,
+        "made": manifest,
+        "made_s": sum(manifest.get("timings_s", {}).values()),
+        "has_truth": dataset.truth is not None,
+    }
+
+
+def _table1(objects: tuple[Mapping[str, Any], ...]) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = []
+    for row in objects:
+        bits = list(row["entropy"].values())
+        lowest = min((value for value in bits if value is not None), default=None)
+        rows.append({"name": row["name"], "bits": bits, "lowest": lowest})
+    return rows
+
+
+def table1_holds(
+    objects: tuple[Mapping[str, Any], ...], planes: tuple[Mapping[str, Any], ...]
+) -> bool | None:
+    """Whether each object's entropy is lowest at its own plane; None if that cannot be said."""
+    own: dict[str, str] = {}
+    for row in planes:
+        for name in (row["object"] or "").split(", "):
+            own[name] = f"{row['z_mm']:g}"
+    verdicts: list[bool] = []
+    for row in objects:
+        bits = {z: value for z, value in row["entropy"].items() if value is not None}
+        if row["name"] in own and len(bits) > 1:
+            verdicts.append(min(bits, key=lambda z: bits[z]) == own[row["name"]])
+    return all(verdicts) if verdicts else None
+
+
+def _panel(image: np.ndarray, box: tuple[slice, slice], caption: str) -> dict[str, str]:
+    return {"image": picture.data_uri(image[box]), "caption": caption}
+
+
+def _figure6(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, str]]:
+    """(a) raw centre view, (b) demosaiced, then sections at full light and from the photons."""
+    dataset = outcome.dataset
+    k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
+    panels: list[dict[str, str]] = []
+    letters = iter("abcdefghijklmnopqrstuvwxyz")
+    if dataset.views is not None:
+        view = dataset.views.view(k, l).astype(np.float64)
+        raw = view[..., 0] if view.shape[2] == 1 else view
+        colour = demosaic(raw, cfa=dataset.cfa) if dataset.cfa and raw.ndim == 2 else view
+        white = picture.white_level(colour, box)
+        what = f"view ({k}, {l}) at full light"
+        shown = picture.to_srgb8(raw, white)
+        panels.append(_panel(shown, box, f"({next(letters)}) {what}, raw"))
+        if dataset.cfa and raw.ndim == 2:
+            shown = picture.to_srgb8(colour, white)
+            panels.append(_panel(shown, box, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
+    counts = dataset.counts.view(k, l)
+    shown = picture.to_srgb8(np.minimum(counts, 1).astype(float), 1.0)
+    panels.append(_panel(shown, box, f"({next(letters)}) view ({k}, {l}): {counts.sum()} photons"))
+    per_view = dataset.counts.total / dataset.grid.view_count
+    for sections, light in (
+        (outcome.full_light, "full light"),
+        (outcome.sections, f"{per_view:.0f} photons per view"),
+    ):
+        panels += _section_panels(sections, box, light, letters)
+    return panels
+
+
+def _section_panels(
+    sections: Sections | None, box: tuple[slice, slice], light: str, letters: Any
+) -> list[dict[str, str]]:
+    if sections is None:
+        return []
+    white = max(picture.white_level(plane, box) for plane in sections.estimate)
+    equation = "Eq. 2" if sections.counts.dtype.kind == "f" else "Eq. 3"
+    return [
+        _panel(
+            picture.to_srgb8(plane, white),
+            box,
+            f"({next(letters)}) section at {z:g} mm, {light} ({equation})",
+        )
+        for z, plane in zip(sections.z_mm, sections.estimate, strict=True)
+    ]
+
+
+def _figure7(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, Any]]:
+    """For each method and plane: what is left of the section, the truth, and where they differ."""
+    truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
+    by_object = object_masks(grid, truth, z_mm) if truth else None
+    by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
+    rows: list[dict[str, Any]] = []
+    for focus in outcome.focus:
+        cleaned = focus.cleaned
+        white = max(picture.white_level(plane, box) for plane in outcome.sections.estimate)
+        for plane, z in enumerate(z_mm):
+            image = picture.to_srgb8(cleaned[plane], white)
+            panels = [_panel(image, box, f"{focus.method}, {z:g} mm: what is left")]
+            if by_object is not None and by_pixel is not None:
+                shown = picture.mask_image(by_object[plane])
+                shown[by_object[plane] & ~by_pixel[plane]] = 130
+                panels.append(_panel(shown, box, f"truth at {z:g} mm"))
+                shown = picture.agreement_image(focus.in_focus[plane], by_object[plane])
+                panels.append(_panel(shown, box, "compared"))
+            rows.append({"panels": panels, "method": focus.method, "z": f"{z:g}"})
+    return rows
+
+
+def _depth_panels(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, str]]:
+    truth, depth = outcome.dataset.truth, outcome.depth
+    near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
+    panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
+    if truth is not None:
+        objects = np.where(truth.object_id > 0, truth.z_mm, np.inf)
+        panels.append(_panel(picture.depth_image(objects, near, far), box, "true depth of the objects"))
+    shown = picture.to_srgb8(depth.confidence**2.2, 1.0)
+    panels.append(_panel(shown, box, "confidence, black 0 to white 1"))
+    return panels

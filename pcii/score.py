@@ -1,0 +1,202 @@
+"""How right it was: masks, depth and entropies against the truth.
+
+The one place where estimate and truth meet.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pcii.errors import InputError
+from pcii.geometry import blur_half_extent_px, disparity_spread_px
+from pcii.statistics import SECTION_WINDOW_PX, entropy_bits, pooled_estimate, region_entropy_bits
+from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
+
+FOCUS_TOLERANCE_PX = 1.0
+"""A point is in focus where its blur half-extent is at most this."""
+BOUNDARY_TOLERANCE_PX = 2.0
+"""Outlines agree where they are at most this far apart."""
+
+
+def score(
+    focus: Segmented | Sequence[Segmented],
+    depth: DepthMap | None,
+    truth: Truth | None,
+    *,
+    dataset: str | None = None,
+) -> Score:
+    """Compare in-focus masks and a depth map with the truth.
+
+    `planes` has a row per method and plane for each kind of truth. "object": the objects whose
+    visible surface is closest to this plane. "pixel": the points whose blur half-extent
+    |disparity(z) - disparity(z0)| (N - 1) / 2 is at most 1 px. `boundary_f` is the F-measure of the
+    outlines with a tolerance of 2 px; `entropy_before` and `entropy_after` are Eq. 9 of the section
+    as a whole, before and after removal, in bits. `objects` is Table 1: the entropy of each object,
+    with the blur it has at the other planes, at each plane. `depth` is over the objects' pixels: errors
+    in mm where answered; `bad_1px` and `bad_3px` the share whose error exceeds 1 or 3 px of total
+    disparity spread, a missing answer counting as bad; `coverage` the share answered.
+
+    What cannot be known is None. Raises `InputError` if shapes differ.
+    """
+    methods = [focus] if isinstance(focus, Segmented) else list(focus)
+    if truth is not None:
+        shapes = [one.in_focus.shape[1:] for one in methods]
+        shapes += [] if depth is None else [depth.z_mm.shape]
+        if any(shape != truth.z_mm.shape for shape in shapes):
+            raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shapes[0]}")
+    rows = [row for one in methods for row in _plane_rows(one, truth)]
+    objects = _object_rows(methods[0], truth) if methods and truth is not None else []
+    grid = methods[0].sections.grid if methods else None
+    errors = _depth_errors(grid, depth, truth)
+    return Score(tuple(rows), tuple(objects), errors, dataset)
+
+
+def objects_by_plane(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> dict[int, int]:
+    """Plane index (into `z_mm`) to which each visible object belongs, by object id.
+
+    The closest plane is the one at which the object's visible surface has the least mean blur.
+    """
+    belongs: dict[int, int] = {}
+    for number in truth.names:
+        surface = truth.z_mm[truth.object_id == number]
+        if surface.size:
+            blur = [blur_half_extent_px(grid, surface, z).mean() for z in z_mm]
+            belongs[number] = int(np.argmin(blur))
+    return belongs
+
+
+def object_masks(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> np.ndarray:
+    """Truth by object: (Z, H, W) bool, the pixels of the objects that belong to each plane."""
+    belongs = objects_by_plane(grid, truth, z_mm)
+    masks = np.zeros((len(z_mm), *truth.z_mm.shape), dtype=bool)
+    for number, plane in belongs.items():
+        masks[plane] |= truth.object_id == number
+    return masks
+
+
+def pixel_masks(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> np.ndarray:
+    """Truth by pixel: (Z, H, W) bool, points whose blur half-extent is at most the tolerance."""
+    return np.stack([blur_half_extent_px(grid, truth.z_mm, z) <= FOCUS_TOLERANCE_PX for z in z_mm])
+
+
+def _plane_rows(focus: Segmented, truth: Truth | None) -> list[dict[str, Any]]:
+    grid, z_mm = focus.sections.grid, focus.z_mm
+    before, after = _section_entropies(focus)
+    kinds: list[tuple[str, np.ndarray | None]] = [("object", None), ("pixel", None)]
+    names: dict[int, list[str]] = {}
+    if truth is not None:
+        kinds = [("object", object_masks(grid, truth, z_mm)), ("pixel", pixel_masks(grid, truth, z_mm))]
+        for number, plane in objects_by_plane(grid, truth, z_mm).items():
+            names.setdefault(plane, []).append(truth.names[number])
+    rows: list[dict[str, Any]] = []
+    for plane, depth in enumerate(z_mm):
+        for kind, masks in kinds:
+            owner = ", ".join(names.get(plane, [])) if kind == "object" else ""
+            rows.append(
+                {
+                    "z_mm": float(depth),
+                    "method": focus.method,
+                    "object": owner or None,
+                    "truth": kind,
+                    **mask_agreement(focus.in_focus[plane], None if masks is None else masks[plane]),
+                    "photon_precision": None,
+                    "photon_recall": None,
+                    "entropy_before": before[plane],
+                    "entropy_after": after[plane],
+                }
+            )
+    return rows
+
+
+def mask_agreement(claimed: np.ndarray, true: np.ndarray | None) -> dict[str, float | None]:
+    """IoU, precision, recall, F1 and boundary F of two masks (H, W).
+
+    Two empty masks agree fully. Precision is None if nothing is claimed, recall if nothing is true.
+    """
+    if true is None:
+        return dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f"))
+    both, claims, facts = (int(np.count_nonzero(m)) for m in (claimed & true, claimed, true))
+    either = claims + facts - both
+    return {
+        "iou": both / either if either else 1.0,
+        "precision": both / claims if claims else None,
+        "recall": both / facts if facts else None,
+        "f1": 2 * both / (claims + facts) if either else 1.0,
+        "boundary_f": _boundary_f(claimed, true) if either else 1.0,
+    }
+
+
+def _boundary_f(claimed: np.ndarray, true: np.ndarray) -> float:
+    """F-measure of the outlines: shares of each that lie within the tolerance of the other."""
+    from scipy.ndimage import distance_transform_edt
+
+    outlines = [_outline(mask) for mask in (claimed, true)]
+    if not all(outline.any() for outline in outlines):
+        return 0.0
+    near = [distance_transform_edt(~outline) <= BOUNDARY_TOLERANCE_PX for outline in outlines]
+    precision = near[1][outlines[0]].mean()
+    recall = near[0][outlines[1]].mean()
+    total = precision + recall
+    return float(2 * precision * recall / total) if total else 0.0
+
+
+def _outline(mask: np.ndarray) -> np.ndarray:
+    """Pixels of the mask with a neighbour (of four) outside it; the frame's border is no outline."""
+    p = np.pad(mask, 1, mode="edge")
+    return mask & ~(p[:-2, 1:-1] & p[2:, 1:-1] & p[1:-1, :-2] & p[1:-1, 2:])
+
+
+def _section_entropies(focus: Segmented) -> tuple[list[float], list[float]]:
+    """Entropy of each section before and after removal, mean over the colours, in bits."""
+    pooled = pooled_estimate(focus.sections, SECTION_WINDOW_PX)
+    tops = pooled.max(axis=(1, 2))
+    before: list[float] = []
+    after: list[float] = []
+    for plane, mask, top in zip(pooled, focus.in_focus, tops, strict=True):
+        colours = range(plane.shape[-1])
+        before.append(float(np.mean([entropy_bits(plane[..., c], top[c]) for c in colours])))
+        after.append(float(np.mean([entropy_bits(plane[..., c] * mask, top[c]) for c in colours])))
+    return before, after
+
+
+def _object_rows(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
+    from scipy.ndimage import binary_dilation
+
+    grid = focus.sections.grid
+    pooled = pooled_estimate(focus.sections, SECTION_WINDOW_PX)
+    tops = pooled.max(axis=(0, 1, 2))
+    rows: list[dict[str, Any]] = []
+    for number, name in sorted(truth.names.items()):
+        mask = truth.object_id == number
+        entropy: dict[str, float | None] = {f"{z:g}": None for z in focus.z_mm}
+        if mask.any():
+            surface = truth.z_mm[mask]
+            blur = max(float(blur_half_extent_px(grid, surface, z).mean()) for z in focus.z_mm)
+            region = binary_dilation(mask, iterations=max(1, round(2 * blur)))
+            for z, plane in zip(focus.z_mm, pooled, strict=True):
+                entropy[f"{z:g}"] = region_entropy_bits(plane, region, tops)
+        rows.append({"name": name, "entropy": entropy})
+    return rows
+
+
+def _depth_errors(
+    grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None
+) -> dict[str, float | None]:
+    keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage")
+    if grid is None or depth is None or truth is None or not (truth.object_id > 0).any():
+        return dict.fromkeys(keys)
+    here = truth.object_id > 0
+    estimate, true = depth.z_mm[here], truth.z_mm[here]
+    answered = np.isfinite(estimate)
+    error_mm = np.abs(estimate[answered] - true[answered])
+    error_px = np.full(estimate.shape, np.inf)
+    spread = disparity_spread_px(grid, estimate[answered]) - disparity_spread_px(grid, true[answered])
+    error_px[answered] = np.abs(spread)
+    return {
+        "mae_mm": float(error_mm.mean()) if answered.any() else None,
+        "median_mm": float(np.median(error_mm)) if answered.any() else None,
+        "bad_1px": float((error_px > 1).mean()),
+        "bad_3px": float((error_px > 3).mean()),
+        "coverage": float(answered.mean()),
+    }

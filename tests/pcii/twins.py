@@ -1,0 +1,142 @@
+"""Slow loops that read as the formulas, and small synthetic scenes; shared by the tests."""
+
+import math
+
+import numpy as np
+
+from pcii.bayer import mosaic
+from pcii.types import CameraGrid
+
+def unit_grid(
+    rows: int, cols: int, height: int, width: int, pitch_mm: tuple[float, float] = (1.0, 1.0)
+) -> CameraGrid:
+    """A grid whose disparity at z = 1 mm is `pitch_mm` read as pixels, exactly: focal and pixel are 1."""
+    return CameraGrid(
+        rows=rows, cols=cols, pitch_mm=pitch_mm, focal_mm=1.0, pixel_mm=1.0, height=height, width=width
+    )
+
+
+def paper_grid() -> CameraGrid:
+    return CameraGrid(
+        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=1024, width=1024
+    )
+
+
+def colour_of(i: int, j: int, cfa: str | None) -> int:
+    """Colour of one pixel, by reading the pattern's name."""
+    return 0 if cfa is None else "RGB".index(cfa[2 * (i % 2) + j % 2])
+
+
+def voxel_of(pixel: int, camera: int, cameras: int, disparity: float, subpixel: int) -> int:
+    """The contract's rule for one axis: row i of camera row k, seen at the depth of this disparity."""
+    shift = (camera - (cameras - 1) / 2) * disparity
+    if subpixel == 1:
+        return pixel + math.floor(shift + 1 / 2)
+    return math.floor((pixel + 1 / 2 + shift) * subpixel)
+
+
+def section_twin(
+    counts_KLHW: np.ndarray, grid: CameraGrid, cfa: str | None, z_mm: list[float], subpixel: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Eq. 3 as it reads, before its division: counts and coverage (Z, H M, W M, C) by five loops."""
+    channels = 1 if cfa is None else 3
+    shape = (len(z_mm), grid.height * subpixel, grid.width * subpixel, channels)
+    total, coverage = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint32)
+    K, L, H, W = grid.shape_KLHW
+    for plane, z in enumerate(z_mm):
+        d_x = grid.focal_mm * grid.pitch_mm[0] / (z * grid.pixel_mm)
+        d_y = grid.focal_mm * grid.pitch_mm[1] / (z * grid.pixel_mm)
+        for k in range(K):
+            for l in range(L):  # noqa: E741
+                for i in range(H):
+                    for j in range(W):
+                        row, col = voxel_of(i, k, K, d_y, subpixel), voxel_of(j, l, L, d_x, subpixel)
+                        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
+                            colour = colour_of(i, j, cfa)
+                            total[plane, row, col, colour] += counts_KLHW[k, l, i, j]
+                            coverage[plane, row, col, colour] += 1
+    return total, coverage
+
+
+def reflected(index: int, size: int) -> int:
+    """The index inside 0 .. size-1 that stands for `index` under reflection about the border pixel."""
+    while not 0 <= index < size:
+        index = -index if index < 0 else 2 * (size - 1) - index
+    return index
+
+
+def demosaic_twin(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Eqs. 4, 5 and 6 with their misprints put right, one pixel at a time."""
+    H, W = raw.shape
+
+    def value(i: int, j: int) -> float:
+        return float(raw[reflected(i, H), reflected(j, W)])
+
+    def green(i: int, j: int) -> float:
+        i, j = reflected(i, H), reflected(j, W)
+        if colour_of(i, j, cfa) == 1:
+            return value(i, j)
+        alpha = abs((value(i, j - 2) + value(i, j + 2)) / 2 - value(i, j))
+        beta = abs((value(i - 2, j) + value(i + 2, j)) / 2 - value(i, j))
+        if alpha < beta:
+            return (value(i, j - 1) + value(i, j + 1)) / 2
+        if alpha > beta:
+            return (value(i - 1, j) + value(i + 1, j)) / 2
+        return (value(i - 1, j) + value(i, j - 1) + value(i, j + 1) + value(i + 1, j)) / 4
+
+    def chroma(i: int, j: int, colour: int) -> float:
+        around = [(di, dj) for di in (-1, 0, 1) for dj in (-1, 0, 1)]
+        sites = [(di, dj) for di, dj in around if colour_of((i + di) % 2, (j + dj) % 2, cfa) == colour]
+        if (0, 0) in sites:
+            return value(i, j)
+        differences = [value(i + di, j + dj) - green(i + di, j + dj) for di, dj in sites]
+        return sum(differences) / len(differences) + green(i, j)
+
+    rgb = np.empty((H, W, 3))
+    for i in range(H):
+        for j in range(W):
+            rgb[i, j] = chroma(i, j, 0), green(i, j), chroma(i, j, 2)
+    return rgb
+
+
+def blocky_texture(rng: np.random.Generator, height: int, width: int, block_px: int = 3) -> np.ndarray:
+    """Colour texture (height, width, 3), each block 0.1 or 1: strong, and without a period."""
+    blocks = rng.choice([0.1, 1.0], size=(-(-height // block_px), -(-width // block_px), 3))
+    return blocks.repeat(block_px, axis=0).repeat(block_px, axis=1)[:height, :width]
+
+
+def patch_views(
+    patch: np.ndarray, top: int, left: int, disparity_px: int, grid: CameraGrid
+) -> np.ndarray:
+    """Views (K, L, H, W, C) of a patch whose upper left pixel is (top, left) of the virtual centre.
+
+    `disparity_px` must give whole shifts; what falls outside a view is cut off, the rest is dark.
+    """
+    K, L, H, W = grid.shape_KLHW
+    views = np.zeros((K, L, H, W, patch.shape[2]))
+    for k in range(K):
+        for l in range(L):  # noqa: E741
+            # A camera further right (lower) sees the patch further left (higher).
+            first_row = top - (2 * k - (K - 1)) * disparity_px / 2
+            first_col = left - (2 * l - (L - 1)) * disparity_px / 2
+            assert first_row.is_integer() and first_col.is_integer()
+            rows = int(first_row) + np.arange(patch.shape[0])
+            cols = int(first_col) + np.arange(patch.shape[1])
+            i, j = (rows >= 0) & (rows < H), (cols >= 0) & (cols < W)
+            views[k, l][np.ix_(rows[i], cols[j])] = patch[np.ix_(i, j)]
+    return views
+
+
+def bayer_photons(rates: np.ndarray, cfa: str, seed: int) -> np.ndarray:
+    """Poisson counts (K, L, H, W) of colour rates (K, L, H, W, 3) behind a Bayer pattern."""
+    return np.random.default_rng(seed).poisson(mosaic(rates, cfa))
+
+
+def square_mask(grid: CameraGrid, top: int, left: int, size: int) -> np.ndarray:
+    mask = np.zeros((grid.height, grid.width), dtype=bool)
+    mask[top : top + size, left : left + size] = True
+    return mask
+
+
+def intersection_over_union(a: np.ndarray, b: np.ndarray) -> float:
+    return float((a & b).sum() / (a | b).sum())
