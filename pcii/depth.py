@@ -4,13 +4,16 @@ import numpy as np
 
 from pcii.errors import InputError
 from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
-from pcii.likelihood import cells_to_pixels, focus_scores
+from pcii.likelihood import cells_to_pixels, focus_scores, photons_nearby
 from pcii.types import DepthMap, PhotonCounts, check_z_mm
 
 PLANE_STEP_PX = 1.0
 """Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""
 SIGMA_PX = 14.0
 LEAST_CONFIDENCE = 0.5
+NEARBY_SIGMA_PX = 4.0
+FEWEST_PHOTONS = 10.0
+"""Fewer photons than this within about 10 px of a point: its neighbours' depth is not its own."""
 NEIGHBOURS = 2
 """Planes on either side of the best whose likelihood counts for it: about the focus depth."""
 
@@ -20,8 +23,10 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     Planes of equal disparity steps are compared by their Poisson likelihood over a window; between
     planes a parabola is fitted. `confidence` (H, W) is the posterior probability, all planes being
-    equally likely beforehand, that the depth lies within 2 planes of the best; below one half the
-    method abstains. Raises `InputError` for a range that is not 0 < near < far, or a single view.
+    equally likely beforehand, that the depth lies within 2 planes of the best; below one half, or
+    where there are next to no photons, the method abstains.
+
+    Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
     if len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
@@ -37,9 +42,9 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     spread = _refined(disparity_spread_px(grid, z), scores, best)
     confidence = _posterior_near_best(scores, best)
     depth = np.clip(float(disparity_spread_px(grid, 1.0)) / spread, near, far)
-    # A patch without photons has the same score at all planes.
-    silent = np.ptp(scores, axis=0) < 1e-6
-    abstains = silent | (confidence < LEAST_CONFIDENCE)
+    photons = photons_nearby(counts, z, sigma_px=NEARBY_SIGMA_PX)
+    here = np.take_along_axis(photons, best[None], axis=0)[0]
+    abstains = (here < FEWEST_PHOTONS) | (confidence < LEAST_CONFIDENCE)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, counts), cells_to_pixels(confidence, counts))

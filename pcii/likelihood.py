@@ -41,6 +41,16 @@ def focus_scores(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> 
     return np.stack([_plane_score(counts, depth, sigma_px) for depth in z_mm])
 
 
+def photons_nearby(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> np.ndarray:
+    """Photons of all colours in a Gaussian window (weight 1 at its centre), (Z, H / 4, W / 4)."""
+    from scipy.ndimage import gaussian_filter
+
+    sigma = sigma_px / CELL_PX
+    planes = (_sum_on_cells(_block_counts(counts, depth).sum(axis=0)) for depth in z_mm)
+    smooth = (gaussian_filter(plane, sigma, mode="constant") for plane in planes)
+    return np.stack([2 * np.pi * sigma**2 * plane for plane in smooth])
+
+
 def _plane_score(counts: PhotonCounts, z_mm: float, sigma_px: float) -> np.ndarray:
     from scipy.ndimage import gaussian_filter
     from scipy.special import xlogy

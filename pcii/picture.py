@@ -35,10 +35,10 @@ def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
 
 
 def white_level(linear: np.ndarray, box: tuple[slice, slice]) -> float:
-    """The level to show as white: the brightest but for one value in 200 of what is lit."""
+    """The level to show as white: the brightest but for one value in 50 of what is lit."""
     part = linear[box]
     lit = part[part > 0]
-    return float(np.quantile(lit, 0.995)) if lit.size else 1.0
+    return float(np.quantile(lit, 0.98)) if lit.size else 1.0
 
 
 def mask_image(mask: np.ndarray) -> np.ndarray:

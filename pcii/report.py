@@ -14,7 +14,7 @@ from pcii.demosaic import demosaic
 from pcii.pipeline import depth_range_of
 from pcii.score import object_masks, pixel_masks
 from pcii.store import write_bytes_safely
-from pcii.types import Sections
+from pcii.types import Sections, Truth
 
 if TYPE_CHECKING:
     from pcii.pipeline import Outcome
@@ -101,32 +101,36 @@ def _panel(image: np.ndarray, box: tuple[slice, slice], caption: str) -> dict[st
 
 
 def _figure6(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, str]]:
-    """(a) raw centre view, (b) demosaiced, then sections at full light and from the photons."""
+    """(a) raw centre view, (b) demosaiced, sections at full light and from photons, one view, truth."""
     dataset = outcome.dataset
     k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
-    panels: list[dict[str, str]] = []
     letters = iter("abcdefghijklmnopqrstuvwxyz")
+    panels: list[dict[str, str]] = []
     if dataset.views is not None:
         view = dataset.views.view(k, l).astype(np.float64)
-        raw = view[..., 0] if view.shape[2] == 1 else view
-        colour = demosaic(raw, cfa=dataset.cfa) if dataset.cfa and raw.ndim == 2 else view
+        is_mosaic = dataset.views.cfa is not None
+        colour = demosaic(view[..., 0], cfa=dataset.cfa) if is_mosaic else view
         white = picture.white_level(colour, box)
-        what = f"view ({k}, {l}) at full light"
-        shown = picture.to_srgb8(raw, white)
-        panels.append(_panel(shown, box, f"({next(letters)}) {what}, raw"))
-        if dataset.cfa and raw.ndim == 2:
+        raw = picture.to_srgb8(view, white)
+        panels.append(_panel(raw, box, f"({next(letters)}) view ({k}, {l}) at full light, raw"))
+        if is_mosaic:
             shown = picture.to_srgb8(colour, white)
             panels.append(_panel(shown, box, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
-    counts = dataset.counts.view(k, l)
-    shown = picture.to_srgb8(np.minimum(counts, 1).astype(float), 1.0)
-    panels.append(_panel(shown, box, f"({next(letters)}) view ({k}, {l}): {counts.sum()} photons"))
     per_view = dataset.counts.total / dataset.grid.view_count
-    for sections, light in (
-        (outcome.full_light, "full light"),
-        (outcome.sections, f"{per_view:.0f} photons per view"),
-    ):
-        panels += _section_panels(sections, box, light, letters)
+    panels += _section_panels(outcome.full_light, box, "full light", letters)
+    panels += _section_panels(outcome.sections, box, f"{per_view:.0f} photons per view", letters)
+    counts = dataset.counts.view(k, l)
+    shown = picture.to_srgb8(counts.astype(np.float64), max(1.0, picture.white_level(counts, box)))
+    panels.append(_panel(shown, box, f"({next(letters)}) view ({k}, {l}) alone: {counts.sum()} photons"))
+    if dataset.truth is not None:
+        near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
+        shown = picture.depth_image(_object_depth(dataset.truth), near, far)
+        panels.append(_panel(shown, box, f"({next(letters)}) truth: depth of the objects, key below"))
     return panels
+
+
+def _object_depth(truth: Truth) -> np.ndarray:
+    return np.where(truth.object_id > 0, truth.z_mm, np.inf)
 
 
 def _section_panels(
@@ -173,8 +177,8 @@ def _depth_panels(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
     if truth is not None:
-        objects = np.where(truth.object_id > 0, truth.z_mm, np.inf)
-        panels.append(_panel(picture.depth_image(objects, near, far), box, "true depth of the objects"))
+        shown = picture.depth_image(_object_depth(truth), near, far)
+        panels.append(_panel(shown, box, "true depth of the objects"))
     shown = picture.to_srgb8(depth.confidence**2.2, 1.0)
     panels.append(_panel(shown, box, "confidence, black 0 to white 1"))
     return panels

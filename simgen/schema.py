@@ -58,10 +58,10 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
     errors = fault.errors(include_url=False)
     # An unknown key is most often the cause of the missing one, so it is told first.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
-    where = _dotted(first["loc"])
+    location, known = _follow(model, first["loc"])
+    where = _dotted(location)
     if first["type"] == "extra_forbidden":
-        known = _known_keys(model, first["loc"])
-        text = f"unknown key '{where}'{suggestion(str(first['loc'][-1]), known)}"
+        text = f"unknown key '{where}'{suggestion(str(location[-1]), known)}"
     elif first["type"] == "missing":
         text = f"'{where}' is missing"
     elif first["type"] == "value_error":
@@ -75,7 +75,7 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
 
 
 def _dotted(location: Iterable[int | str]) -> str:
-    """`objects[1].shape.radius_mm` from pydantic's location, without its union tags."""
+    """`objects[1].shape.radius_mm` from a location."""
     text = ""
     for part in location:
         if isinstance(part, int):
@@ -94,20 +94,31 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     return f"; known are {', '.join(words)}" if words else ""
 
 
-def _known_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> set[str]:
-    """Keys allowed at the place of an unknown one: walk the models along its location."""
+def _follow(
+    model: type[BaseModel], location: tuple[int | str, ...]
+) -> tuple[tuple[int | str, ...], set[str]]:
+    """Pydantic's location without the tags of unions, and the keys that are known at its last part."""
     candidates: list[type[BaseModel]] = [model]
-    for part in location[:-1]:
-        if isinstance(part, int):
+    path: list[int | str] = []
+    last: set[str] = set()
+    for part in location:
+        keys = {key for candidate in candidates for key in candidate.model_fields}
+        tagged = [one for one in candidates if part == _tag(one)]
+        if tagged and part not in keys:
+            candidates = tagged
             continue
-        following: list[type[BaseModel]] = []
-        for candidate in candidates:
-            if part in candidate.model_fields:
-                following += _models_in(candidate.model_fields[part].annotation)
-            elif part == getattr(candidate.model_fields.get("type"), "default", None):
-                following.append(candidate)  # a union's tag is part of the location
-        candidates = following
-    return {key for candidate in candidates for key in candidate.model_fields}
+        path.append(part)
+        if isinstance(part, str):
+            last = keys
+            fields = [one.model_fields[part] for one in candidates if part in one.model_fields]
+            candidates = [inner for field in fields for inner in _models_in(field.annotation)]
+    return tuple(path), last
+
+
+def _tag(model: type[BaseModel]) -> str | None:
+    """The value of `type` by which a union recognises the model."""
+    field = model.model_fields.get("type")
+    return None if field is None else field.default
 
 
 def _models_in(annotation: Any) -> list[type[BaseModel]]:

@@ -7,6 +7,7 @@ import numpy as np
 from pcii.bayer import mosaic
 from pcii.types import CameraGrid
 
+
 def unit_grid(
     rows: int, cols: int, height: int, width: int, pitch_mm: tuple[float, float] = (1.0, 1.0)
 ) -> CameraGrid:
@@ -105,9 +106,7 @@ def blocky_texture(rng: np.random.Generator, height: int, width: int, block_px: 
     return blocks.repeat(block_px, axis=0).repeat(block_px, axis=1)[:height, :width]
 
 
-def patch_views(
-    patch: np.ndarray, top: int, left: int, disparity_px: int, grid: CameraGrid
-) -> np.ndarray:
+def patch_views(patch: np.ndarray, top: int, left: int, disparity_px: int, grid: CameraGrid) -> np.ndarray:
     """Views (K, L, H, W, C) of a patch whose upper left pixel is (top, left) of the virtual centre.
 
     `disparity_px` must give whole shifts; what falls outside a view is cut off, the rest is dark.

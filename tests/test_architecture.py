@@ -1,0 +1,115 @@
+"""The import rules of the design, kept by reading the source."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+HEAVY = {"mitsuba", "drjit", "colour"}
+# What simgen may share with pcii: nouns, masks, the file format and how commands behave. Not its
+# geometry or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
+SHARED = {"pcii", "pcii.types", "pcii.bayer", "pcii.errors", "pcii.store", "pcii.dataset", "pcii.console"}
+# Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
+PCII_LEVELS = [
+    {"errors"},
+    {"bayer", "store", "console"},
+    {"types"},
+    {"geometry", "dataset", "demosaic", "picture"},
+    {"reconstruct", "planes", "foreground"},
+    {"statistics"},
+    {"likelihood"},
+    {"three_step", "depth", "score"},
+    {"segment"},
+    {"results"},
+    {"pipeline"},
+    {"report"},
+    {"cli"},
+]
+SIMGEN_LEVELS = [
+    {"locations", "seeds"},
+    {"backend", "schema"},
+    {"recipe", "scene"},
+    {"cameras", "light"},
+    {"build", "sensor"},
+    {"render", "truth"},
+    {"generate", "preview"},
+    {"cli"},
+]
+
+
+def modules(package: str) -> dict[str, ast.Module]:
+    return {file.stem: ast.parse(file.read_text()) for file in sorted((ROOT / package).glob("*.py"))}
+
+
+def imported(node: ast.AST) -> set[str]:
+    """Dotted names that one statement imports; `from a import b` counts as a and a.b."""
+    if isinstance(node, ast.Import):
+        return {alias.name for alias in node.names}
+    if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        return {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return set()
+
+
+def all_imports(tree: ast.Module) -> set[str]:
+    return set().union(*(imported(node) for node in ast.walk(tree)))
+
+
+def checks_types_only(node: ast.AST) -> bool:
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+
+
+def top_level_imports(tree: ast.Module) -> set[str]:
+    return set().union(*(imported(node) for node in tree.body if not checks_types_only(node)))
+
+
+def roots(names: set[str]) -> set[str]:
+    return {name.split(".")[0] for name in names}
+
+
+def test_pcii_never_imports_simgen_or_a_renderer() -> None:
+    for name, tree in modules("pcii").items():
+        assert not roots(all_imports(tree)) & {"simgen", *HEAVY}, name
+
+
+def test_simgen_takes_from_pcii_only_what_is_no_physics() -> None:
+    known = {f"pcii.{name}" for name in modules("pcii")}
+    for name, tree in modules("simgen").items():
+        taken = all_imports(tree) & (known | {"pcii"})
+        assert taken <= SHARED, f"simgen.{name} imports {sorted(taken - SHARED)}"
+
+
+def test_the_renderer_is_loaded_in_one_file_inside_functions() -> None:
+    for name, tree in modules("simgen").items():
+        assert not roots(top_level_imports(tree)) & HEAVY, name
+        if name != "backend":
+            assert not roots(all_imports(tree)) & {"mitsuba", "drjit"}, name
+
+
+@pytest.mark.parametrize(("package", "levels"), [("pcii", PCII_LEVELS), ("simgen", SIMGEN_LEVELS)])
+def test_arrows_run_one_way(package: str, levels: list[set[str]]) -> None:
+    rank = {name: number for number, level in enumerate(levels) for name in level}
+    trees = modules(package)
+    trees.pop("__init__")
+    assert set(trees) == set(rank), "a module has no level, or a level no module"
+    for name, tree in trees.items():
+        used = {part for part in trees if f"{package}.{part}" in top_level_imports(tree)}
+        for other in used:
+            assert rank[other] < rank[name], f"{package}.{name} imports {package}.{other}"
+
+
+def test_importing_pcii_is_light() -> None:
+    script = (
+        "import sys, time; start = time.perf_counter(); import pcii;"
+        "spent = time.perf_counter() - start;"
+        "print(spent, *[m for m in ('mitsuba', 'drjit', 'colour', 'simgen') if m in sys.modules])"
+    )
+    best = min(
+        (subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
+        for _ in range(3)
+    )
+    seconds, *loaded = best.split()
+    assert loaded == []
+    assert float(seconds) < 0.5

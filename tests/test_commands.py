@@ -1,0 +1,174 @@
+"""The commands as a user types them: results, exit codes, one sentence for bad input."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pcii import cli as pcii_cli
+from pcii import console
+from pcii.store import MANIFEST
+from simgen import cli as simgen_cli
+
+pytestmark = pytest.mark.renders
+
+
+@pytest.fixture(scope="module")
+def results(small_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("results") / "small"
+    assert console.run(pcii_cli.app, ["run", str(small_dataset), "-o", str(out)]) == 0
+    return out
+
+
+def refusal(app: object, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one sentence with which a command refuses bad input."""
+    assert console.run(app, arguments) == 2  # type: ignore[arg-type]
+    said = capsys.readouterr().err.strip()
+    assert said.startswith("error: ")
+    assert "\n" not in said
+    assert "Traceback" not in said
+    return said
+
+
+def test_score_json_is_as_in_the_contract(results: Path) -> None:
+    score = json.loads((results / "score.json").read_text())
+    assert list(score) == ["dataset", "planes", "objects", "depth"]
+    keys = "z_mm method object truth iou precision recall f1 boundary_f photon_precision photon_recall"
+    for row in score["planes"]:
+        assert list(row) == [*keys.split(), "entropy_before", "entropy_after"]
+        assert row["truth"] in ("object", "pixel")
+    assert {(row["z_mm"], row["method"]) for row in score["planes"]} == {
+        (z, method) for z in (540.0, 620.0) for method in ("three-step", "likelihood")
+    }
+    assert [row["name"] for row in score["objects"]] == ["ball", "bird"]
+    assert list(score["depth"]) == ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
+
+
+def test_table_1_holds_on_the_small_scene(results: Path) -> None:
+    objects = json.loads((results / "score.json").read_text())["objects"]
+    ball, bird = (row["entropy"] for row in objects)
+    assert ball["540"] < ball["620"]
+    assert bird["620"] < bird["540"]
+
+
+def test_objects_are_found_on_the_small_scene(results: Path) -> None:
+    # 38 px wide objects and a blur of 3.8 px: a coarse bound, the full size is scored elsewhere.
+    rows = json.loads((results / "score.json").read_text())["planes"]
+    for row in rows:
+        if row["truth"] == "object":
+            assert row["iou"] > 0.5, row
+
+
+def test_the_report_is_one_file_with_everything_in_it(results: Path) -> None:
+    page = (results / "report.html").read_text()
+    assert "Figure 6" in page
+    assert "Figure 7" in page
+    assert "Table 1" in page
+    assert page.count("data:image/png;base64,") >= 8 + 4 * 3 + 3
+    assert "<script" not in page
+    assert "http" not in page
+    assert str(results.parent) not in page
+
+
+def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path, tmp_path: Path) -> None:
+    out, data = str(tmp_path / "steps"), str(small_dataset)
+    for method in ("three-step", "likelihood"):
+        command = ["segment", data, "--z-mm", "540", "--z-mm", "620", "--method", method, "-o", out]
+        assert console.run(pcii_cli.app, command) == 0
+    assert console.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
+    assert console.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", out]) == 0
+    assert console.run(pcii_cli.app, ["score", data, out]) == 0
+    one, other = (json.loads((Path(d) / "score.json").read_text()) for d in (out, results))
+    by_name = [
+        sorted(s["planes"], key=lambda row: (row["method"], row["z_mm"], row["truth"])) for s in (one, other)
+    ]
+    assert by_name[0] == by_name[1]
+    assert one["depth"] == other["depth"]
+    assert (tmp_path / "steps" / "section_580mm.png").is_file()
+
+
+def test_bad_input_to_simgen_is_told_in_one_sentence(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    recipe, out = tmp_path / "r.toml", str(tmp_path / "out")
+    recipe.write_text('scene = "two_objects"\n[photon]\nbudget = 3\n')
+    assert "did you mean 'photons'" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
+    recipe.write_text('scene = "nowhere"\n')
+    assert "there is no scene 'nowhere'" in refusal(
+        simgen_cli.app, ["generate", str(recipe), "-o", out], capsys
+    )
+    recipe.write_text('scene = "two_objects"\n[sensor]\ncfa = "GRGB"\n')
+    assert "GRBG" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
+    recipe.write_text("scene = ")
+    assert "not valid TOML" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
+    recipe.write_text('scene = "two_objects"\n')
+    assert "holds something else" in refusal(
+        simgen_cli.app, ["generate", str(recipe), "-o", str(tmp_path)], capsys
+    )
+    refusal(simgen_cli.app, ["generate"], capsys)
+    refusal(simgen_cli.app, ["generate", str(recipe), "-o", out, "--colour"], capsys)
+    assert not Path(out).exists()
+
+
+def test_bad_input_to_pcii_is_told_in_one_sentence(
+    small_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    data, out = str(small_dataset), str(tmp_path / "out")
+    for z in ("0", "-540", "nan", "inf"):
+        said = refusal(pcii_cli.app, ["reconstruct", data, f"--z-mm={z}", "-o", out], capsys)
+        assert "above 0 mm" in said
+    assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
+    assert "this is the dataset itself" in refusal(pcii_cli.app, ["run", data, "-o", data], capsys)
+    broken = tmp_path / "broken"
+    shutil.copytree(small_dataset, broken)
+    (broken / "counts.zarr" / "n" / "c" / "0").write_bytes(b"")
+    assert "truncated" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
+    (broken / MANIFEST).write_text("{")
+    assert "not valid JSON" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").touch()
+    assert "holds something else" in refusal(
+        pcii_cli.app, ["run", data, "-o", str(tmp_path / "full")], capsys
+    )
+    assert not Path(out).exists()
+
+
+def test_a_failure_is_one_line_and_exit_code_1(
+    monkeypatch: pytest.MonkeyPatch, small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full_disk(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("pcii.results.save_sections", full_disk)
+    command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
+    assert console.run(pcii_cli.app, command) == 1
+    assert "No space left" in capsys.readouterr().err
+
+
+def test_help_of_every_command_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    for app in (simgen_cli.app, pcii_cli.app):
+        for command in app:
+            if not command.startswith("-"):
+                assert console.run(app, [command, "--help"]) == 0
+                assert "Example" in capsys.readouterr().out, command
+
+
+def test_doctor_and_scenes_and_schema_speak(capsys: pytest.CaptureFixture[str]) -> None:
+    assert console.run(simgen_cli.app, ["doctor"]) == 0
+    assert "Rendering will run with" in capsys.readouterr().out
+    assert console.run(simgen_cli.app, ["scenes"]) == 0
+    assert "two_objects" in capsys.readouterr().out
+    for what in ("scene", "recipe"):
+        assert console.run(simgen_cli.app, ["schema", what]) == 0
+        schema = json.loads(capsys.readouterr().out)
+        assert schema["additionalProperties"] is False
+
+
+def test_preview_writes_a_picture(tmp_path: Path) -> None:
+    from PIL import Image
+
+    out = tmp_path / "look.png"
+    assert console.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
+    assert np.asarray(Image.open(out)).std() > 10
