@@ -39,8 +39,8 @@ class Dataset:
         arrays = self._arrays(COUNTS, "counts")
         if "dense" in arrays:
             return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
-        columns = [arrays[name] for name in "klijn"]
-        return PhotonCounts.from_events(*columns, self.grid, cfa=self.cfa)
+        columns = {name: arrays[name] for name in "klijn"}
+        return PhotonCounts.from_events(**columns, grid=self.grid, cfa=self.cfa)
 
     @cached_property
     def truth(self) -> Truth | None:
@@ -93,7 +93,7 @@ class _ExrStack:
         self._dataset = dataset
         self.shape = (*dataset.grid.shape_KLHW, channels)
 
-    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+    def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         path = self._dataset.check(radiance_name(*index))
         image = read_exr(path)
         if image.shape != self.shape[2:]:

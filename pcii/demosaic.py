@@ -40,7 +40,7 @@ def demosaic(
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
-    colour = colour_index(*raw.shape, cfa)
+    colour = colour_index(raw.shape[0], raw.shape[1], cfa)
     green = _green(raw, colour)
     image = np.empty((*raw.shape, 3))
     image[..., GREEN] = green

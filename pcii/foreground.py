@@ -58,10 +58,17 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     return ~_large_pieces(~_large_pieces(mask, smallest_px), smallest_px)
 
 
-def _large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+def connected_pieces(mask: np.ndarray) -> np.ndarray:
+    """Number of the connected piece (by edges) that each pixel belongs to, from 1; 0 outside."""
     from scipy.ndimage import label
 
-    pieces, _ = label(mask)
+    pieces = np.zeros(mask.shape, dtype=np.int32)
+    label(mask, output=pieces)
+    return pieces
+
+
+def _large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+    pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px
     keep[0] = False
     return keep[pieces]

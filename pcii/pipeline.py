@@ -123,7 +123,7 @@ class _Counted:
         self._radiance, self._total, self._report, self._done = radiance, total, report, 0
         self.shape = radiance.shape
 
-    def __getitem__(self, index: Any) -> Any:
+    def __getitem__(self, index: Any, /) -> Any:
         self._done += 1
         self._report("views at full light", self._done, self._total)
         return self._radiance[index]

@@ -134,7 +134,7 @@ def _boundary_f(claimed: np.ndarray, true: np.ndarray) -> float:
     outlines = [_outline(mask) for mask in (claimed, true)]
     if not all(outline.any() for outline in outlines):
         return 0.0
-    near = [distance_transform_edt(~outline) <= BOUNDARY_TOLERANCE_PX for outline in outlines]
+    near = [np.asarray(distance_transform_edt(~outline)) <= BOUNDARY_TOLERANCE_PX for outline in outlines]
     precision = near[1][outlines[0]].mean()
     recall = near[0][outlines[1]].mean()
     total = precision + recall

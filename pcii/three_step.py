@@ -14,7 +14,7 @@ stand between the requested ones, so that what is sharp at none of them is remov
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.foreground import brightness, foreground, roberts_magnitude, without_specks
+from pcii.foreground import brightness, connected_pieces, foreground, roberts_magnitude, without_specks
 from pcii.geometry import blur_half_extent_px
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
@@ -114,10 +114,10 @@ def _sharpest_plane(
     A region is a connected piece of what is bright at any requested plane. Its entropy is taken over the
     region grown by the blur that it could have, so that all planes show the same object and light.
     """
-    from scipy.ndimage import binary_dilation, find_objects, label
+    from scipy.ndimage import binary_dilation, find_objects
 
     winner = np.full(masks[0].shape, -1, dtype=np.int64)
-    regions, _ = label(np.logical_or.reduce(masks))
+    regions = connected_pieces(np.logical_or.reduce(masks))
     margin = int(np.ceil(max(blur_half_extent_px(counts.grid, compared, compared[0]))))
     margin = min(margin, LARGEST_MARGIN_PX)
     for number, box in enumerate(find_objects(regions), start=1):

@@ -97,7 +97,7 @@ class ArrayLike5D(Protocol):
     @property
     def shape(self) -> tuple[int, ...]: ...
 
-    def __getitem__(self, index: Any) -> Any: ...
+    def __getitem__(self, index: Any, /) -> Any: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,19 +208,20 @@ class PhotonCounts:
         outside the grid, a negative or fractional count, or lists of different lengths.
         """
         check_cfa(cfa)
-        columns: list[np.ndarray] = []
-        limits = (("k", k, grid.rows), ("l", l, grid.cols), ("i", i, grid.height))
-        for name, values, limit in (*limits, ("j", j, grid.width)):
+        where: dict[str, np.ndarray] = {}
+        for (name, values), limit in zip(
+            {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
+        ):
             column = _whole_counts(name, np.atleast_1d(values))
             if column.ndim != 1:
                 raise InputError(f"{name}: expected a one-dimensional list")
             if column.size and column.max() >= limit:
                 raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
-            columns.append(column.astype(np.int32))
+            where[name] = column.astype(np.int32)
         photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
-        if len({column.shape for column in (*columns, photons)}) != 1:
+        if len({column.shape for column in (*where.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
-        return cls(grid, cfa, _events=_canonical_events(*columns, photons, grid))
+        return cls(grid, cfa, _events=_canonical_events(**where, n=photons, grid=grid))
 
     @property
     def is_sparse(self) -> bool:
@@ -233,9 +234,9 @@ class PhotonCounts:
         if self._events is not None:
             return self._events
         assert self._dense is not None
-        k, l, i, j = (a.astype(np.int32) for a in np.nonzero(self._dense))
-        n = self._dense[k, l, i, j].astype(np.int64)
-        return PhotonEvents(*(read_only(a) for a in (k, l, i, j, n)))
+        where = np.nonzero(self._dense)
+        n = self._dense[where].astype(np.int64)
+        return _events(where, n)
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l)."""
@@ -274,8 +275,12 @@ def _canonical_events(
     photons = np.zeros(where.size, dtype=np.int64)
     np.add.at(photons, inverse, n)
     where, photons = where[photons > 0], photons[photons > 0]
-    indices = (a.astype(np.int32) for a in np.unravel_index(where, grid.shape_KLHW))
-    return PhotonEvents(*(read_only(a) for a in indices), read_only(photons))
+    return _events(np.unravel_index(where, grid.shape_KLHW), photons)
+
+
+def _events(where: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
+    k, l, i, j = (read_only(index.astype(np.int32)) for index in where)
+    return PhotonEvents(k, l, i, j, read_only(n))
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,7 +138,8 @@ def shape_numbers(scene: Any) -> list[int]:
         return list(range(1, len(scene.shapes()) + 1))
     import drjit as dr
 
-    return [int(number) for number in dr.reinterpret_array(load().UInt32, scene.shapes_dr())]
+    numbers: Any = dr.reinterpret_array(load().UInt32, scene.shapes_dr())
+    return [int(number) for number in numbers]
 
 
 def _candidates(kind: Kind) -> list[Candidate]:

@@ -66,7 +66,7 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
         text = f"'{where}' is missing"
     elif first["type"] == "value_error":
         text = f"'{where}': " if where else ""
-        text += str(first["ctx"]["error"])
+        text += str(first.get("ctx", {}).get("error"))
     else:
         message = first["msg"][0].lower() + first["msg"][1:]
         text = f"'{where}': {message}, got {first['input']!r}"

@@ -30,7 +30,7 @@ def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
     """
     if scope != "channel":
         return np.array([raw.sum(dtype=np.float64)])
-    colours = colour_index(*raw.shape, cfa)
+    colours = colour_index(raw.shape[0], raw.shape[1], cfa)
     return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
 
 
@@ -45,7 +45,7 @@ def photon_rates(raw: np.ndarray, cfa: str | None, photons: Photons, energies: n
     share = np.divide(photons.budget, energies, out=np.zeros_like(energies), where=energies > 0)
     if photons.scope != "channel":
         return raw * share[0]
-    return raw * share[colour_index(*raw.shape, cfa)]
+    return raw * share[colour_index(raw.shape[0], raw.shape[1], cfa)]
 
 
 def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
@@ -76,7 +76,9 @@ def draw_counts(
         return rng.poisson(rates)
     counts = np.zeros(rates.shape, dtype=np.int64)
     by_colour = totals.size > 1
-    colours = colour_index(*rates.shape, cfa) if by_colour else np.zeros(rates.shape, np.uint8)
+    colours = (
+        colour_index(rates.shape[0], rates.shape[1], cfa) if by_colour else np.zeros(rates.shape, np.uint8)
+    )
     for group, total in enumerate(totals):
         here = colours == group
         if total > 0:

@@ -67,11 +67,12 @@ def card(
 @pytest.mark.parametrize("point", [(0.0, 0.0, 500.0), (60.0, 25.0, 600.0), (-70.0, -40.0, 720.0)])
 def test_a_dot_appears_where_geometry_says(point: tuple[float, float, float], tmp_path: Path) -> None:
     # The dot is a card parallel to the sensor: its image is a square about its centre's image, evenly
-    # lit (a ball's would be shaded, and pull the centroid). The tolerance is for noise.
-    cameras = grid(2, 3, 200, 260)
-    scene = built(tmp_path, [card("dot", point[2], 4.0, {"reflectance": [1, 1, 1]}, at_mm=point[:2])])
-    for k, l in ((0, 0), (0, 2), (1, 0), (1, 1)):
-        image = render_view(scene, cameras, k, l, samples_per_pixel=64, seed=11).sum(axis=2)
+    # lit (a ball's would be shaded, and pull the centroid). Its 20 pixels of 512 samples leave noise of
+    # about 1.4 px x 0.6 / sqrt(10^4) = 0.01 px.
+    cameras = grid(2, 3, 100, 130, pixel_mm=0.1408)
+    scene = built(tmp_path, [card("dot", point[2], 8.0, {"reflectance": [1, 1, 1]}, at_mm=point[:2])])
+    for k, l in ((0, 0), (0, 2), (1, 1)):
+        image = render_view(scene, cameras, k, l, samples_per_pixel=512, seed=11).sum(axis=2)
         i, j = np.indices(image.shape)
         found = np.array([(i * image).sum(), (j * image).sum()]) / image.sum()
         expected = np.array(project_px(cameras, point, k, l))

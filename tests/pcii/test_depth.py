@@ -1,0 +1,123 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.depth import estimate_depth
+from pcii.errors import InputError
+from pcii.geometry import disparity_spread_px
+from pcii.types import DepthMap, PhotonCounts
+
+RANGE_MM = (1 / 9, 1 / 1)
+
+
+@pytest.fixture(scope="module")
+def depth(two_squares) -> DepthMap:
+    return estimate_depth(two_squares.counts, RANGE_MM)
+
+
+def spread_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
+    """Errors in px of total disparity over one square; infinite where the method abstains."""
+    z = depth.z_mm[scene.masks[plane]]
+    errors = np.abs(disparity_spread_px(scene.grid, z) - disparity_spread_px(scene.grid, scene.z_mm[plane]))
+    return np.where(np.isnan(errors), np.inf, errors)
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+def test_depths_of_the_squares_are_right(depth, two_squares, plane):
+    errors = spread_errors_px(depth, two_squares, plane)
+    # Planes are 1 px of spread apart, so half of that is the nearest plane; the rest of the outline
+    # within a window of 14 px may be mixed with the dark.
+    assert np.median(errors) < 0.5
+    assert (errors < 1.0).mean() > 0.9
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
+    flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
+    errors = spread_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
+    assert np.median(errors) > 0.5
+
+
+def test_the_dark_has_no_depth(depth, two_squares):
+    # No photon of a plane in the range comes within the reach of the window (4 x 14 px) of this corner.
+    corner = (slice(0, 24), slice(-24, None))
+    assert np.isnan(depth.z_mm[corner]).all()
+    # Elsewhere a window that reaches a square may answer.
+    dark = ~(two_squares.masks[0] | two_squares.masks[1])
+    assert np.isnan(depth.z_mm[dark]).mean() > 0.8
+
+
+def test_confidence_is_zero_exactly_where_the_method_abstains(depth):
+    np.testing.assert_array_equal(np.isnan(depth.z_mm), depth.confidence == 0)
+    assert depth.confidence.min() == 0
+    # A share of a sum: one rounding above 1 at most.
+    assert 0.5 <= depth.confidence[depth.confidence > 0].min() <= depth.confidence.max() <= 1 + 1e-12
+
+
+def test_depths_stay_in_the_range(depth):
+    answered = depth.z_mm[~np.isnan(depth.z_mm)]
+    assert RANGE_MM[0] <= answered.min() <= answered.max() <= RANGE_MM[1]
+
+
+def test_a_range_without_the_object_still_answers_inside_the_range(two_squares):
+    near, far = 1 / 9, 1 / 5  # the first square is at 1 / 3
+    z = estimate_depth(two_squares.counts, (near, far)).z_mm
+    assert near <= np.nanmin(z) <= np.nanmax(z) <= far
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (33, 18)])
+def test_no_photons_have_no_depth(cfa, size):
+    grid = unit_grid(2, 3, *size)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
+    depth = estimate_depth(dark, (0.2, 1.0))
+    assert depth.z_mm.shape == size
+    assert np.isnan(depth.z_mm).all()
+    assert not depth.confidence.any()
+
+
+@pytest.mark.parametrize("event", [(1, 1, 30, 30), (0, 2, 30, 30), (0, 0, 0, 0)])
+def test_one_photon_has_no_depth(event):
+    grid = unit_grid(3, 3, 64, 64)
+    one = PhotonCounts.from_events(*np.array([[*event, 1]]).T, grid, cfa="GRBG")
+    assert np.isnan(estimate_depth(one, (0.2, 1.0)).z_mm).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 2), (16, 17)])
+def test_saturated_counts_have_an_answer(size):
+    grid = unit_grid(3, 2, *size)
+    bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 10**9), grid, cfa="GRBG")
+    depth = estimate_depth(bright, (0.2, 1.0))
+    assert np.isfinite(depth.confidence).all()
+
+
+BAD_RANGES: list[Any] = [
+    (0, 1),
+    (-1, 1),
+    (2.0, 1.0),
+    (1.0, 1.0),
+    (float("nan"), 1),
+    (1, float("inf")),
+    (1.0,),
+    (1.0, 2.0, 3.0),
+    (),
+    ("near", "far"),
+]
+
+
+@pytest.mark.parametrize("bad", BAD_RANGES)
+def test_a_range_that_is_not_near_to_far_is_refused(bad):
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    with pytest.raises(InputError, match="^z_(range_)?mm: ") as caught:
+        estimate_depth(counts, bad)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_view_is_refused():
+    grid = unit_grid(1, 1, 8, 8)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    with pytest.raises(InputError, match="^counts: one view has no depth"):
+        estimate_depth(counts, (1.0, 2.0))

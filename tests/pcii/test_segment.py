@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+from twins import intersection_over_union, unit_grid
+
+from pcii.errors import InputError
+from pcii.planes import with_probes
+from pcii.segment import METHODS, segment
+from pcii.types import PhotonCounts
+
+methods = pytest.mark.parametrize("method", sorted(METHODS))
+
+# The outline is found on windows of 5 px, so allow it to be 3 px off all along a square of 72 px.
+LEAST_IOU = (66 / 72) ** 2
+
+
+@methods
+def test_each_object_is_in_focus_at_its_own_depth_alone(two_squares, method):
+    focus = segment(two_squares.counts, two_squares.z_mm, method=method)
+    for plane, here in enumerate(two_squares.masks):
+        there = two_squares.masks[1 - plane]
+        assert intersection_over_union(focus.in_focus[plane], here) > LEAST_IOU
+        # Brightness alone would keep the other object as well.
+        assert (focus.in_focus[plane] & there).sum() < 0.05 * there.sum()
+
+
+@methods
+def test_cameras_in_the_wrong_order_do_not_pass(two_squares, method):
+    # The planted fault of the test above: the sign of the shifts reversed, which nothing else shows.
+    flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
+    focus = segment(flipped, two_squares.z_mm, method=method)
+    found = [intersection_over_union(focus.in_focus[p], two_squares.masks[p]) for p in (0, 1)]
+    assert max(found) < LEAST_IOU / 2
+
+
+@methods
+def test_nothing_is_in_focus_where_nothing_is(two_squares, method):
+    between = 2 / (1 / two_squares.z_mm[0] + 1 / two_squares.z_mm[1])  # 6 px of blur from either
+    focus = segment(two_squares.counts, [*two_squares.z_mm, between], method=method)
+    assert focus.in_focus[2].sum() < 0.05 * two_squares.masks[0].sum()
+
+
+@methods
+def test_masks_follow_the_order_of_the_depths(two_squares, method):
+    forward = segment(two_squares.counts, two_squares.z_mm, method=method)
+    backward = segment(two_squares.counts, two_squares.z_mm[::-1], method=method)
+    np.testing.assert_array_equal(forward.in_focus, backward.in_focus[::-1])
+
+
+@methods
+def test_sparse_and_dense_counts_give_the_same_masks(two_squares, method):
+    k, l, i, j = np.nonzero(two_squares.dense)  # noqa: E741
+    n = two_squares.dense[k, l, i, j]
+    sparse = PhotonCounts.from_events(k, l, i, j, n, two_squares.grid, cfa="GRBG")
+    one = segment(sparse, two_squares.z_mm, method=method).in_focus
+    np.testing.assert_array_equal(one, segment(two_squares.counts, two_squares.z_mm, method=method).in_focus)
+
+
+@methods
+def test_the_sections_of_a_result_are_those_of_its_depths(two_squares, method):
+    focus = segment(two_squares.counts, two_squares.z_mm, method=method)
+    np.testing.assert_array_equal(focus.z_mm, two_squares.z_mm)
+    np.testing.assert_array_equal(focus.sections.z_mm, two_squares.z_mm)
+    assert not focus.cleaned[~focus.in_focus].any()
+    assert all(step.shape == focus.in_focus.shape for step in focus.steps.values())
+
+
+@methods
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_no_photons_leave_nothing_in_focus(method, cfa):
+    grid = unit_grid(3, 3, 64, 64)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
+    assert not segment(dark, [0.5, 1.0], method=method).in_focus.any()
+
+
+@methods
+@pytest.mark.parametrize("event", [(1, 1, 30, 30), (0, 2, 30, 30), (0, 0, 0, 0)])
+def test_one_photon_leaves_nothing_in_focus(method, event):
+    grid = unit_grid(3, 3, 64, 64)
+    one = PhotonCounts.from_events(*np.array([[*event, 1]]).T, grid, cfa="GRBG")
+    assert not segment(one, [0.5, 1.0], method=method).in_focus.any()
+
+
+@methods
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 3)])
+def test_tiny_saturated_images_have_an_answer(method, size):
+    grid = unit_grid(2, 3, *size)
+    bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 10**9), grid, cfa="GRBG")
+    assert segment(bright, [0.5, 1.0], method=method).in_focus.shape == (2, *size)
+
+
+@methods
+def test_one_view_is_refused(method):
+    grid = unit_grid(1, 1, 8, 8)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid, cfa="GRBG")
+    with pytest.raises(InputError, match="^counts: one view has no depth"):
+        segment(counts, 1.0, method=method)
+
+
+def test_an_unknown_method_is_refused_with_the_known_ones(two_squares):
+    with pytest.raises(InputError, match=r"^method: .*'magic'.*three-step.*likelihood"):
+        segment(two_squares.counts, two_squares.z_mm, method="magic")
+
+
+@methods
+@pytest.mark.parametrize("bad", [0, -1.0, float("nan"), []])
+def test_a_depth_that_cannot_be_is_refused(two_squares, method, bad):
+    with pytest.raises(InputError, match="^z_mm: "):
+        segment(two_squares.counts, bad, method=method)
+
+
+def test_probes_stand_14_and_28_px_of_spread_around_a_plane():
+    grid = unit_grid(5, 5, 8, 8)  # spread 4 / z
+    z = with_probes(grid, np.array([4 / 50]))
+    np.testing.assert_allclose(4 / z, [50, 50 - 28, 50 - 14, 50 + 14, 50 + 28], rtol=1e-14)  # two divisions
+
+
+def test_no_probe_is_near_another_plane_or_beyond_infinity():
+    grid = unit_grid(5, 5, 8, 8)
+    planes = np.array([4 / 20, 4 / 35])
+    spread = 4 / with_probes(grid, planes)
+    np.testing.assert_allclose(spread[:2], [20, 35], rtol=1e-14)  # two divisions
+    assert np.all(spread > 0)
+    gaps = np.abs(spread[2:, None] - spread[:2])
+    assert gaps.min() > 7  # half a probe step
+
+
+def test_a_single_camera_has_no_probes():
+    np.testing.assert_array_equal(with_probes(unit_grid(1, 1, 4, 4), np.array([1.0, 2.0])), [1.0, 2.0])
