@@ -33,7 +33,7 @@ depths = st.floats(200, 5000)
 
 def test_a_camera_further_right_sees_a_point_further_left():
     grid = unit_grid(3, 3, 9, 9, pitch_mm=(2.0, 1.0))
-    columns = [project_px(grid, (0, 0, 1), 1, l)[1] for l in range(3)]  # noqa: E741
+    columns = [project_px(grid, (0, 0, 1), 1, l)[1] for l in range(3)]
     assert columns == [6.0, 4.0, 2.0]  # X_l = -2, 0, 2
 
 
@@ -50,7 +50,7 @@ def test_right_and_down_in_the_world_are_right_and_down_in_the_image():
 
 def test_the_row_of_a_camera_does_not_depend_on_its_column():
     grid = unit_grid(3, 3, 9, 9, pitch_mm=(2.0, 1.0))
-    assert {project_px(grid, (3, 1, 2), 0, l)[0] for l in range(3)} == {4 + (1 + 1) / 2}  # noqa: E741
+    assert {project_px(grid, (3, 1, 2), 0, l)[0] for l in range(3)} == {4 + (1 + 1) / 2}
 
 
 @pytest.mark.parametrize(
@@ -127,7 +127,7 @@ def test_targets_follow_the_contracts_formula(grid, z, subpixel):
     rows, cols = target_indices(grid, z, subpixel)
     K, L, H, W = grid.shape_KLHW
     assert rows.tolist() == [[voxel_of(i, k, K, d_y, subpixel) for i in range(H)] for k in range(K)]
-    assert cols.tolist() == [[voxel_of(j, l, L, d_x, subpixel) for j in range(W)] for l in range(L)]  # noqa: E741
+    assert cols.tolist() == [[voxel_of(j, l, L, d_x, subpixel) for j in range(W)] for l in range(L)]
 
 
 @pytest.mark.parametrize(("rows", "cols"), [(3, 3), (4, 2), (1, 5)])
@@ -136,7 +136,7 @@ def test_where_a_camera_sees_a_point_is_sent_to_where_the_centre_sees_it(rows, c
     point = (3.0, -2.0, 1.0)  # whole pixels in every camera: pitch / 2 is whole
     row_targets, col_targets = target_indices(grid, 1.0, 1)
     for k in range(rows):
-        for l in range(cols):  # noqa: E741
+        for l in range(cols):
             i, j = project_px(grid, point, k, l)
             assert (row_targets[k, round(i)], col_targets[l, round(j)]) == (20 - 2, 20 + 3)
 

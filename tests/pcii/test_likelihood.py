@@ -16,7 +16,9 @@ DISPARITIES = np.arange(1, 9)  # z = 1 / d mm on a unit grid
 def information_twin(rate: float) -> float:
     """E[K log K], by adding up the probabilities of every count that matters."""
     last = int(rate + 40 * math.sqrt(rate) + 40)
-    terms = (math.exp(k * math.log(rate) - rate - math.lgamma(k + 1)) * k * math.log(k) for k in range(2, last))
+    terms = (
+        math.exp(k * math.log(rate) - rate - math.lgamma(k + 1)) * k * math.log(k) for k in range(2, last)
+    )
     return math.fsum(terms)
 
 

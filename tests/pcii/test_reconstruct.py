@@ -157,7 +157,7 @@ def test_sections_of_a_sum_are_the_sum_of_sections(grid, cfa, z, seed):
 @settings(max_examples=50, deadline=None)
 def test_events_and_dense_counts_give_the_same_sections(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed, rate=0.3)
-    k, l, i, j = np.nonzero(dense)  # noqa: E741
+    k, l, i, j = np.nonzero(dense)
     sparse = PhotonCounts.from_events(k, l, i, j, dense[k, l, i, j], grid, cfa=cfa)
     one = reconstruct(sparse, z, subpixel=subpixel)
     other = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
@@ -269,13 +269,13 @@ def views_of_a_plane(
     margin = 32
     picture = np.random.default_rng(seed).integers(0, 256, size=(H + 2 * margin, W + 2 * margin, 3))
 
-    def crop(k: float, l: float) -> np.ndarray:  # noqa: E741
+    def crop(k: float, l: float) -> np.ndarray:
         # A camera further right looks at a part of the picture that lies further right.
         top = margin + int((k - (K - 1) / 2) * disparity_px[1])
         left = margin + int((l - (L - 1) / 2) * disparity_px[0])
         return picture[top : top + H, left : left + W]
 
-    views = np.array([[crop(k, l) for l in range(L)] for k in range(K)])  # noqa: E741
+    views = np.array([[crop(k, l) for l in range(L)] for k in range(K)])
     return views.astype(float), crop((K - 1) / 2, (L - 1) / 2)
 
 
@@ -335,7 +335,7 @@ def test_views_on_disk_are_read_once_however_many_planes():
             return pixels
 
     sections = reconstruct(Views(Reader(), grid), [1.0, 2.0, 4.0])
-    assert sorted(reads) == [(k, l) for k in range(2) for l in range(3)]  # noqa: E741
+    assert sorted(reads) == [(k, l) for k in range(2) for l in range(3)]
     everything = np.broadcast_to(pixels, (*grid.shape_KLHW, 3))
     np.testing.assert_array_equal(
         sections.counts, reconstruct(Views(everything, grid), [1.0, 2.0, 4.0]).counts

@@ -48,7 +48,7 @@ def test_masks_follow_the_order_of_the_depths(two_squares, method):
 
 @methods
 def test_sparse_and_dense_counts_give_the_same_masks(two_squares, method):
-    k, l, i, j = np.nonzero(two_squares.dense)  # noqa: E741
+    k, l, i, j = np.nonzero(two_squares.dense)
     n = two_squares.dense[k, l, i, j]
     sparse = PhotonCounts.from_events(k, l, i, j, n, two_squares.grid, cfa="GRBG")
     one = segment(sparse, two_squares.z_mm, method=method).in_focus

@@ -111,7 +111,7 @@ def view_samples_twin(dense: np.ndarray, grid: CameraGrid, cell_px: int, window:
     shape = (math.ceil(H / cell_px), math.ceil(W / cell_px))
     samples: list[list[list[int]]] = [[[] for _ in range(shape[1])] for _ in range(shape[0])]
     for k in range(K):
-        for l in range(L):  # noqa: E741
+        for l in range(L):
             cells = np.zeros(shape, dtype=int)
             for i in range(H):
                 for j in range(W):
@@ -151,7 +151,7 @@ def test_samples_of_the_views_are_those_of_a_plain_loop(cell_px, window, pitch):
 def test_views_that_agree_at_the_planted_shift_have_no_variance_there():
     grid = unit_grid(1, 3, 8, 16, pitch_mm=(2.0, 1.0))
     dense = np.zeros(grid.shape_KLHW, dtype=int)
-    for l in range(3):  # noqa: E741
+    for l in range(3):
         dense[0, l, 4, 8 - 2 * (l - 1)] = 5  # further right sees it further left
     counts = PhotonCounts.from_dense(dense, grid)
     focused = view_samples(counts, 1.0, cell_px=1, window_cells=1)

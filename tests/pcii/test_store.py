@@ -42,9 +42,9 @@ DENSE = np.random.default_rng(0).poisson(0.5, size=GRID.shape_KLHW)
 
 
 def make_dataset(root: Path, *, sparse: bool = True, **overrides: Any) -> Path:
-    """A finished dataset of counts, truth and two-colour-free radiance, as `simgen` lays it out."""
+    """A finished dataset of counts, truth and radiance, as `simgen` lays it out."""
     root.mkdir()
-    k, l, i, j = np.nonzero(DENSE)  # noqa: E741
+    k, l, i, j = np.nonzero(DENSE)
     events = {"k": k, "l": l, "i": i, "j": j, "n": DENSE[k, l, i, j]}
     write_arrays_safely(root / COUNTS, events if sparse else {"dense": DENSE}, {})
     write_arrays_safely(root / TRUTH, {"z_mm": Z_MM, "object_id": IDS}, {})
@@ -205,7 +205,9 @@ def test_a_manifest_with_a_bad_grid_or_pattern_is_refused(tmp_path):
     with pytest.raises(InputError, match="^cfa: "):
         open_dataset(root)
     good = json.loads((root / MANIFEST).read_text())["grid"]
-    write_json_safely(root / MANIFEST, {**json.loads((root / MANIFEST).read_text()), "grid": {**good, "rows": 0}})
+    write_json_safely(
+        root / MANIFEST, {**json.loads((root / MANIFEST).read_text()), "grid": {**good, "rows": 0}}
+    )
     with pytest.raises(InputError, match="^rows: "):
         open_dataset(root)
 

@@ -116,7 +116,7 @@ def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
         sparse = PhotonCounts.from_events(*rows.T, photons, grid, cfa="GRBG")
         assert events_of(sparse) == events_of(from_dense)
         assert sparse.total == from_dense.total == dense.sum()
-        for k, l in np.ndindex(grid.rows, grid.cols):  # noqa: E741
+        for k, l in np.ndindex(grid.rows, grid.cols):
             np.testing.assert_array_equal(sparse.view(k, l), dense[k, l])
             np.testing.assert_array_equal(from_dense.view(k, l), dense[k, l])
 

@@ -48,7 +48,7 @@ def section_twin(
         d_x = grid.focal_mm * grid.pitch_mm[0] / (z * grid.pixel_mm)
         d_y = grid.focal_mm * grid.pitch_mm[1] / (z * grid.pixel_mm)
         for k in range(K):
-            for l in range(L):  # noqa: E741
+            for l in range(L):
                 for i in range(H):
                     for j in range(W):
                         row, col = voxel_of(i, k, K, d_y, subpixel), voxel_of(j, l, L, d_x, subpixel)
@@ -114,7 +114,7 @@ def patch_views(patch: np.ndarray, top: int, left: int, disparity_px: int, grid:
     K, L, H, W = grid.shape_KLHW
     views = np.zeros((K, L, H, W, patch.shape[2]))
     for k in range(K):
-        for l in range(L):  # noqa: E741
+        for l in range(L):
             # A camera further right (lower) sees the patch further left (higher).
             first_row = top - (2 * k - (K - 1)) * disparity_px / 2
             first_col = left - (2 * l - (L - 1)) * disparity_px / 2

@@ -1,0 +1,138 @@
+"""The score on masks and depths small enough to count by hand."""
+
+import numpy as np
+import pytest
+
+from pcii.errors import InputError
+from pcii.geometry import blur_half_extent_px
+from pcii.reconstruct import reconstruct
+from pcii.score import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
+from pcii.types import CameraGrid, DepthMap, PhotonCounts, Segmented, Truth
+
+GRID = CameraGrid(rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=24, width=32)
+Z = np.array([540.0, 620.0])
+
+
+def truth() -> Truth:
+    """A near object of 6 x 6 at 541 mm, a far one of 8 x 8 at 625 mm, nothing else."""
+    z = np.full((24, 32), np.inf)
+    ids = np.zeros((24, 32), dtype=np.int16)
+    z[4:10, 4:10], ids[4:10, 4:10] = 541.0, 1
+    z[8:16, 18:26], ids[8:16, 18:26] = 625.0, 2
+    return Truth(z, ids, {1: "near", 2: "far"})
+
+
+def segmented(masks: np.ndarray) -> Segmented:
+    counts = PhotonCounts.from_dense(np.ones(GRID.shape_KLHW, dtype=np.int64), GRID)
+    return Segmented(Z, masks, "by hand", reconstruct(counts, Z))
+
+
+def test_agreement_is_counted_by_hand() -> None:
+    true = np.zeros((8, 8), dtype=bool)
+    true[2:6, 2:6] = True  # 16 pixels
+    claimed = np.zeros((8, 8), dtype=bool)
+    claimed[2:6, 4:8] = True  # 16 pixels, 8 of them true
+    agreement = mask_agreement(claimed, true)
+    assert agreement["iou"] == 8 / 24
+    assert agreement["precision"] == agreement["recall"] == agreement["f1"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("claimed", "true", "expected"),
+    [
+        (False, False, {"iou": 1.0, "precision": None, "recall": None, "f1": 1.0, "boundary_f": 1.0}),
+        (True, False, {"iou": 0.0, "precision": 0.0, "recall": None, "f1": 0.0, "boundary_f": 0.0}),
+        (False, True, {"iou": 0.0, "precision": None, "recall": 0.0, "f1": 0.0, "boundary_f": 0.0}),
+    ],
+)
+def test_empty_masks_have_defined_answers(claimed: bool, true: bool, expected: dict) -> None:
+    square = np.zeros((9, 9), dtype=bool)
+    square[3:6, 3:6] = True
+    assert mask_agreement(square & claimed, square & true) == expected
+
+
+def test_outlines_may_be_two_pixels_apart_and_no_more() -> None:
+    true = np.zeros((40, 40), dtype=bool)
+    true[10:30, 10:30] = True
+    for shift, perfect in ((2, True), (3, False)):
+        grown = np.zeros_like(true)
+        grown[10 - shift : 30 + shift, 10 - shift : 30 + shift] = True
+        # The corners of the grown square are sqrt(2) times as far: they are the only ones to fail at 2.
+        value = mask_agreement(grown, true)["boundary_f"]
+        assert value is not None
+        assert (value > 0.9) is perfect
+
+
+def test_objects_belong_to_the_closest_plane() -> None:
+    assert objects_by_plane(GRID, truth(), Z) == {1: 0, 2: 1}
+    masks = object_masks(GRID, truth(), Z)
+    assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
+
+
+def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
+    # 541 mm is 0.11 px from 540 mm, 625 mm is 0.41 px from 620 mm, 650 mm would be 2.4 px.
+    assert blur_half_extent_px(GRID, 541.0, 540.0) == pytest.approx(0.1094, abs=1e-4)
+    masks = pixel_masks(GRID, truth(), Z)
+    assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
+    assert not pixel_masks(GRID, truth(), np.array([650.0])).any()
+
+
+def test_a_perfect_answer_scores_one() -> None:
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(*depth_of(truth())), truth())
+    for row in result.planes:
+        assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
+    assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
+    assert result.depth == {
+        "mae_mm": 0.0,
+        "median_mm": 0.0,
+        "bad_1px": 0.0,
+        "bad_3px": 0.0,
+        "coverage": 1.0,
+    }
+
+
+def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
+    z = np.where(np.isfinite(true.z_mm), true.z_mm, np.nan)
+    return z, np.isfinite(z).astype(float)
+
+
+def test_a_missing_answer_is_bad_and_never_good() -> None:
+    z, confidence = depth_of(truth())
+    z[4:10, 4:10] = np.nan  # 36 of 100 object pixels
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    assert result.depth["coverage"] == 0.64
+    assert result.depth["bad_1px"] == result.depth["bad_3px"] == 0.36
+    assert result.depth["mae_mm"] == 0.0
+
+
+def test_depth_errors_are_counted_in_pixels_of_total_spread() -> None:
+    z, confidence = depth_of(truth())
+    # At 541 mm the total spread is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
+    z[4:10, 4:7] += 9.0
+    z[4:10, 7:10] += 20.0
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    assert result.depth["bad_1px"] == 0.36
+    assert result.depth["bad_3px"] == 0.18
+    assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
+
+
+def test_without_truth_everything_unknown_is_none() -> None:
+    result = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, None)
+    assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)
+    assert result.objects == ()
+    assert set(result.depth.values()) == {None}
+
+
+def test_removal_lowers_the_entropy_of_the_section() -> None:
+    rng = np.random.default_rng(2)
+    counts = PhotonCounts.from_dense(rng.poisson(0.5, GRID.shape_KLHW), GRID)
+    masks = object_masks(GRID, truth(), Z)
+    result = score(Segmented(Z, masks, "by hand", reconstruct(counts, Z)), None, truth())
+    for row in result.planes:
+        assert row["entropy_after"] < row["entropy_before"]
+
+
+def test_maps_of_another_size_are_refused() -> None:
+    other = Truth(np.full((5, 5), np.inf), np.zeros((5, 5), dtype=int), {})
+    with pytest.raises(InputError, match="truth"):
+        score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, other)
