@@ -61,7 +61,7 @@ def test_a_mosaic_is_a_copy():
 
 @pytest.mark.parametrize("shape", [(3,), (4, 4), (4, 4, 1), (4, 4, 4)])
 def test_a_mosaic_needs_three_colours(shape):
-    with pytest.raises(InputError, match="^rgb: "):
+    with pytest.raises(InputError, match=r"^rgb: "):
         mosaic(np.zeros(shape), "GRBG")
 
 

@@ -179,7 +179,7 @@ def test_green_borders_are_reflected_about_the_border_pixel():
 
 @pytest.mark.parametrize("shape", [(4,), (1, 4), (4, 1), (0, 0), (4, 4, 3)])
 def test_an_image_below_2_x_2_is_refused(shape):
-    with pytest.raises(InputError, match="^mosaic: expected an image"):
+    with pytest.raises(InputError, match=r"^mosaic: expected an image"):
         demosaic(np.zeros(shape))
 
 
@@ -187,7 +187,7 @@ def test_an_image_below_2_x_2_is_refused(shape):
 def test_nan_and_infinity_are_refused(bad):
     raw = np.zeros((4, 4))
     raw[2, 1] = bad
-    with pytest.raises(InputError, match="^mosaic: holds NaN"):
+    with pytest.raises(InputError, match=r"^mosaic: holds NaN"):
         demosaic(raw)
 
 
@@ -198,7 +198,7 @@ def test_an_unknown_method_is_refused_with_the_known_ones():
 
 @pytest.mark.parametrize("bad", ["grbg", "RGB", None])
 def test_a_bad_pattern_is_refused(bad):
-    with pytest.raises(InputError, match="^cfa: "):
+    with pytest.raises(InputError, match=r"^cfa: "):
         demosaic(np.zeros((4, 4)), cfa=bad)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
+import pcii.depth
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.geometry import disparity_spread_px
@@ -34,6 +35,17 @@ def test_depths_of_the_squares_are_right(depth, two_squares, plane):
 
 
 @pytest.mark.parametrize("plane", [0, 1])
+@pytest.mark.parametrize("beyond", [0.3, 0.7])
+def test_depths_between_planes_are_told_apart(two_squares, plane, beyond):
+    # Planes at 6.3, 7.3, ... px of spread, or 6.7, 7.7, ...: 0.3 px from the truth, 18 and 42 px.
+    shifted = (6 / (54 + beyond), 6 / (6 + beyond))
+    errors = spread_errors_px(estimate_depth(two_squares.counts, shifted), two_squares, plane)
+    # Shifts are whole pixels, so the planes on both sides of the truth can tie, and half way between
+    # them is 0.2 px off. Without the parabola it would be 0.3, with its sign reversed 0.8.
+    assert np.median(errors) < 0.25
+
+
+@pytest.mark.parametrize("plane", [0, 1])
 def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
     flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
     errors = spread_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
@@ -54,6 +66,19 @@ def test_confidence_is_zero_exactly_where_the_method_abstains(depth):
     assert depth.confidence.min() == 0
     # A share of a sum: one rounding above 1 at most.
     assert 0.5 <= depth.confidence[depth.confidence > 0].min() <= depth.confidence.max() <= 1 + 1e-12
+
+
+def test_what_is_less_certain_than_asked_for_is_not_answered(monkeypatch):
+    grid = unit_grid(7, 7, 96, 96)
+    sparse = np.random.default_rng(0).poisson(0.004, size=grid.shape_KLHW)  # few photons, no texture
+    counts = PhotonCounts.from_dense(sparse, grid, cfa="GRBG")
+    answered = []
+    for least in (pcii.depth.LEAST_CONFIDENCE, 0.95):
+        monkeypatch.setattr(pcii.depth, "LEAST_CONFIDENCE", least)
+        confidence = estimate_depth(counts, RANGE_MM).confidence
+        assert confidence[confidence > 0].min() >= least >= 0.5
+        answered.append((confidence > 0).sum())
+    assert answered[1] < answered[0]
 
 
 def test_depths_stay_in_the_range(depth):
@@ -111,7 +136,7 @@ BAD_RANGES: list[Any] = [
 def test_a_range_that_is_not_near_to_far_is_refused(bad):
     grid = unit_grid(2, 2, 4, 4)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    with pytest.raises(InputError, match="^z_(range_)?mm: ") as caught:
+    with pytest.raises(InputError, match=r"^z_(range_)?mm: ") as caught:
         estimate_depth(counts, bad)
     assert "\n" not in str(caught.value)
 
@@ -119,5 +144,5 @@ def test_a_range_that_is_not_near_to_far_is_refused(bad):
 def test_one_view_is_refused():
     grid = unit_grid(1, 1, 8, 8)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    with pytest.raises(InputError, match="^counts: one view has no depth"):
+    with pytest.raises(InputError, match=r"^counts: one view has no depth"):
         estimate_depth(counts, (1.0, 2.0))

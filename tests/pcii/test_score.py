@@ -134,5 +134,5 @@ def test_removal_lowers_the_entropy_of_the_section() -> None:
 
 def test_maps_of_another_size_are_refused() -> None:
     other = Truth(np.full((5, 5), np.inf), np.zeros((5, 5), dtype=int), {})
-    with pytest.raises(InputError, match="truth"):
+    with pytest.raises(InputError, match=r"truth"):
         score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, other)

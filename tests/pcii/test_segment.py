@@ -3,6 +3,7 @@ import pytest
 from twins import intersection_over_union, unit_grid
 
 from pcii.errors import InputError
+from pcii.foreground import roberts_magnitude, without_specks
 from pcii.planes import with_probes
 from pcii.segment import METHODS, segment
 from pcii.types import PhotonCounts
@@ -92,7 +93,7 @@ def test_tiny_saturated_images_have_an_answer(method, size):
 def test_one_view_is_refused(method):
     grid = unit_grid(1, 1, 8, 8)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid, cfa="GRBG")
-    with pytest.raises(InputError, match="^counts: one view has no depth"):
+    with pytest.raises(InputError, match=r"^counts: one view has no depth"):
         segment(counts, 1.0, method=method)
 
 
@@ -104,7 +105,7 @@ def test_an_unknown_method_is_refused_with_the_known_ones(two_squares):
 @methods
 @pytest.mark.parametrize("bad", [0, -1.0, float("nan"), []])
 def test_a_depth_that_cannot_be_is_refused(two_squares, method, bad):
-    with pytest.raises(InputError, match="^z_mm: "):
+    with pytest.raises(InputError, match=r"^z_mm: "):
         segment(two_squares.counts, bad, method=method)
 
 
@@ -126,3 +127,24 @@ def test_no_probe_is_near_another_plane_or_beyond_infinity():
 
 def test_a_single_camera_has_no_probes():
     np.testing.assert_array_equal(with_probes(unit_grid(1, 1, 4, 4), np.array([1.0, 2.0])), [1.0, 2.0])
+
+
+def test_roberts_cross_takes_both_diagonals_and_continues_the_border():
+    image = np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]])
+    # Down-right and up-right differences at each upper left corner, Eq. 8 by hand.
+    down = [[-3, 0, 0], [0, -1, -4], [0, -4, 0]]
+    up = [[0, -3, 0], [3, 0, -4], [0, 4, 0]]
+    np.testing.assert_array_equal(roberts_magnitude(image), np.hypot(down, up))
+
+
+def test_specks_and_holes_below_the_size_go_and_others_stay():
+    mask = np.zeros((12, 12), dtype=bool)
+    mask[1:8, 1:8] = True
+    mask[3:5, 3:5] = False  # a hole of 4
+    mask[10, 1:4] = True  # a speck of 3
+    mask[10, 6:11] = True  # a piece of 5
+    expected = np.zeros_like(mask)
+    expected[1:8, 1:8] = True
+    expected[10, 6:11] = True
+    np.testing.assert_array_equal(without_specks(mask, 5), expected)
+    np.testing.assert_array_equal(without_specks(mask, 4)[3:5, 3:5], False)

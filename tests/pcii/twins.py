@@ -118,7 +118,8 @@ def patch_views(patch: np.ndarray, top: int, left: int, disparity_px: int, grid:
             # A camera further right (lower) sees the patch further left (higher).
             first_row = top - (2 * k - (K - 1)) * disparity_px / 2
             first_col = left - (2 * l - (L - 1)) * disparity_px / 2
-            assert first_row.is_integer() and first_col.is_integer()
+            assert first_row.is_integer()
+            assert first_col.is_integer()
             rows = int(first_row) + np.arange(patch.shape[0])
             cols = int(first_col) + np.arange(patch.shape[1])
             i, j = (rows >= 0) & (rows < H), (cols >= 0) & (cols < W)
