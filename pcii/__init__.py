@@ -1,1 +1,45 @@
+"""Photon-counted integral imaging: reconstruct, remove what is out of focus, score.
+
+Importing this package loads NumPy and nothing heavier: SciPy, Zarr and Matplotlib are imported
+inside the functions that need them. The imports below are eager because modules and the functions
+they are named for share names, and only an eager import leaves the function under that name.
+"""
+
+from pcii.dataset import Dataset, open_dataset
+from pcii.demosaic import demosaic
+from pcii.depth import estimate_depth
+from pcii.errors import InputError
+from pcii.reconstruct import reconstruct
+from pcii.score import score
+from pcii.segment import segment
+from pcii.types import (
+    CameraGrid,
+    DepthMap,
+    PhotonCounts,
+    Score,
+    Sections,
+    Segmented,
+    Truth,
+    Views,
+)
+
 __version__ = "0.1.0"
+
+__all__ = [
+    "CameraGrid",
+    "Dataset",
+    "DepthMap",
+    "InputError",
+    "PhotonCounts",
+    "Score",
+    "Sections",
+    "Segmented",
+    "Truth",
+    "Views",
+    "demosaic",
+    "estimate_depth",
+    "open_dataset",
+    "reconstruct",
+    "score",
+    "segment",
+]

@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.bayer import check_cfa
 from pcii.errors import InputError
-from pcii.store import COUNTS, RADIANCE, TRUTH, check_file, radiance_name, read_exr, read_manifest
+from pcii.store import COUNTS, MANIFEST, RADIANCE, TRUTH, check_file, radiance_name, read_exr, read_manifest
 from pcii.types import CameraGrid, PhotonCounts, Truth, Views
 
 
@@ -39,6 +39,9 @@ class Dataset:
         arrays = self._arrays(COUNTS, "counts")
         if "dense" in arrays:
             return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
+        missing = set("klijn") - set(arrays)
+        if missing:
+            raise InputError(f"{self.path / COUNTS}: lacks the array {min(missing)!r}")
         columns = {name: arrays[name] for name in "klijn"}
         return PhotonCounts.from_events(**columns, grid=self.grid, cfa=self.cfa)
 
@@ -48,7 +51,7 @@ class Dataset:
         if not self.has(TRUTH):
             return None
         arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id"))
-        names = {int(key): value for key, value in self.manifest["objects"].items()}
+        names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
         return Truth(arrays["z_mm"], arrays["object_id"], names)
 
     @cached_property
@@ -83,7 +86,10 @@ class Dataset:
                 self.check(name)
         group = zarr.open_group(self.path / part, mode="r", zarr_format=3)
         names = list(group.array_keys()) if only is None else only
-        return {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
+        try:
+            return {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
+        except KeyError as fault:
+            raise InputError(f"{self.path / part}: lacks the array {fault}") from None
 
 
 class _ExrStack:
@@ -112,8 +118,8 @@ def open_dataset(path: str | Path) -> Dataset:
     try:
         grid = CameraGrid(**manifest["grid"])
         cfa, files = check_cfa(manifest["cfa"]), manifest["files"]
-    except (KeyError, TypeError) as fault:
-        raise InputError(f"{root}: its manifest lacks or misspells {fault}") from None
-    for name, entry in files.items():
-        check_file(root, name, entry, content=False)
+        for name, entry in files.items():
+            check_file(root, name, entry, content=False)
+    except (KeyError, TypeError, AttributeError) as fault:
+        raise InputError(f"{root / MANIFEST}: something is missing or misspelt in it: {fault}") from None
     return Dataset(root, manifest, grid, cfa)

@@ -1,16 +1,20 @@
 """Depth of every pixel of the virtual centre, from where the photons agree best."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pcii.errors import InputError
 from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
-from pcii.likelihood import cells_to_pixels, focus_scores, photons_nearby
+from pcii.likelihood import cells_to_pixels, flat_deviation, focus_scores, photons_nearby
 from pcii.types import DepthMap, PhotonCounts, check_z_mm
 
 PLANE_STEP_PX = 1.0
 """Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""
 SIGMA_PX = 14.0
 LEAST_CONFIDENCE = 0.5
+SIGNIFICANT_SIGMAS = 4.0
+"""The best of many planes exceeds 3 standard deviations now and then without any texture."""
 NEARBY_SIGMA_PX = 4.0
 FEWEST_PHOTONS = 10.0
 """Fewer photons than this within about 10 px of a point: its neighbours' depth is not its own."""
@@ -23,12 +27,12 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     Planes of equal disparity steps are compared by their Poisson likelihood over a window; between
     planes a parabola is fitted. `confidence` (H, W) is the posterior probability, all planes being
-    equally likely beforehand, that the depth lies within 2 planes of the best; below one half, or
-    where there are next to no photons, the method abstains.
+    equally likely beforehand, that the depth lies within 2 planes of the best; below one half,
+    or where there are next to no photons or no texture, the method abstains.
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
-    if len(z_range_mm) != 2:
+    if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
     near, far = check_z_mm(z_range_mm)
     if near >= far:
@@ -44,7 +48,10 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     depth = np.clip(float(disparity_spread_px(grid, 1.0)) / spread, near, far)
     photons = photons_nearby(counts, z, sigma_px=NEARBY_SIGMA_PX)
     here = np.take_along_axis(photons, best[None], axis=0)[0]
-    abstains = (here < FEWEST_PHOTONS) | (confidence < LEAST_CONFIDENCE)
+    # What a flat patch would score at its best plane by chance is no evidence of depth.
+    chance = flat_deviation(counts, float(np.median(z)), sigma_px=SIGMA_PX)
+    is_flat = scores.max(axis=0) < SIGNIFICANT_SIGMAS * chance
+    abstains = is_flat | (here < FEWEST_PHOTONS) | (confidence < LEAST_CONFIDENCE)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, counts), cells_to_pixels(confidence, counts))

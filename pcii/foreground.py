@@ -54,7 +54,12 @@ def foreground(bright: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
-    """The mask without connected pieces, and without holes, of fewer than `smallest_px` pixels."""
+    """The mask without connected pieces, and without holes, of fewer than `smallest_px` pixels.
+
+    The dark around everything is no hole, however small the picture.
+    """
+    if not mask.any():
+        return mask
     return ~_large_pieces(~_large_pieces(mask, smallest_px), smallest_px)
 
 

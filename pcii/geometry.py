@@ -7,6 +7,7 @@ likewise in rows, so a camera further right sees it further LEFT.
 
 import numpy as np
 
+from pcii.errors import InputError
 from pcii.types import CameraGrid
 
 
@@ -38,6 +39,15 @@ def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray
     return per_mm * grid.pitch_mm[0], per_mm * grid.pitch_mm[1]
 
 
+def _check_near(grid: CameraGrid, z_mm: float) -> tuple[float, float]:
+    """The disparities at z, if shifts by them can be counted in whole pixels."""
+    with np.errstate(over="ignore", divide="ignore"):
+        d_x, d_y = disparity_px(grid, z_mm)
+    if not max(d_x * grid.cols, d_y * grid.rows) < 2**31:
+        raise InputError(f"z_mm: {z_mm:g} mm is so near that views shift by more than 2^31 pixels")
+    return float(d_x), float(d_y)
+
+
 def nearest_shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Whole-pixel shifts (rows (K,), columns (L,)), int64, that bring each view to the centre.
 
@@ -45,7 +55,7 @@ def nearest_shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.nda
     `floor(x + 1/2)` and not `round`, which rounds half to even and makes half-pixel shifts
     alternate.
     """
-    d_x, d_y = disparity_px(grid, z_mm)
+    d_x, d_y = _check_near(grid, z_mm)
     rows = np.floor((np.arange(grid.rows) - (grid.rows - 1) / 2) * d_y + 0.5)
     cols = np.floor((np.arange(grid.cols) - (grid.cols - 1) / 2) * d_x + 0.5)
     return rows.astype(np.int64), cols.astype(np.int64)
@@ -62,7 +72,7 @@ def target_indices(grid: CameraGrid, z_mm: float, subpixel: int) -> tuple[np.nda
     if subpixel == 1:
         row_shift, col_shift = nearest_shifts_px(grid, z_mm)
         return i + row_shift[:, None], j + col_shift[:, None]
-    d_x, d_y = disparity_px(grid, z_mm)
+    d_x, d_y = _check_near(grid, z_mm)
     k, l = np.arange(grid.rows)[:, None], np.arange(grid.cols)[:, None]
     rows = np.floor((i + 0.5 + (k - (grid.rows - 1) / 2) * d_y) * subpixel)
     cols = np.floor((j + 0.5 + (l - (grid.cols - 1) / 2) * d_x) * subpixel)

@@ -41,6 +41,22 @@ def focus_scores(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> 
     return np.stack([_plane_score(counts, depth, sigma_px) for depth in z_mm])
 
 
+def flat_deviation(counts: PhotonCounts, z_mm: float, *, sigma_px: float) -> np.ndarray:
+    """Standard deviation that `focus_scores` has over a flat patch, (H / 4, W / 4) float64, in nats.
+
+    The patch has the mean that the counts have around each cell in the section at z.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    sigma = sigma_px / CELL_PX
+    variance = np.zeros(cell_shape(counts))
+    for photons in _block_counts(counts, z_mm):
+        rate = gaussian_filter(_sum_on_cells(photons), sigma, mode="constant") / BLOCKS**2
+        variance += np.interp(rate, *_noise_table())
+    # The squares of weights that are 1 at the centre sum to pi sigma^2 cells.
+    return np.sqrt(np.pi * sigma**2 * BLOCKS**2 * variance)
+
+
 def photons_nearby(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> np.ndarray:
     """Photons of all colours in a Gaussian window (weight 1 at its centre), (Z, H / 4, W / 4)."""
     from scipy.ndimage import gaussian_filter
@@ -68,10 +84,10 @@ def _plane_score(counts: PhotonCounts, z_mm: float, sigma_px: float) -> np.ndarr
             for values in (information, K, V)
         )
         rate = photons / np.maximum(samples, 1e-9)
-        # Coverage varies slowly, so one block's stands for its cell.
-        coverage = _sum_on_cells(V[colour]) / BLOCKS**2
-        flat = flat_information(rate * coverage) - xlogy(rate * coverage, coverage)
-        score += own - BLOCKS**2 * flat
+        # The window's own mean coverage: near borders some of the window is covered less or not at all.
+        blocks = gaussian_filter(_sum_on_cells((V[colour] > 0).astype(np.float64)), sigma, mode="constant")
+        coverage = samples / np.maximum(blocks, 1e-9)
+        score += own - blocks * (flat_information(rate * coverage) - xlogy(rate * coverage, coverage))
     # The filter's weights sum to 1; with weight 1 at the centre they sum to 2 pi sigma^2.
     return 2 * np.pi * sigma**2 * score
 
@@ -119,17 +135,42 @@ def flat_information(rate: np.ndarray) -> np.ndarray:
     """E[K log K] of a Poisson variable K with this mean: the information of a flat patch, in nats."""
     rates, values = _information_table()
     inside = np.interp(rate, rates, values)
-    # Expanding K log K about the mean: r log r + 1/2 + 1 / (12 r), good to 1e-5 from 64 on.
+    # Expanding K log K about the mean: r log r + 1/2 + 1 / (12 r), good to 3e-5 from 64 on.
     large = np.maximum(rate, LARGEST_RATE)
     asymptotic = large * np.log(large) + 0.5 + 1 / (12 * large)
     return np.where(rate < LARGEST_RATE, inside, asymptotic)
 
 
 @cache
-def _information_table() -> tuple[np.ndarray, np.ndarray]:
+def _poisson_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rates (R,), counts (N,) and probabilities (R, N) of a Poisson variable."""
     from scipy.special import gammaln, xlogy
 
     rates = np.linspace(0, np.sqrt(LARGEST_RATE), 4096) ** 2
-    k = np.arange(0, int(LARGEST_RATE + 14 * np.sqrt(LARGEST_RATE)))
-    log_probability = xlogy(k, rates[:, None]) - rates[:, None] - gammaln(k + 1)
-    return rates, np.exp(log_probability) @ xlogy(k, k)
+    k = np.arange(0.0, LARGEST_RATE + 14 * np.sqrt(LARGEST_RATE))
+    return rates, k, np.exp(xlogy(k, rates[:, None]) - rates[:, None] - gammaln(k + 1))
+
+
+@cache
+def _information_table() -> tuple[np.ndarray, np.ndarray]:
+    from scipy.special import xlogy
+
+    rates, k, probability = _poisson_table()
+    return rates, probability @ xlogy(k, k)
+
+
+@cache
+def _noise_table() -> tuple[np.ndarray, np.ndarray]:
+    """Variance of K log K about its regression on K: the mean is fitted, so that part does not count.
+
+    It tends to 1/2, the variance of half a chi-square variable.
+    """
+    from scipy.special import xlogy
+
+    rates, k, probability = _poisson_table()
+    value = xlogy(k, k)
+    mean = probability @ value
+    variance = probability @ value**2 - mean**2
+    covariance = probability @ (value * k) - mean * rates
+    residual = variance - covariance**2 / np.maximum(rates, 1e-12)
+    return rates, np.maximum(residual, 0.0)

@@ -29,7 +29,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     (2, 1024, 1024)
     """
     z = check_z_mm(z_mm)
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
     if counts.grid.view_count < 2:
         raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")

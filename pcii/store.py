@@ -143,7 +143,7 @@ def read_manifest(root: Path) -> dict[str, Any]:
         raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as fault:
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as fault:
         raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); generate it again") from None
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: not the manifest of a {FORMAT}")

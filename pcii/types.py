@@ -16,6 +16,8 @@ from pcii.bayer import channel_count, check_cfa
 from pcii.errors import InputError
 
 Normalisation = Literal["overlap", "views"]
+LARGEST_COUNT = 1 << 40
+"""Photons in a pixel; millions of such pixels still add up in 64 bits."""
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -163,6 +165,8 @@ def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
         array = array.astype(np.uint8)
     if array.size and array.min() < 0:
         raise InputError(f"{name}: photon counts must not be negative")
+    if array.size and array.max() > LARGEST_COUNT:
+        raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
     return array
 
 

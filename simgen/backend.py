@@ -128,6 +128,14 @@ def load() -> Any:
     return mi
 
 
+def load_drjit() -> Any:
+    """The `drjit` module, once the backend is chosen; it computes nothing in scalar mode."""
+    load()
+    import drjit as dr
+
+    return dr
+
+
 def shape_numbers(scene: Any) -> list[int]:
     """The number by which the `shape_index` output names each shape of a Mitsuba scene, in its order.
 
@@ -136,8 +144,7 @@ def shape_numbers(scene: Any) -> list[int]:
     """
     if load().variant().startswith("scalar"):
         return list(range(1, len(scene.shapes()) + 1))
-    import drjit as dr
-
+    dr = load_drjit()
     numbers: Any = dr.reinterpret_array(load().UInt32, scene.shapes_dr())
     return [int(number) for number in numbers]
 

@@ -12,15 +12,15 @@ Stage = Literal["radiance", "photons", "totals"]
 _STAGES: tuple[Stage, ...] = ("radiance", "photons", "totals")
 
 
-def _sequence(seed: int, view: int, stage: Stage, scene: int) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=(scene, view, _STAGES.index(stage)))
+def _sequence(seed: int, view: int, stage: Stage, part: int, scene: int) -> np.random.SeedSequence:
+    return np.random.SeedSequence(seed, spawn_key=(scene, view, _STAGES.index(stage), part))
 
 
-def generator(seed: int, *, view: int, stage: Stage, scene: int = 0) -> np.random.Generator:
-    """NumPy's generator of one view and stage."""
-    return np.random.default_rng(_sequence(seed, view, stage, scene))
+def generator(seed: int, *, view: int, stage: Stage, part: int = 0, scene: int = 0) -> np.random.Generator:
+    """NumPy's generator of one view and stage; `part` counts repetitions of a stage."""
+    return np.random.default_rng(_sequence(seed, view, stage, part, scene))
 
 
-def integer(seed: int, *, view: int, stage: Stage, scene: int = 0) -> int:
+def integer(seed: int, *, view: int, stage: Stage, part: int = 0, scene: int = 0) -> int:
     """A 32-bit seed of one view and stage, for the renderer."""
-    return int(_sequence(seed, view, stage, scene).generate_state(1)[0])
+    return int(_sequence(seed, view, stage, part, scene).generate_state(1)[0])

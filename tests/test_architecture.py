@@ -113,3 +113,13 @@ def test_importing_pcii_is_light() -> None:
     seconds, *loaded = best.split()
     assert loaded == []
     assert float(seconds) < 0.5
+
+
+def test_pcii_offers_the_names_that_users_rely_on() -> None:
+    import pcii
+
+    nouns = "CameraGrid Views PhotonCounts Sections Segmented DepthMap Truth Score Dataset InputError"
+    verbs = "reconstruct demosaic segment estimate_depth score open_dataset"
+    for name in (nouns + " " + verbs).split():
+        assert callable(getattr(pcii, name)), name
+        assert name in pcii.__all__

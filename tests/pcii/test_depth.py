@@ -72,6 +72,7 @@ def test_what_is_less_certain_than_asked_for_is_not_answered(monkeypatch):
     grid = unit_grid(7, 7, 96, 96)
     sparse = np.random.default_rng(0).poisson(0.004, size=grid.shape_KLHW)  # few photons, no texture
     counts = PhotonCounts.from_dense(sparse, grid, cfa="GRBG")
+    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_SIGMAS", 0.0)  # which would refuse all of it
     answered = []
     for least in (pcii.depth.LEAST_CONFIDENCE, 0.95):
         monkeypatch.setattr(pcii.depth, "LEAST_CONFIDENCE", least)
@@ -79,6 +80,15 @@ def test_what_is_less_certain_than_asked_for_is_not_answered(monkeypatch):
         assert confidence[confidence > 0].min() >= least >= 0.5
         answered.append((confidence > 0).sum())
     assert answered[1] < answered[0]
+
+
+def test_a_flat_patch_has_no_depth(monkeypatch):
+    grid = unit_grid(7, 7, 96, 96)
+    flat = np.random.default_rng(1).poisson(0.1, size=grid.shape_KLHW)
+    counts = PhotonCounts.from_dense(flat, grid, cfa="GRBG")
+    assert np.isnan(estimate_depth(counts, RANGE_MM).z_mm).all()
+    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_SIGMAS", 0.0)  # the fault: noise taken for texture
+    assert np.isfinite(estimate_depth(counts, RANGE_MM).z_mm).any()
 
 
 def test_depths_stay_in_the_range(depth):

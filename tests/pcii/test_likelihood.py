@@ -6,7 +6,14 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import xlogy
 from twins import bayer_photons, blocky_texture, patch_views, unit_grid
 
-from pcii.likelihood import LARGEST_RATE, cell_shape, cells_to_pixels, flat_information, focus_scores
+from pcii.likelihood import (
+    LARGEST_RATE,
+    cell_shape,
+    cells_to_pixels,
+    flat_deviation,
+    flat_information,
+    focus_scores,
+)
 from pcii.reconstruct import reconstruct
 from pcii.types import PhotonCounts
 
@@ -137,3 +144,28 @@ def test_a_cell_is_four_by_four_pixels_cut_at_the_frame():
     pixels = cells_to_pixels(np.array([[1, 2], [3, 4]]), counts)
     np.testing.assert_array_equal(pixels[:4], [[1, 1, 1, 1, 2, 2]] * 4)
     np.testing.assert_array_equal(pixels[4:], [[3, 3, 3, 3, 4, 4]])
+
+
+@pytest.mark.parametrize("rate", [0.02, 0.2, 2.0])
+def test_chance_scores_of_a_flat_scene_spread_as_predicted(rate):
+    grid = unit_grid(5, 5, 96, 96)
+    drawn = [np.random.default_rng(seed).poisson(rate, grid.shape_KLHW) for seed in range(60)]
+    scenes = [PhotonCounts.from_dense(counts, grid) for counts in drawn]
+    scores = [focus_scores(counts, np.array([1.0]), sigma_px=10.0)[0][8:16, 8:16] for counts in scenes]
+    predicted = flat_deviation(scenes[0], 1.0, sigma_px=10.0)[12, 12]
+    # 60 scenes with some 2 independent windows each: a standard deviation is good to 1 / sqrt(240),
+    # 6.5 %; three times that.
+    assert np.std(scores) == pytest.approx(predicted, rel=0.2)
+
+
+def test_no_bias_at_the_borders_of_a_flat_scene():
+    # Views leave the frame there: windows are partly empty and blocks covered by fewer views.
+    grid = unit_grid(5, 5, 96, 96)
+    scores = []
+    for seed in range(40):
+        counts = PhotonCounts.from_dense(np.random.default_rng(seed).poisson(2.0, grid.shape_KLHW), grid)
+        scores.append(focus_scores(counts, np.array([1 / 3]), sigma_px=10.0)[0])
+    spread = flat_deviation(counts, 1 / 3, sigma_px=10.0).max()
+    # A mean of 40 is good to 1/6 of the spread; the coverage within a window is taken as its mean,
+    # which leaves less than the spread itself. Unequal treatment of borders gave 500 times that.
+    assert np.abs(np.mean(scores, axis=0)).max() < spread

@@ -197,7 +197,7 @@ def test_a_manifest_that_lacks_a_field_is_refused_by_its_name(tmp_path, name):
     manifest = json.loads((root / MANIFEST).read_text())
     del manifest[name]
     write_json_safely(root / MANIFEST, manifest)
-    assert name in one_sentence(lambda: open_dataset(root), root)
+    assert name in one_sentence(lambda: open_dataset(root), root / MANIFEST)
 
 
 def test_a_manifest_with_a_bad_grid_or_pattern_is_refused(tmp_path):
