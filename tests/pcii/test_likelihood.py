@@ -161,11 +161,10 @@ def test_chance_scores_of_a_flat_scene_spread_as_predicted(rate):
 def test_no_bias_at_the_borders_of_a_flat_scene():
     # Views leave the frame there: windows are partly empty and blocks covered by fewer views.
     grid = unit_grid(5, 5, 96, 96)
-    scores = []
-    for seed in range(40):
-        counts = PhotonCounts.from_dense(np.random.default_rng(seed).poisson(2.0, grid.shape_KLHW), grid)
-        scores.append(focus_scores(counts, np.array([1 / 3]), sigma_px=10.0)[0])
-    spread = flat_deviation(counts, 1 / 3, sigma_px=10.0).max()
+    drawn = [np.random.default_rng(seed).poisson(2.0, grid.shape_KLHW) for seed in range(40)]
+    scenes = [PhotonCounts.from_dense(counts, grid) for counts in drawn]
+    scores = [focus_scores(counts, np.array([1 / 3]), sigma_px=10.0)[0] for counts in scenes]
+    spread = flat_deviation(scenes[0], 1 / 3, sigma_px=10.0).max()
     # A mean of 40 is good to 1/6 of the spread; the coverage within a window is taken as its mean,
     # which leaves less than the spread itself. Unequal treatment of borders gave 500 times that.
     assert np.abs(np.mean(scores, axis=0)).max() < spread
