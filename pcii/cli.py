@@ -34,7 +34,7 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = ()) -> None:
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     """
-    from pcii.pipeline import run as run_all
+    from pcii.run import run as run_all
 
     with Stages() as report:
         outcome = run_all(open_dataset(dataset), out, z_mm, report)

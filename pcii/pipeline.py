@@ -3,12 +3,10 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pcii import results
 from pcii.console import Report, silent
 from pcii.dataset import Dataset
 from pcii.depth import estimate_depth
@@ -74,21 +72,6 @@ def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = sil
     result = score(focus, depth, dataset.truth, dataset=dataset.name)
     finished("score", start)
     return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
-
-
-def run(dataset: Dataset, out: Path, z_mm: Sequence[float] | None, report: Report = silent) -> Outcome:
-    """Analyse and write everything into `out`: sections, masks, depth, score.json, report.html."""
-    from pcii.report import write_report
-
-    results.claim(out, dataset)
-    outcome = analyse(dataset, z_mm, report)
-    results.save_sections(out, outcome.sections)
-    for focus in outcome.focus:
-        results.save_segmented(out, focus)
-    results.save_depth(out, outcome.depth)
-    results.save_score(out, outcome.score)
-    write_report(out / "report.html", outcome)
-    return outcome
 
 
 def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> np.ndarray:

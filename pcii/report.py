@@ -5,24 +5,21 @@ One file without scripts and without anything fetched: it can be mailed, archive
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from pcii import __version__, picture
 from pcii.demosaic import demosaic
-from pcii.pipeline import depth_range_of
+from pcii.pipeline import Outcome, depth_range_of
 from pcii.score import object_masks, pixel_masks
 from pcii.store import write_bytes_safely
 from pcii.types import Sections, Truth
 
-if TYPE_CHECKING:
-    from pcii.pipeline import Outcome
-
 PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
 
 
-def write_report(path: Path, outcome: "Outcome") -> None:
+def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
     from jinja2 import Environment, PackageLoader, select_autoescape
 
@@ -41,7 +38,7 @@ def _number(value: float | None, digits: int = 3) -> str:
     return "–" if value is None else f"{value:.{digits}f}"
 
 
-def _content(outcome: "Outcome") -> dict[str, Any]:
+def _content(outcome: Outcome) -> dict[str, Any]:
     dataset = outcome.dataset
     box = picture.crop_box(picture.interesting_part(dataset.truth, list(outcome.focus)))
     manifest = dataset.manifest
@@ -100,7 +97,7 @@ def _panel(image: np.ndarray, box: tuple[slice, slice], caption: str) -> dict[st
     return {"image": picture.data_uri(image[box]), "caption": caption}
 
 
-def _figure6(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, str]]:
+def _figure6(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
     """(a) raw centre view, (b) demosaiced, sections at full light and from photons, one view, truth."""
     dataset = outcome.dataset
     k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
@@ -150,7 +147,7 @@ def _section_panels(
     ]
 
 
-def _figure7(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, Any]]:
+def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, Any]]:
     """For each method and plane: what is left of the section, the truth, and where they differ."""
     truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
     by_object = object_masks(grid, truth, z_mm) if truth else None
@@ -172,7 +169,7 @@ def _figure7(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, Any
     return rows
 
 
-def _depth_panels(outcome: "Outcome", box: tuple[slice, slice]) -> list[dict[str, str]]:
+def _depth_panels(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
     truth, depth = outcome.dataset.truth, outcome.depth
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]

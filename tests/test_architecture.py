@@ -26,6 +26,7 @@ PCII_LEVELS = [
     {"results"},
     {"pipeline"},
     {"report"},
+    {"run"},
     {"cli"},
 ]
 SIMGEN_LEVELS = [
