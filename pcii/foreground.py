@@ -10,6 +10,8 @@ DARK_SIGMAS = 2.0
 BRIGHT_SIGMAS = 6.0
 """How far from the dark, in standard deviations of its noise, a pixel is surely dark or bright."""
 NEARBY_PX = 25
+SKIRT_SHARE = 1 / 3
+"""What is below 1/3 of the brightest nearby (1/9 of its photons) may be its blurred skirt."""
 EDGE_SMOOTHING_PX = 1.0
 
 
@@ -49,7 +51,7 @@ def foreground(bright: np.ndarray, edges: np.ndarray) -> np.ndarray:
     nearby = maximum_filter(above, NEARBY_PX)
     markers = np.zeros(bright.shape, dtype=np.int32)
     markers[above < DARK_SIGMAS] = 1
-    markers[(above > BRIGHT_SIGMAS) & (above > nearby / 2)] = 2
+    markers[(above > BRIGHT_SIGMAS) & (above > SKIRT_SHARE * nearby)] = 2
     return watershed(gaussian_filter(edges, EDGE_SMOOTHING_PX), markers) == 2
 
 

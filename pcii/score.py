@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.errors import InputError
 from pcii.geometry import blur_half_extent_px, disparity_spread_px
-from pcii.statistics import SECTION_WINDOW_PX, entropy_bits, pooled_estimate, region_entropy_bits
+from pcii.statistics import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
 from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
 
 FOCUS_TOLERANCE_PX = 1.0
@@ -149,7 +149,7 @@ def _outline(mask: np.ndarray) -> np.ndarray:
 
 def _section_entropies(focus: Segmented) -> tuple[list[float], list[float]]:
     """Entropy of each section before and after removal, mean over the colours, in bits."""
-    pooled = pooled_estimate(focus.sections, SECTION_WINDOW_PX)
+    pooled = pooled_estimate(focus.sections, section_window_px(focus.sections))
     tops = pooled.max(axis=(1, 2))
     before: list[float] = []
     after: list[float] = []
@@ -164,7 +164,7 @@ def _object_rows(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
     from scipy.ndimage import binary_dilation
 
     grid = focus.sections.grid
-    pooled = pooled_estimate(focus.sections, SECTION_WINDOW_PX)
+    pooled = pooled_estimate(focus.sections, section_window_px(focus.sections))
     tops = pooled.max(axis=(0, 1, 2))
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):

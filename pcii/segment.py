@@ -9,7 +9,7 @@ from pcii.foreground import brightness, foreground, roberts_magnitude, without_s
 from pcii.likelihood import cells_to_pixels, focus_scores
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
-from pcii.statistics import SECTION_WINDOW_PX, pooled_estimate
+from pcii.statistics import pooled_estimate, section_window_px
 from pcii.three_step import three_step
 from pcii.types import PhotonCounts, Segmented, check_z_mm
 
@@ -45,10 +45,11 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     compared = with_probes(counts.grid, z_mm)
     scores = focus_scores(counts, compared, sigma_px=FOCUS_SIGMA_PX)
     best = cells_to_pixels(np.argmax(scores, axis=0), counts)
-    pooled = pooled_estimate(sections, SECTION_WINDOW_PX)
+    window_px = section_window_px(sections)
+    pooled = pooled_estimate(sections, window_px)
     masks = []
     for plane, coverage in zip(pooled, sections.coverage, strict=True):
-        samples = SECTION_WINDOW_PX**2 * float(coverage.mean()) * plane.shape[-1]
+        samples = window_px**2 * float(coverage.mean()) * plane.shape[-1]
         bright = brightness(plane, samples)
         mask = foreground(bright, roberts_magnitude(bright))
         masks.append(without_specks(mask, SMALLEST_REGION_PX))

@@ -19,10 +19,10 @@ from pcii.geometry import blur_half_extent_px
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
-    SECTION_WINDOW_PX,
     ViewSamples,
     pooled_estimate,
     region_entropy_bits,
+    section_window_px,
     truncated_poisson_variance,
     view_samples,
 )
@@ -50,8 +50,9 @@ def three_step(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
         raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")
     compared = with_probes(counts.grid, z_mm)
     everything = reconstruct(counts, compared)
-    pooled = pooled_estimate(everything, SECTION_WINDOW_PX)
-    samples_per_window = SECTION_WINDOW_PX**2 * float(everything.coverage.mean()) * pooled.shape[-1]
+    window_px = section_window_px(everything)
+    pooled = pooled_estimate(everything, window_px)
+    samples_per_window = window_px**2 * float(everything.coverage.mean()) * pooled.shape[-1]
     bright = [brightness(plane, samples_per_window) for plane in pooled]
     edges = [roberts_magnitude(plane) for plane in bright]
     masks = [foreground(b, e) for b, e in zip(bright, edges, strict=True)]

@@ -54,11 +54,12 @@ def test_table_1_holds_on_the_small_scene(results: Path) -> None:
 
 
 def test_objects_are_found_on_the_small_scene(results: Path) -> None:
-    # 38 px wide objects and a blur of 3.8 px: a coarse bound, the full size is scored elsewhere.
+    # 38 px wide objects and a blur of 3.8 px: found about 0.1 better than this, by either backend.
     rows = json.loads((results / "score.json").read_text())["planes"]
+    least = {"likelihood": 0.8, "three-step": 0.6}
     for row in rows:
         if row["truth"] == "object":
-            assert row["iou"] > 0.5, row
+            assert row["iou"] > least[row["method"]], row
 
 
 def test_the_report_is_one_file_with_everything_in_it(results: Path) -> None:
