@@ -10,8 +10,18 @@ import numpy as np
 
 from pcii.bayer import check_cfa
 from pcii.errors import InputError
-from pcii.store import COUNTS, MANIFEST, RADIANCE, TRUTH, check_file, radiance_name, read_exr, read_manifest
-from pcii.types import CameraGrid, PhotonCounts, Truth, Views
+from pcii.store import (
+    COUNTS,
+    MANIFEST,
+    PHOTON_TRUTH,
+    RADIANCE,
+    TRUTH,
+    check_file,
+    radiance_name,
+    read_exr,
+    read_manifest,
+)
+from pcii.types import CameraGrid, PhotonCounts, PhotonTruth, Truth, Views
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +62,17 @@ class Dataset:
             return None
         arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id"))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
-        return Truth(arrays["z_mm"], arrays["object_id"], names)
+        return Truth(arrays["z_mm"], arrays["object_id"], names, self._photon_truth())
+
+    def _photon_truth(self) -> PhotonTruth | None:
+        if not self.has(PHOTON_TRUTH):
+            return None
+        known = self._arrays(PHOTON_TRUTH, "photon truth", only=("object_id", "z_mm"))
+        events = self.counts.events
+        where = {name: getattr(events, name).repeat(events.n) for name in "klij"}
+        if known["z_mm"].shape != where["k"].shape:
+            raise InputError(f"{self.path / PHOTON_TRUTH}: does not belong to the counts beside it")
+        return PhotonTruth(**where, **known)
 
     @cached_property
     def views(self) -> Views | None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.geometry import blur_half_extent_px, disparity_spread_px
+from pcii.geometry import blur_half_extent_px, disparity_spread_px, target_indices
 from pcii.statistics import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
 from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
 
@@ -100,8 +100,7 @@ def _plane_rows(focus: Segmented, truth: Truth | None) -> list[dict[str, Any]]:
                     "object": owner or None,
                     "truth": kind,
                     **mask_agreement(focus.in_focus[plane], None if masks is None else masks[plane]),
-                    "photon_precision": None,
-                    "photon_recall": None,
+                    **photon_agreement(focus, truth, plane, kind),
                     "entropy_before": before[plane],
                     "entropy_after": after[plane],
                 }
@@ -124,6 +123,32 @@ def mask_agreement(claimed: np.ndarray, true: np.ndarray | None) -> dict[str, fl
         "recall": both / facts if facts else None,
         "f1": 2 * both / (claims + facts) if either else 1.0,
         "boundary_f": _boundary_f(claimed, true) if either else 1.0,
+    }
+
+
+def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: str) -> dict[str, float | None]:
+    """Precision and recall of the photons that a mask keeps, against where each came from.
+
+    A photon is kept if the voxel that it lands on in the section is claimed. It is rightly kept if
+    its object belongs to the plane ("object"), or if its first hit is in focus there ("pixel").
+    Photons that land outside the section do not count.
+    """
+    if truth is None or truth.photons is None:
+        return {"photon_precision": None, "photon_recall": None}
+    grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
+    rows, cols = target_indices(grid, z0, 1)
+    row, col = rows[photons.k, photons.i], cols[photons.l, photons.j]
+    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    kept = focus.in_focus[plane][row[inside], col[inside]]
+    if kind == "object":
+        own = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
+        right = np.isin(photons.object_id[inside], own)
+    else:
+        right = blur_half_extent_px(grid, photons.z_mm[inside], z0) <= FOCUS_TOLERANCE_PX
+    both = int(np.count_nonzero(kept & right))
+    return {
+        "photon_precision": both / int(kept.sum()) if kept.any() else None,
+        "photon_recall": both / int(right.sum()) if right.any() else None,
     }
 
 

@@ -3,6 +3,7 @@
     manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
     counts.zarr/             events k, l, i, j, n (N,) or dense counts (K, L, H, W)
     truth.zarr/              z_mm, object_id (H, W); on request view_z_mm, view_object_id (K, L, H, W)
+    photon_truth.zarr/       object_id, z_mm (photons,) of each photon's first hit, in the events' order
     radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
 
 A file is written beside its place, flushed to disk and renamed, so that whatever has its final name
@@ -29,6 +30,7 @@ FORMAT_VERSION = 1
 MANIFEST = "manifest.json"
 COUNTS = "counts.zarr"
 TRUTH = "truth.zarr"
+PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
 
 # One Zarr chunk is at most this many elements: a view or a million events.

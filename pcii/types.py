@@ -373,17 +373,33 @@ class DepthMap:
         object.__setattr__(self, "confidence", read_only(self.confidence))
 
 
+@dataclass(frozen=True)
+class PhotonTruth:
+    """Where each detected photon came from: five arrays and a depth, (N,).
+
+    Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of what its path hit first.
+    """
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    object_id: np.ndarray
+    z_mm: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """What the virtual centre camera really sees, from first hits at pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
-    backdrop and for nothing, else a key of `names`.
+    backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
     """
 
     z_mm: np.ndarray
     object_id: np.ndarray
     names: Mapping[int, str]
+    photons: PhotonTruth | None = None
 
     def __post_init__(self) -> None:
         if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:

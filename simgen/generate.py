@@ -22,6 +22,7 @@ from pcii.store import (
     FORMAT,
     FORMAT_VERSION,
     MANIFEST,
+    PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
     check_file,
@@ -38,6 +39,7 @@ from pcii.store import (
 from pcii.types import PhotonCounts
 from simgen import backend, seeds
 from simgen.build import Built, build
+from simgen.photons import draw_photons
 from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene, load_scene
@@ -45,6 +47,8 @@ from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energie
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
 MARKER = ".unfinished.json"
+CROSSOVER_PHOTONS_PER_PIXEL = 0.5
+"""With more light than this a dense render costs less than a path or three for every photon."""
 
 
 @dataclass
@@ -82,18 +86,22 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
         if recipe.products.truth or recipe.products.view_truth:
             with clock.stage("truth"):
                 _write_truth(recipe, built, out, report)
-        if recipe.products.counts or recipe.products.radiance != "none":
+        thins = recipe.products.counts and thinning_pays(recipe, engine["kind"])
+        photons = None
+        if thins:
+            with clock.stage("photons"):
+                photons = _write_thinned(recipe, built, out)
+        if recipe.products.radiance != "none" or (recipe.products.counts and not thins):
             with clock.stage("radiance"):
                 _render_views(recipe, built, out, report)
-        photons = None
-        if recipe.products.counts:
+        if recipe.products.counts and not thins:
             with clock.stage("counts"):
                 photons = _write_counts(recipe, out, report)
         manifest = _manifest(recipe, scene, built, engine, identity, clock, photons)
         if recipe.products.radiance == "none":
             shutil.rmtree(out / RADIANCE, ignore_errors=True)
         with clock.stage("hash"):
-            manifest["files"] = list_files(out, [TRUTH, COUNTS, RADIANCE])
+            manifest["files"] = list_files(out, [TRUTH, PHOTON_TRUTH, COUNTS, RADIANCE])
         manifest["timings_s"] = clock.seconds
         write_json_safely(out / MANIFEST, manifest)
         (out / MARKER).unlink()
@@ -210,6 +218,43 @@ def _render_views(recipe: Recipe, built: Built, out: Path, report: Report) -> No
         report("views", done, grid.view_count)
 
 
+def thinning_pays(recipe: Recipe, kind: str) -> bool:
+    """Whether photons are drawn one by one (see `photons`) rather than from rendered pixels."""
+    grid, photons = recipe.grid, recipe.photons
+    scopes = {"view": 1.0, "channel": 3.0 if recipe.cfa else 1.0, "scene": 1 / (grid.rows * grid.cols)}
+    per_view = photons.budget * scopes[photons.scope]
+    sparse = per_view <= CROSSOVER_PHOTONS_PER_PIXEL * grid.height * grid.width
+    return kind != "scalar" and sparse
+
+
+def _write_thinned(recipe: Recipe, built: Built, out: Path) -> dict[str, Any]:
+    """Draw the photons of all views one by one and write them with where each came from."""
+    grid, cfa = recipe.grid.camera_grid(), recipe.cfa
+    drawn = draw_photons(
+        built, grid, cfa, recipe.photons, max_depth=recipe.render.max_depth, seed=recipe.seed
+    )
+    ones = np.ones(drawn.k.size, dtype=np.int64)
+    counts = PhotonCounts.from_events(drawn.k, drawn.l, drawn.i, drawn.j, ones, grid, cfa=cfa)
+    _save_events(out, counts)
+    if recipe.products.truth:
+        # Both lists are ordered by (k, l, i, j), so photon follows photon of the events.
+        provenance = {"object_id": drawn.object_id, "z_mm": drawn.z_mm}
+        write_arrays_safely(out / PHOTON_TRUTH, provenance, {"z_mm": "planar depth in mm"})
+    dense = grid.view_count * grid.height * grid.width * recipe.render.samples_per_pixel
+    return drawn.log | {
+        "total": counts.total,
+        "pixels_with_photons": int(counts.events.n.size),
+        "normaliser_standard_error": 0.0,
+        "dense_paths_instead": dense,
+    }
+
+
+def _save_events(out: Path, counts: PhotonCounts) -> None:
+    small = {name: getattr(counts.events, name).astype(np.uint16) for name in "klij"}
+    arrays = {**small, "n": counts.events.n.astype(np.uint32)}
+    write_arrays_safely(out / COUNTS, arrays, {"layout": "events"})
+
+
 def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
     """Draw the photons of all views and write them; what the manifest says of them."""
     grid, cfa, photons = recipe.grid.camera_grid(), recipe.cfa, recipe.photons
@@ -233,13 +278,12 @@ def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", done, len(views))
     k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))
-    events = PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa).events
-    small = {name: getattr(events, name).astype(np.uint16) for name in "klij"}
-    write_arrays_safely(out / COUNTS, {**small, "n": events.n.astype(np.uint32)}, {"layout": "events"})
+    made = PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa)
+    _save_events(out, made)
     return {
         "method": "dense",
-        "total": int(events.n.sum()),
-        "pixels_with_photons": int(events.n.size),
+        "total": made.total,
+        "pixels_with_photons": int(made.events.n.size),
         "views_without_light": dark,
     }
 
@@ -254,6 +298,11 @@ def _manifest(
     photons: dict[str, Any] | None,
 ) -> dict[str, Any]:
     skipped = []
+    if photons is not None and photons["method"] == "thinning":
+        skipped.append(
+            f"rendering for the photon counts: {photons['paths']} paths instead of "
+            f"{photons['dense_paths_instead']}"
+        )
     if recipe.products.radiance == "none":
         skipped.append("radiance images: the recipe does not ask for them")
     if not recipe.products.view_truth:

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-Stage = Literal["radiance", "photons", "totals"]
-_STAGES: tuple[Stage, ...] = ("radiance", "photons", "totals")
+Stage = Literal["radiance", "photons", "totals", "pilot", "candidates", "paths", "nested"]
+_STAGES: tuple[Stage, ...] = ("radiance", "photons", "totals", "pilot", "candidates", "paths", "nested")
 
 
 def _sequence(seed: int, view: int, stage: Stage, part: int, scene: int) -> np.random.SeedSequence:

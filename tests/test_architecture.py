@@ -35,7 +35,9 @@ SIMGEN_LEVELS = [
     {"recipe", "scene"},
     {"cameras", "light"},
     {"build", "sensor"},
-    {"render", "truth"},
+    {"paths", "render", "truth"},
+    {"majorant"},
+    {"photons"},
     {"generate", "preview"},
     {"cli"},
 ]

@@ -1,0 +1,258 @@
+"""Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pcii.bayer import colour_index, mosaic
+from pcii.types import CameraGrid
+from simgen import backend
+from simgen.build import Built, build
+from simgen.photons import OVERSHOOT_SHARE, PhotonList, draw_photons
+from simgen.recipe import Photons
+from simgen.render import render_view
+from simgen.scene import Scene
+from simgen.truth import first_hits_of_view
+
+pytestmark = [
+    pytest.mark.renders,
+    pytest.mark.skipif(backend.choose().kind == "scalar", reason="thinning needs a compiled backend"),
+]
+GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
+DEPTH = 3
+
+
+def lit(objects: list[dict], lights: list[dict] | None = None) -> Built:
+    lamp = {
+        "type": "area",
+        "position_mm": (-200, -300, 200),
+        "target_mm": (0, 0, 600),
+        "width_mm": 200,
+        "height_mm": 200,
+        "luminance_cd_m2": 2000.0,
+    }
+    values = {
+        "title": "test",
+        "objects": objects,
+        "lights": lights or [lamp, {"type": "uniform", "luminance_cd_m2": 30.0}],
+        "backdrop": {"z_mm": 1500.0, "reflectance": [0.1, 0.1, 0.1]},
+    }
+    return build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
+
+
+def ball(name: str, x: float, z: float, colour: tuple[float, float, float]) -> dict:
+    return {
+        "name": name,
+        "position_mm": (x, 0.0, z),
+        "shape": {"type": "sphere", "radius_mm": 120.0},
+        "material": {"reflectance": colour},
+    }
+
+
+@pytest.fixture(scope="module")
+def scene() -> Built:
+    return lit([ball("red", -130.0, 600.0, (0.9, 0.2, 0.1)), ball("blue", 150.0, 700.0, (0.1, 0.3, 0.9))])
+
+
+@pytest.fixture(scope="module")
+def radiance(scene: Built) -> np.ndarray:
+    """Mosaics (V, H, W) from 4096 samples per pixel: good to about 1 % per pixel, 0.1 % per tile."""
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    return mosaic(np.stack(views).astype(np.float64), "GRBG")
+
+
+def draw(scene: Built, seed: int, **photons: object) -> PhotonList:
+    settings = Photons.model_validate(photons)
+    return draw_photons(scene, GRID, "GRBG", settings, max_depth=DEPTH, seed=seed)
+
+
+def counted(drawn: PhotonList) -> np.ndarray:
+    """Photons per pixel, (V, H, W)."""
+    counts = np.zeros((4, 32, 32), dtype=np.int64)
+    np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
+    return counts
+
+
+def uniform_if_poisson(counts: np.ndarray, rates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Randomised probability integral transform: independent uniforms if counts are Poisson(rates)."""
+    below = stats.poisson.cdf(counts - 1, rates)
+    return below + rng.random(counts.shape) * stats.poisson.pmf(counts, rates)
+
+
+def on_tiles(pixels: np.ndarray) -> np.ndarray:
+    """Sums over 4 x 4 pixels, (V, 8, 8)."""
+    return pixels.reshape(-1, 8, 4, 8, 4).sum(axis=(2, 4))
+
+
+def tiles(repeated: np.ndarray) -> np.ndarray:
+    """Sums over 4 x 4 pixels of each draw, (N, V, 8, 8)."""
+    return np.stack([on_tiles(counts) for counts in repeated])
+
+
+def rates_of(radiance: np.ndarray, budget: float) -> np.ndarray:
+    return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def repeated(scene: Built) -> np.ndarray:
+    """Photons per pixel of 50 independent draws of 1500 photons per view, (50, V, H, W)."""
+    return np.stack([counted(draw(scene, seed, budget=1500)) for seed in range(50)])
+
+
+def test_counts_fit_the_rendered_rates_pixel_by_pixel_and_tile_by_tile(
+    repeated: np.ndarray, radiance: np.ndarray
+) -> None:
+    rng = np.random.default_rng(1)
+    rates = rates_of(radiance, 1500.0)
+    tilted = rates * np.linspace(0.9, 1.1, 32)  # the fault: brightness off by up to 10 % across the film
+    for counts, expected in ((repeated, rates), (tiles(repeated), on_tiles(rates))):
+        p_values = [
+            stats.kstest(uniform_if_poisson(n, expected, rng).ravel(), "uniform").pvalue for n in counts
+        ]
+        # Each draw's p-value is itself uniform; one suite in a thousand fails by chance.
+        assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+    pooled, n = tiles(repeated).sum(axis=0), len(repeated)
+
+    def chi_square(expected: np.ndarray) -> float:
+        return float(((pooled - n * on_tiles(expected)) ** 2 / (n * on_tiles(expected))).sum())
+
+    assert stats.chi2.sf(chi_square(rates), pooled.size) > 1e-3
+    assert stats.chi2.sf(chi_square(tilted), pooled.size) < 1e-6
+
+
+def test_there_is_no_rendering_noise_in_the_counts(
+    scene: Built, repeated: np.ndarray, radiance: np.ndarray
+) -> None:
+    rates, drawn = on_tiles(rates_of(radiance, 1500.0)), tiles(repeated)
+
+    def dispersion(counts: np.ndarray) -> float:
+        return float(((counts - rates) ** 2 / rates).mean())
+
+    # The mean of n squared standard Poisson deviates is 1 with a spread of sqrt((2 + 1 / rate) / n).
+    spread = np.sqrt((2 + (1 / rates).mean()) / drawn.size)
+    assert abs(dispersion(drawn) - 1) < 4 * spread
+    rng = np.random.default_rng(2)
+    noisy = np.stack([rng.poisson(rates_of(one_sample(scene, seed), 1500.0)) for seed in range(20)])
+    assert dispersion(tiles(noisy)) > 1 + 8 * spread
+
+
+def one_sample(scene: Built, seed: int) -> np.ndarray:
+    """The fault: mosaics of one sample per pixel, whose noise makes counts a Cox process."""
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=1, seed=8 * seed + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    return mosaic(np.stack(views).astype(np.float64), "GRBG")
+
+
+def test_colours_are_true_to_a_percent(scene: Built, radiance: np.ndarray) -> None:
+    colours = colour_index(32, 32, "GRBG")
+    true = np.array([rates_of(radiance, 1.0)[:, colours == c].sum() for c in range(3)]) / 4
+    drawn = counted(draw(scene, 3, budget=400_000))
+    found = np.array([drawn[:, colours == c].sum() for c in range(3)])
+    total = found.sum()
+    # Standard error of a share of 1.6 million photons; the reference's is below 0.03 %.
+    error = np.sqrt(true * (1 - true) / total) + 3e-4 * true
+    assert (np.abs(found / total - true) < 4 * error).all()
+    planted = true * np.array([1.01, 1.0, 1.0])
+    planted /= planted.sum()
+    assert (np.abs(found / total - planted) > 4 * error).any()
+
+
+def test_views_are_independent(scene: Built, radiance: np.ndarray) -> None:
+    counts = counted(draw(scene, 4, budget=3000))
+    excess = ((counts - rates_of(radiance, 3000.0)) / np.sqrt(rates_of(radiance, 3000.0))).reshape(4, -1)
+    correlation = np.corrcoef(excess)
+    assert np.abs(correlation[~np.eye(4, dtype=bool)]).max() < 5 / np.sqrt(32 * 32)
+    leaking = excess[1] + 0.3 * excess[0]  # the fault: a third of one view's noise in another
+    assert np.corrcoef(excess[0], leaking)[0, 1] > 5 / np.sqrt(32 * 32)
+
+
+@pytest.mark.parametrize("scope", ["view", "channel", "scene"])
+def test_totals_are_those_of_the_scope(scene: Built, scope: str) -> None:
+    exact = counted(draw(scene, 5, budget=500, scope=scope, statistics="multinomial"))
+    colours = colour_index(32, 32, "GRBG")
+    if scope == "view":
+        assert exact.sum(axis=(1, 2)).tolist() == [500] * 4
+    elif scope == "channel":
+        assert [[int(view[colours == c].sum()) for c in range(3)] for view in exact] == [[500] * 3] * 4
+    else:
+        assert exact.sum() == 500
+    totals = [counted(draw(scene, seed, budget=500, scope=scope)).sum() for seed in range(12)]
+    expected = {"view": 2000, "channel": 6000, "scene": 500}[scope]
+    assert abs(np.mean(totals) - expected) < 4 * np.sqrt(expected / 12)
+    assert np.std(totals) > 0
+
+
+def test_the_first_photons_of_a_scope_are_a_smaller_draw(scene: Built, radiance: np.ndarray) -> None:
+    drawn = draw(scene, 6, budget=20_000, statistics="multinomial")
+    first = drawn.rank < 2000
+    counts = np.zeros((4, 32, 32))
+    np.add.at(counts, (2 * drawn.k[first] + drawn.l[first], drawn.i[first], drawn.j[first]), 1)
+    assert counts.sum(axis=(1, 2)).tolist() == [2000] * 4
+    expected = on_tiles(rates_of(radiance, 2000.0))
+    chi = ((on_tiles(counts) - expected) ** 2 / expected).sum()
+    assert stats.chi2.sf(chi, 4 * 63) > 1e-3
+
+
+def test_each_photon_knows_what_it_came_from(scene: Built) -> None:
+    drawn = draw(scene, 7, budget=20_000)
+    for k, l in np.ndindex(2, 2):
+        hits = first_hits_of_view(scene, GRID, k, l)
+        ids = np.pad(hits.object_id, 1, mode="edge")
+        around = np.stack([ids[a : a + 32, b : b + 32] for a in range(3) for b in range(3)])
+        inner = (around == hits.object_id).all(axis=0)  # pixels that lie within one object
+        here = (drawn.k == k) & (drawn.l == l)
+        i, j = drawn.i[here], drawn.j[here]
+        sure = inner[i, j]
+        assert (drawn.object_id[here][sure] == hits.object_id[i, j][sure]).all()
+        # A pixel is 24 mm wide on the balls, which are 240 mm across: depth varies within it.
+        assert np.abs(drawn.z_mm[here][sure] - hits.z_mm[i, j][sure]).max() < 60
+
+
+def test_the_same_seed_gives_the_same_photons_and_another_others(scene: Built) -> None:
+    one, again, other = draw(scene, 8, budget=900), draw(scene, 8, budget=900), draw(scene, 9, budget=900)
+    for name in ("k", "l", "i", "j", "object_id", "z_mm", "stream", "rank"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(again, name))
+    assert (counted(one) != counted(other)).any()
+
+
+def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
+    # 6 mm of film at 100 000 times the brightness of what is around: most of the light is in few pixels.
+    lamp = {
+        "type": "area",
+        "position_mm": (40, 30, 700),
+        "target_mm": (40, 30, 0),
+        "width_mm": 30,
+        "height_mm": 30,
+        "luminance_cd_m2": 1e6,
+    }
+    scene = lit([ball("grey", -150.0, 600.0, (0.5, 0.5, 0.5))], [lamp])
+    drawn = draw(scene, 10, budget=30_000)
+    assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
+    view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=4096, seed=1).astype(float), "GRBG")
+    share = view / view.sum()
+    peak = share > 0.01
+    counts = counted(drawn)[0]
+    n, p = counts.sum(), share[peak].sum()
+    # The lamp's edges cross pixels, whose reference is good to 1 / sqrt(4096) of them.
+    assert abs(counts[peak].sum() / n - p) < 4 * np.sqrt(p * (1 - p) / n) + 0.005
+
+
+def test_a_black_scene_gives_no_photons() -> None:
+    dark = {"type": "uniform", "luminance_cd_m2": 1.0}
+    scene = lit([ball("black", 0.0, 600.0, (0.0, 0.0, 0.0))], [dark])
+    values = {
+        "title": "dark",
+        "lights": [dark],
+        "backdrop": {"z_mm": 500.0, "reflectance": [0, 0, 0]},
+    }
+    scene = build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
+    drawn = draw(scene, 1, budget=100)
+    assert drawn.k.size == 0
+    assert drawn.log["kept"] == 0
