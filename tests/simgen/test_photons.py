@@ -167,7 +167,7 @@ def test_colours_are_true_to_a_percent(scene: Built, radiance: np.ndarray) -> No
 def test_views_are_independent(scene: Built, radiance: np.ndarray) -> None:
     counts = counted(draw(scene, 4, budget=3000))
     excess = ((counts - rates_of(radiance, 3000.0)) / np.sqrt(rates_of(radiance, 3000.0))).reshape(4, -1)
-    correlation = np.corrcoef(excess)
+    correlation = np.asarray(np.corrcoef(excess))
     assert np.abs(correlation[~np.eye(4, dtype=bool)]).max() < 5 / np.sqrt(32 * 32)
     leaking = excess[1] + 0.3 * excess[0]  # the fault: a third of one view's noise in another
     assert np.corrcoef(excess[0], leaking)[0, 1] > 5 / np.sqrt(32 * 32)
