@@ -56,7 +56,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_dataset_explains_itself(made: Path) -> None:
     manifest = json.loads((made / MANIFEST).read_text())
     assert manifest["objects"] == {"1": "ball", "2": "bird"}
-    assert set(manifest["timings_s"]) >= {"truth", "radiance", "counts"}
+    assert set(manifest["timings_s"]) >= {"truth", "radiance"}
     assert manifest["backend"]["variant"]
     assert set(manifest["files"]) == set(digest(made))
     assert not (made / MARKER).exists()
@@ -158,6 +158,23 @@ def test_scene_scope_shares_one_budget_among_views(tmp_path: Path) -> None:
     assert dataset.counts.total == 900
     assert dataset.truth is None
     assert not (tmp_path / "scene" / RADIANCE).exists()
+
+
+def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) -> None:
+    generate(recipe(photons={"budget": 4000}), Path(), tmp_path / "bright")
+    bright, dim = open_dataset(tmp_path / "bright"), open_dataset(made)
+    assert bright.manifest["photons"]["method"] == "dense"
+    assert abs(bright.counts.total - 24_000) < 5 * np.sqrt(24_000)
+    assert bright.truth is not None
+    assert bright.truth.photons is None
+    if dim.manifest["backend"]["kind"] == "scalar":
+        return
+    photons = dim.manifest["photons"]
+    assert photons["method"] == "thinning"
+    assert photons["paths"] < photons["dense_paths_instead"] * 100  # both are told
+    assert dim.truth is not None
+    assert dim.truth.photons is not None
+    assert dim.truth.photons.z_mm.shape == (dim.counts.total,)
 
 
 def test_a_monochrome_dataset_has_one_channel(tmp_path: Path) -> None:
