@@ -1,12 +1,13 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
+# make bench  run time against error
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out
 
-.PHONY: demo test format clean llvm
+.PHONY: demo test bench format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -36,6 +37,9 @@ test: llvm
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/python -m pytest -n 2 -m "not slow"
+
+bench: llvm
+	$(BIN)/python -m benchmarks
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .

@@ -16,7 +16,8 @@ from simgen.build import Built
 from simgen.light import LUMINANCE
 from simgen.paths import Paths, Rays, trace
 
-TILE_PX = 4
+TILES_ACROSS = 256
+"""The longer side of a film has about so many tiles, whatever its pixels."""
 COARSE_TILES = 8
 """The first, uniform pilot is pooled over 8 x 8 tiles; the second is drawn from what it found."""
 PILOT_PATHS = (1 << 16, 1 << 17)
@@ -33,24 +34,21 @@ SMALL_SAMPLE = 16
 class Majorant:
     """Upper bound of radiance on tiles: `bound` (tile rows, tile columns, C), C colours of the sensor.
 
-    Pixel (i, j) of camera (k, l) lies on the tile of row (i + row_shift[k]) // TILE_PX, and likewise
-    for columns; the shifts are even and not negative.
+    Pixel (i, j) of camera (k, l) lies on the tile of row (i + row_shift[k]) // tile_px, and likewise
+    for columns; the shifts are even and not negative, and `tile_px` is even.
     """
 
+    tile_px: int
     row_shift: np.ndarray
     col_shift: np.ndarray
     bound: np.ndarray
     paths: int
     """Paths that the pilot took."""
 
-    def scaled(self, factor: float) -> "Majorant":
-        """The same shape, higher by a factor."""
-        return replace(self, bound=self.bound * factor)
-
     def tiles_of(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
         """Tile row and column of each ray's pixel."""
-        row = (np.rint(rays.row_px).astype(np.int64) + self.row_shift[rays.k]) // TILE_PX
-        col = (np.rint(rays.col_px).astype(np.int64) + self.col_shift[rays.l]) // TILE_PX
+        row = (np.rint(rays.row_px).astype(np.int64) + self.row_shift[rays.k]) // self.tile_px
+        col = (np.rint(rays.col_px).astype(np.int64) + self.col_shift[rays.l]) // self.tile_px
         return row, col
 
 
@@ -74,8 +72,11 @@ def explore(built: Built, grid: CameraGrid, channels: int, *, max_depth: int, se
     if not light.any():
         return None
     row_shift, col_shift = _shifts(grid, paths, light)
-    shape = (_tiles(grid.height + row_shift.max()), _tiles(grid.width + col_shift.max()), channels)
-    start = Majorant(row_shift, col_shift, np.broadcast_to(mean, shape), sum(PILOT_PATHS))
+    tile_px = 2 * max(1, round(max(grid.height, grid.width) / (2 * TILES_ACROSS)))
+    rows = _tiles(grid.height + row_shift.max(), tile_px)
+    cols = _tiles(grid.width + col_shift.max(), tile_px)
+    level = np.broadcast_to(mean, (rows, cols, channels))
+    start = Majorant(tile_px, row_shift, col_shift, level, sum(PILOT_PATHS))
     coarse = replace(start, bound=_coarse_bound(start, first, light, FLOOR_SHARE * mean))
 
     second, weight = draw_even_tiles(coarse, grid, PILOT_PATHS[1], rng)
@@ -97,9 +98,9 @@ def draw_even_tiles(
     flat = np.searchsorted(np.cumsum(density.ravel()) / density.sum(), rng.random(number))
     flat = np.minimum(flat, density.size - 1)
     k, l = rng.integers(0, grid.rows, number), rng.integers(0, grid.cols, number)
-    inside = rng.random((2, number)) * TILE_PX - 0.5
-    row = flat // density.shape[1] * TILE_PX - majorant.row_shift[k] + inside[0]
-    col = flat % density.shape[1] * TILE_PX - majorant.col_shift[l] + inside[1]
+    inside = rng.random((2, number)) * majorant.tile_px - 0.5
+    row = flat // density.shape[1] * majorant.tile_px - majorant.row_shift[k] + inside[0]
+    col = flat % density.shape[1] * majorant.tile_px - majorant.col_shift[l] + inside[1]
     keep = (row >= -0.5) & (row < grid.height - 0.5) & (col >= -0.5) & (col < grid.width - 0.5)
     return Rays(k[keep], l[keep], row[keep], col[keep]), 1 / density.ravel()[flat[keep]]
 
@@ -127,9 +128,9 @@ def _shifts(grid: CameraGrid, paths: Paths, light: np.ndarray) -> tuple[np.ndarr
     return row, col
 
 
-def _tiles(pixels: int) -> int:
+def _tiles(pixels: int, tile_px: int) -> int:
     """Tiles that cover so many pixels, a whole number of coarse ones."""
-    coarse = TILE_PX * COARSE_TILES
+    coarse = tile_px * COARSE_TILES
     return -(-int(pixels) // coarse) * COARSE_TILES
 
 

@@ -84,6 +84,9 @@ def _estimate(mi: Any, dr: Any, scene: Any, ray: Any, sampler: Any, max_depth: i
     before = dr.zeros(mi.Interaction3f)  # where the ray came from: the camera, at first
     pdf, by_chance = mi.Float(1), mi.Bool(False)  # by_chance: lamps could have been sampled instead
     side = 1
+    # Light from all around is found by following the surface's own scattering: for uniform
+    # surroundings that has no variance but for what stands in the way.
+    lamps = [light for light in scene.emitters() if not light.is_environment()]
     shape, z = mi.UInt32(0), mi.Float(0)
     for segment in range(1, max_depth + 1):
         hit = scene.ray_intersect(ray, active)
@@ -92,20 +95,19 @@ def _estimate(mi: Any, dr: Any, scene: Any, ray: Any, sampler: Any, max_depth: i
             z = mi.Float(hit.p.z)
         lamp = hit.emitter(scene, active)
         towards = mi.DirectionSample3f(scene, hit, before)
-        tries = dr.select(hit.is_valid(), mi.Float(side**2), 1)  # surroundings are sampled once
-        pdf_lamp = dr.select(by_chance, tries * lamp.pdf_direction(before, towards, active), 0)
+        reached = by_chance & hit.is_valid()  # what lies behind everything is no lamp to be aimed at
+        pdf_lamp = dr.select(reached, side**2 * lamp.pdf_direction(before, towards, active), 0)
         radiance += dr.select(active, throughput * lamp.eval(hit, active) * _share(pdf, pdf_lamp), 0)
         active &= hit.is_valid()
         if segment == max_depth:
             break
         bsdf = hit.bsdf(ray)
         side = STRATA if segment == 1 else 1
-        for light in scene.emitters():
-            cells = 1 if light.is_environment() else side
-            for cell in np.ndindex(cells, cells):
-                point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / cells
-                direct = _direct(mi, dr, scene, light, hit, bsdf, context, point, cells**2, active)
-                radiance += throughput * direct / cells**2
+        for light in lamps:
+            for cell in np.ndindex(side, side):
+                point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / side
+                direct = _direct(mi, dr, scene, light, hit, bsdf, context, point, side**2, active)
+                radiance += throughput * direct / side**2
         sample, weight = bsdf.sample(context, hit, sampler.next_1d(active), sampler.next_2d(active), active)
         throughput *= weight
         active &= dr.any(throughput != 0)

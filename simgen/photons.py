@@ -25,7 +25,7 @@ from pcii.bayer import channel_count, colour_cells
 from pcii.types import CameraGrid
 from simgen import seeds
 from simgen.build import Built
-from simgen.majorant import TILE_PX, Majorant, explore, sensed
+from simgen.majorant import Majorant, explore, sensed
 from simgen.paths import Rays, trace
 from simgen.recipe import Photons
 
@@ -213,7 +213,7 @@ def _candidates_needed(stream: _Stream, round_number: int, share: float, streams
     if round_number == 0:
         missing *= FIRST_SHARE
     elif round_number > 1:
-        missing += 4 * np.sqrt(missing) + 4
+        missing += 2 * np.sqrt(missing) + 2
     return int(np.clip(missing / share, 16, max(WAVEFRONT // streams, 16)))
 
 
@@ -255,10 +255,10 @@ def _candidates(
     tile, cell = np.divmod(where, 4)
     k, l = np.divmod(view, grid.cols)
     # One number gives the pixel (its whole part) and the place within the pixel (the rest).
-    place = chances[:, 1:3] * (TILE_PX // 2)
+    place = chances[:, 1:3] * (majorant.tile_px // 2)
     whole = np.floor(place)
-    row = tile // cols * TILE_PX + 2 * whole[:, 0] + cell // 2 - majorant.row_shift[k]
-    col = tile % cols * TILE_PX + 2 * whole[:, 1] + cell % 2 - majorant.col_shift[l]
+    row = tile // cols * majorant.tile_px + 2 * whole[:, 0] + cell // 2 - majorant.row_shift[k]
+    col = tile % cols * majorant.tile_px + 2 * whole[:, 1] + cell % 2 - majorant.col_shift[l]
     keep = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
     inner = place - whole - 0.5
     rays = Rays(k[keep], l[keep], (row + inner[:, 0])[keep], (col + inner[:, 1])[keep])
