@@ -78,11 +78,11 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     if finished is not None:
         return finished
     engine = backend.describe()
+    clock = _Clock()
+    with clock.stage("load"):  # before the folder is made: a bad scene shows here
+        built = build(backend.load(), scene, folder, recipe.render.max_depth)
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
-        clock = _Clock()
-        with clock.stage("load"):
-            built = build(backend.load(), scene, folder, recipe.render.max_depth)
         if recipe.products.truth or recipe.products.view_truth:
             with clock.stage("truth"):
                 _write_truth(recipe, built, out, report)
@@ -160,13 +160,17 @@ def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[None]
         file.seek(0)
         text = file.read()
         if text:
-            begun = json.loads(text)
+            try:
+                begun = json.loads(text)
+            except ValueError:
+                raise InputError(f"{marker}: damaged; delete the folder to start again") from None
             if begun.get("identity") != identity:
                 raise InputError(
                     f"{out}: holds the unfinished dataset of another recipe or scene; "
                     "name a new or empty folder"
                 )
-            if begun.get("backend") != engine:
+            decisive = ("variant", "mitsuba", "drjit")
+            if any(begun["backend"][key] != engine[key] for key in decisive):
                 raise InputError(
                     f"{out}: was begun with {begun['backend']['variant']}, and this machine now "
                     f"runs {engine['variant']}, whose pixels differ; delete {marker.name}'s folder "
@@ -250,7 +254,8 @@ def _write_thinned(recipe: Recipe, built: Built, out: Path) -> dict[str, Any]:
 
 
 def _save_events(out: Path, counts: PhotonCounts) -> None:
-    small = {name: getattr(counts.events, name).astype(np.uint16) for name in "klij"}
+    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
+    small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
     arrays = {**small, "n": counts.events.n.astype(np.uint32)}
     write_arrays_safely(out / COUNTS, arrays, {"layout": "events"})
 
