@@ -11,6 +11,7 @@ from pcii.types import DepthMap, PhotonCounts, check_z_mm
 
 PLANE_STEP_PX = 1.0
 """Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""
+MOST_PLANES = 2000
 SIGMA_PX = 14.0
 LEAST_CONFIDENCE = 0.5
 SIGNIFICANT_SIGMAS = 4.0
@@ -40,6 +41,12 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     grid = counts.grid
     if grid.view_count < 2:
         raise InputError("counts: one view has no depth; depth needs at least 2 cameras")
+    span = float(disparity_spread_px(grid, near) - disparity_spread_px(grid, far))
+    if span > MOST_PLANES * PLANE_STEP_PX:
+        raise InputError(
+            f"z_range_mm: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
+            f"most {MOST_PLANES * PLANE_STEP_PX:g} px can be searched; choose a farther near end"
+        )
     z = depths_of_equal_spread_mm(grid, near, far, PLANE_STEP_PX)
     scores = focus_scores(counts, z, sigma_px=SIGMA_PX)
     best = np.argmax(scores, axis=0)

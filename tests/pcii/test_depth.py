@@ -156,3 +156,9 @@ def test_one_view_is_refused():
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
     with pytest.raises(InputError, match=r"^counts: one view has no depth"):
         estimate_depth(counts, (1.0, 2.0))
+
+
+def test_a_range_without_end_is_refused():
+    counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
+    with pytest.raises(InputError, match="choose a farther near end"):
+        estimate_depth(counts, (1e-6, 1.0))
