@@ -26,7 +26,7 @@ def demosaic(
     >>> demosaic(np.ones((4, 4)), cfa="GRBG").shape
     (4, 4, 3)
     """
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no demosaicing named {method!r}; use {', '.join(METHODS)}")
     if cfa is None:
         raise InputError("cfa: a monochrome image has nothing to demosaic")

@@ -33,6 +33,8 @@ def reconstruct(
     (2, 1024, 1024, 3)
     """
     z = check_z_mm(z_mm)
+    if not isinstance(data, PhotonCounts | Views):
+        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
     if isinstance(subpixel, bool) or not isinstance(subpixel, int) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
     if normalisation not in ("overlap", "views"):

@@ -11,7 +11,7 @@ from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import pooled_estimate, section_window_px
 from pcii.three_step import three_step
-from pcii.types import PhotonCounts, Segmented, check_z_mm
+from pcii.types import PhotonCounts, Segmented, check_counts, check_z_mm
 
 FOCUS_SIGMA_PX = 20.0
 SMALLEST_REGION_PX = 100
@@ -29,6 +29,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     (2, 1024, 1024)
     """
     z = check_z_mm(z_mm)
+    check_counts(counts)
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
     if counts.grid.view_count < 2:

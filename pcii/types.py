@@ -46,6 +46,17 @@ def _check_size(name: str, value: object) -> None:
         raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
 
 
+def check_counts(value: object) -> None:
+    """Raise `InputError` unless `value` is `PhotonCounts`."""
+    if not isinstance(value, PhotonCounts):
+        raise InputError(f"counts: expected PhotonCounts, got {type(value).__name__}")
+
+
+def _check_grid(value: object) -> None:
+    if not isinstance(value, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
+
+
 def _check_length(name: str, value: object) -> None:
     number = isinstance(value, int | float | np.integer | np.floating)
     if isinstance(value, bool) or not number or not (math.isfinite(value) and value > 0):
@@ -189,6 +200,7 @@ class PhotonCounts:
     ) -> "PhotonCounts":
         """Counts from a dense stack (K, L, H, W) of whole numbers >= 0; raises `InputError`."""
         check_cfa(cfa)
+        _check_grid(grid)
         counts = _whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
@@ -212,6 +224,7 @@ class PhotonCounts:
         outside the grid, a negative or fractional count, or lists of different lengths.
         """
         check_cfa(cfa)
+        _check_grid(grid)
         where: dict[str, np.ndarray] = {}
         for (name, values), limit in zip(
             {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
@@ -404,8 +417,8 @@ class Truth:
     def __post_init__(self) -> None:
         if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
             raise InputError("z_mm, object_id: expected two maps (H, W) of the same shape")
-        if np.isnan(self.z_mm).any():
-            raise InputError("z_mm: the truth has no NaN; a miss is +inf")
+        if not (self.z_mm > 0).all():
+            raise InputError("z_mm: true depths are above 0 mm and never NaN; a miss is +inf")
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
         if unknown:
             raise InputError(f"object_id: id {min(unknown)} has no name")

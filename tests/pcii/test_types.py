@@ -8,6 +8,7 @@ from twins import unit_grid
 
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
+from pcii.segment import segment
 from pcii.types import (
     CameraGrid,
     DepthMap,
@@ -279,7 +280,7 @@ def test_a_depth_map_needs_a_confidence_of_its_shape():
 def test_truth_has_infinity_for_a_miss_but_no_nan():
     ids = np.zeros((1, 2), dtype=int)
     Truth(np.array([[1.0, np.inf]]), ids, {})
-    with pytest.raises(InputError, match=r"^z_mm: the truth has no NaN"):
+    with pytest.raises(InputError, match=r"^z_mm: true depths are above 0 mm and never NaN"):
         Truth(np.array([[1.0, np.nan]]), ids, {})
 
 
@@ -296,3 +297,16 @@ def test_a_score_keeps_the_spelling_of_its_file():
         "objects": [],
         "depth": {"mae_mm": None},
     }
+
+
+def test_things_of_another_kind_are_refused_by_name():
+    grid = unit_grid(1, 2, 4, 4)
+    counts = np.ones(grid.shape_KLHW, dtype=int)
+    with pytest.raises(InputError, match="grid: expected a CameraGrid, got dict"):
+        PhotonCounts.from_dense(counts, {"rows": 1})  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="data: expected PhotonCounts or Views, got ndarray"):
+        reconstruct(counts, [1.0])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="counts: expected PhotonCounts, got ndarray"):
+        segment(counts, [1.0])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="above 0 mm and never NaN"):
+        Truth(np.zeros((2, 2)), np.zeros((2, 2), dtype=int), {})
