@@ -35,8 +35,8 @@ def project_px(
 
 def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """(horizontal, vertical) disparity at depth z in px per camera step; 0 at infinity."""
-    per_mm = grid.focal_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
-    return per_mm * grid.pitch_mm[0], per_mm * grid.pitch_mm[1]
+    scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
+    return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
 
 
 def _check_near(grid: CameraGrid, z_mm: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 from pcii.errors import InputError
 from simgen.backend import shape_numbers
 from simgen.light import light_plugin
-from simgen.scene import Card, Material, Mesh, Scene, SceneObject, Sphere, asset
+from simgen.scene import Card, Mesh, Scene, SceneObject, Sphere, asset
 
 BACKDROP = "backdrop"
 LARGEST_TEXTURE_PIXELS = 1 << 26
@@ -72,7 +72,7 @@ def _object(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     pose = T().translate(list(thing.position_mm))
     for axis, degrees in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True):
         pose = pose @ T().rotate(list(axis), degrees)
-    return {**_shape(mi, thing.shape, pose, folder), "bsdf": _material(mi, thing.material, folder)}
+    return {**_shape(mi, thing.shape, pose, folder), "bsdf": _material(mi, thing, folder)}
 
 
 def _shape(mi: Any, shape: Sphere | Card | Mesh, pose: Any, folder: Path) -> dict[str, Any]:
@@ -100,13 +100,24 @@ def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
 
 
-def _material(mi: Any, material: Material, folder: Path) -> dict[str, Any]:
+def _material(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
+    material = thing.material
     if material.texture is None:
         assert material.reflectance is not None
         return _diffuse({"type": "rgb", "value": _linear(material.reflectance)})
     path = asset(folder, material.texture, "material.texture")
-    bitmap = mi.Bitmap(_read_image(path))  # linear already, so Mitsuba must not convert it
-    return _diffuse({"type": "bitmap", "bitmap": bitmap, "raw": True, "filter_type": "bilinear"})
+    pixels = _read_image(path)
+    if isinstance(thing.shape, Card):
+        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
+    texture = {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(pixels),
+        "raw": True,  # linear already, so Mitsuba must not convert it
+        "filter_type": "bilinear",
+        # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
+        "wrap_mode": "repeat" if isinstance(thing.shape, Sphere) else "clamp",
+    }
+    return _diffuse(texture)
 
 
 def _diffuse(reflectance: dict[str, Any]) -> dict[str, Any]:

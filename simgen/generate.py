@@ -256,7 +256,7 @@ def _write_thinned(recipe: Recipe, built: Built, out: Path) -> dict[str, Any]:
 def _save_events(out: Path, counts: PhotonCounts) -> None:
     index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
     small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
-    arrays = {**small, "n": counts.events.n.astype(np.uint32)}
+    arrays = {**small, "n": counts.events.n}
     write_arrays_safely(out / COUNTS, arrays, {"layout": "events"})
 
 

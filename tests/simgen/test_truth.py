@@ -158,3 +158,20 @@ def test_views_with_different_seeds_have_independent_noise(tmp_path: Path) -> No
     if one.std() > 0:
         correlation = np.corrcoef(one.ravel(), other.ravel())[0, 1]
         assert abs(correlation) < 5 / np.sqrt(one.size)
+
+
+def test_a_cards_texture_stands_upright_and_ends_at_its_borders(tmp_path: Path) -> None:
+    corners = np.zeros((40, 40, 3), dtype=np.uint8)
+    corners[:20, :20], corners[:20, 20:] = (255, 0, 0), (0, 255, 0)  # top: red, green
+    corners[20:, :20], corners[20:, 20:] = (0, 0, 255), (255, 255, 255)  # bottom: blue, white
+    Image.fromarray(corners).save(tmp_path / "corners.png")
+    scene = built(tmp_path, [card("card", 600.0, 80.0, {"texture": "corners.png"})])
+    image = render_view(scene, grid(1, 1, 120, 120), 0, 0, samples_per_pixel=64, seed=3)
+    # The card is 95 px wide about (59.5, 59.5): its corners are 25 px from the centre, and more.
+    lit = image > 0.3 * image.max()
+    assert lit[35, 35].tolist() == [True, False, False]
+    assert lit[35, 84].tolist() == [False, True, False]
+    assert lit[84, 35].tolist() == [False, False, True]
+    assert lit[84, 84].tolist() == [True, True, True]
+    top_row = image[13, 20:50]  # the card's uppermost row, where the bottom's blue must not leak in
+    assert top_row[:, 2].max() < 0.02 * image.max()
