@@ -58,7 +58,7 @@ class Dataset:
     @cached_property
     def truth(self) -> Truth | None:
         """Depth and object of every pixel of the virtual centre, or None where it is not known."""
-        if not self.has(TRUTH):
+        if not self.has(f"{TRUTH}/z_mm"):
             return None
         arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id"))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}

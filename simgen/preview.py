@@ -20,6 +20,8 @@ def write_preview(scene_name: str, out: Path, samples_per_pixel: int) -> None:
     mpl.use("Agg")
     import matplotlib.pyplot as plt
 
+    if samples_per_pixel < 1:
+        raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
     if out.suffix.lower() != ".png":
         raise InputError(f"{out}: name a .png file")
     scene, folder = load_scene(scene_name, Path.cwd())

@@ -3,9 +3,9 @@
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pcii.bayer import PATTERNS
 from pcii.errors import InputError
@@ -14,6 +14,8 @@ from simgen.locations import find, recipe_roots
 from simgen.schema import Count, Positive, Strict, read_toml, suggestion, validate
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
+MOST_PATHS = 1 << 31
+"""One rendering pass counts its paths in 32 bits."""
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
 
 
@@ -85,6 +87,12 @@ class Analysis(Strict):
     z_range_mm: tuple[Positive, Positive] | None = None
     """Nearest and farthest depth that a depth map considers."""
 
+    @model_validator(mode="after")
+    def _near_before_far(self) -> Self:
+        if self.z_range_mm is not None and self.z_range_mm[0] >= self.z_range_mm[1]:
+            raise ValueError("z_range_mm: near must be less than far")
+        return self
+
 
 class Recipe(Strict):
     """A dataset: which scene, seen by which cameras, in how much light, and what is kept."""
@@ -99,6 +107,17 @@ class Recipe(Strict):
     render: Render = Render()
     products: Products = Products()
     analysis: Analysis = Analysis()
+
+    @model_validator(mode="after")
+    def _one_pass_renders_a_view(self) -> Self:
+        paths = self.grid.height * self.grid.width * self.render.samples_per_pixel
+        if paths >= MOST_PATHS:
+            raise ValueError(
+                f"a view of {self.grid.height} x {self.grid.width} pixels with "
+                f"{self.render.samples_per_pixel} samples each is {paths} paths; fewer than "
+                f"{MOST_PATHS} can be rendered at once"
+            )
+        return self
 
     @property
     def cfa(self) -> str | None:

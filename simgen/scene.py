@@ -149,13 +149,10 @@ def load_scene(name_or_path: str, near: Path | None = None) -> tuple[Scene, Path
 def find_scene(name_or_path: str, near: Path | None = None) -> Path:
     """The scene.toml that a name or path means; `InputError` with a suggestion if there is none."""
     given = Path(name_or_path)
-    for candidate in (given, given / "scene.toml"):
+    beside = [] if near is None else [near / given, near / given / "scene.toml"]
+    for candidate in (*beside, given, given / "scene.toml"):
         if candidate.is_file():
             return candidate
-    if near is not None:
-        for candidate in (near / given, near / given / "scene.toml"):
-            if candidate.is_file():
-                return candidate
     shipped = find(scene_roots, f"{name_or_path}/scene.toml")
     if shipped is not None:
         return shipped
