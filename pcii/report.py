@@ -60,7 +60,7 @@ def _content(outcome: Outcome) -> dict[str, Any]:
         "score": outcome.score,
         "table1": _table1(outcome.score.objects),
         "table1_holds": table1_holds(outcome.score.objects, outcome.score.planes),
-        "paper_table1": PAPER_TABLE_1,
+        "paper_table1": PAPER_TABLE_1 if outcome.sections.z_mm.tolist() == [540.0, 620.0] else (),
         "timings": outcome.timings_s,
         "made": manifest,
         "made_s": sum(manifest.get("timings_s", {}).values()),

@@ -142,7 +142,10 @@ def _finished(out: Path, identity: str) -> dict[str, Any] | None:
     if manifest.get("identity") != identity:
         raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
     for name, entry in manifest["files"].items():
-        check_file(out, name, entry, content=False)
+        try:
+            check_file(out, name, entry, content=True)
+        except InputError as fault:
+            raise InputError(f"{fault}, after deleting {out}") from None
     return manifest
 
 
