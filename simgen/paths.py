@@ -1,7 +1,7 @@
 """Light paths, one for each of many camera rays at once: unbiased radiance and what was hit first.
 
 The estimator is path tracing with next-event estimation (Kajiya 1986) and multiple importance sampling
-by the power heuristic (Veach 1997). At every hit each lamp is sampled once, instead of one lamp
+by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
 chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
 varies, the fewer candidates are needed. Needs a compiled backend.
 """
@@ -16,7 +16,7 @@ from simgen.backend import load_drjit
 from simgen.build import Built
 from simgen.cameras import camera_x_mm, camera_y_mm
 
-STRATA = 3
+STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
 
 
