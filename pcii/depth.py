@@ -7,7 +7,7 @@ import numpy as np
 from pcii.errors import InputError
 from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
 from pcii.likelihood import cells_to_pixels, flat_deviation, focus_scores, photons_nearby
-from pcii.types import DepthMap, PhotonCounts, check_counts, check_z_mm
+from pcii.types import DepthMap, PhotonCounts, check_depth_counts, check_z_mm
 
 PLANE_STEP_PX = 1.0
 """Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""
@@ -36,12 +36,10 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
     near, far = check_z_mm(z_range_mm)
-    check_counts(counts)
+    check_depth_counts(counts)
     if near >= far:
         raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
     grid = counts.grid
-    if grid.view_count < 2:
-        raise InputError("counts: one view has no depth; depth needs at least 2 cameras")
     span = float(disparity_spread_px(grid, near) - disparity_spread_px(grid, far))
     if span > MOST_PLANES * PLANE_STEP_PX:
         raise InputError(

@@ -13,6 +13,7 @@ NEARBY_PX = 25
 SKIRT_SHARE = 1 / 3
 """What is below 1/3 of the brightest nearby (1/9 of its photons) may be its blurred skirt."""
 EDGE_SMOOTHING_PX = 1.0
+SMALLEST_REGION_PX = 100
 
 
 def roberts_magnitude(image: np.ndarray) -> np.ndarray:
@@ -53,6 +54,15 @@ def foreground(bright: np.ndarray, edges: np.ndarray) -> np.ndarray:
     markers[above < DARK_SIGMAS] = 1
     markers[(above > BRIGHT_SIGMAS) & (above > SKIRT_SHARE * nearby)] = 2
     return watershed(gaussian_filter(edges, EDGE_SMOOTHING_PX), markers) == 2
+
+
+def outlined(
+    pooled: np.ndarray, samples_per_window: float, smallest_px: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Roberts magnitude of one pooled section (H, W, C), and what stands out in it, both (H, W)."""
+    bright = brightness(pooled, samples_per_window)
+    edges = roberts_magnitude(bright)
+    return edges, without_specks(foreground(bright, edges), smallest_px)
 
 
 def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:

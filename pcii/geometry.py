@@ -8,7 +8,7 @@ likewise in rows, so a camera further right sees it further LEFT.
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.types import CameraGrid
+from pcii.types import CameraGrid, PhotonEvents, PhotonTruth
 
 
 def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:
@@ -77,6 +77,16 @@ def target_indices(grid: CameraGrid, z_mm: float, subpixel: int) -> tuple[np.nda
     rows = np.floor((i + 0.5 + (k - (grid.rows - 1) / 2) * d_y) * subpixel)
     cols = np.floor((j + 0.5 + (l - (grid.cols - 1) / 2) * d_x) * subpixel)
     return rows.astype(np.int64), cols.astype(np.int64)
+
+
+def landing(
+    grid: CameraGrid, photons: PhotonEvents | PhotonTruth, z_mm: float, subpixel: int = 1
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Voxel row and column (N,) of each photon in the section at z, and whether it is inside, bool."""
+    rows, cols = target_indices(grid, z_mm, subpixel)
+    row, col = rows[photons.k, photons.i], cols[photons.l, photons.j]
+    H, W = grid.height * subpixel, grid.width * subpixel
+    return row, col, (row >= 0) & (row < H) & (col >= 0) & (col < W)
 
 
 def disparity_spread_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:

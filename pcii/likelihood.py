@@ -14,9 +14,9 @@ from functools import cache
 
 import numpy as np
 
-from pcii.geometry import nearest_shifts_px
+from pcii import statistics
+from pcii.geometry import landing
 from pcii.reconstruct import coverage_of
-from pcii.statistics import colour_of_events
 from pcii.types import PhotonCounts
 
 BLOCK_PX = 2
@@ -94,13 +94,11 @@ def _plane_score(counts: PhotonCounts, z_mm: float, sigma_px: float) -> np.ndarr
 
 def _block_counts(counts: PhotonCounts, z_mm: float) -> np.ndarray:
     """Photons of the section at z by colour and block, (C, blocks, blocks) float64."""
-    grid, events = counts.grid, counts.events
-    row_shift, col_shift = nearest_shifts_px(grid, z_mm)
-    row, col = events.i + row_shift[events.k], events.j + col_shift[events.l]
-    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    events = counts.events
+    row, col, inside = landing(counts.grid, events, z_mm)
     height, width = (n * BLOCKS for n in cell_shape(counts))
     block = (row[inside] // BLOCK_PX) * width + col[inside] // BLOCK_PX
-    flat = colour_of_events(counts)[inside] * (height * width) + block
+    flat = counts.event_colours[inside] * (height * width) + block
     size = counts.channel_count * height * width
     return np.bincount(flat, events.n[inside], minlength=size).reshape(-1, height, width)
 
@@ -127,8 +125,7 @@ def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
 
 def cells_to_pixels(cells: np.ndarray, counts: PhotonCounts) -> np.ndarray:
     """Values on cells (H / 4, W / 4) as values on pixels (H, W), each cell constant."""
-    full = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1)
-    return full[: counts.grid.height, : counts.grid.width]
+    return statistics.cells_to_pixels(cells, CELL_PX, counts.grid)
 
 
 def flat_information(rate: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.bayer import colour_cells
 from pcii.errors import InputError
-from pcii.geometry import target_indices
+from pcii.geometry import landing, target_indices
 from pcii.types import CameraGrid, Normalisation, PhotonCounts, Sections, Views, check_z_mm
 
 
@@ -55,12 +55,8 @@ def reconstruct(
 def _add_events(plane: np.ndarray, data: PhotonCounts, z_mm: float, subpixel: int) -> None:
     """Scatter the photons into the section `plane` (C, H M, W M): the cost follows the photons."""
     events = data.events
-    rows, cols = target_indices(data.grid, z_mm, subpixel)
-    row, col = rows[events.k, events.i], cols[events.l, events.j]
-    colour = colour_cells(data.cfa)[events.i % 2, events.j % 2]
-    _, H, W = plane.shape
-    inside = (row >= 0) & (row < H) & (col >= 0) & (col < W)
-    voxel = np.ravel_multi_index((colour[inside], row[inside], col[inside]), plane.shape)
+    row, col, inside = landing(data.grid, events, z_mm, subpixel)
+    voxel = np.ravel_multi_index((data.event_colours[inside], row[inside], col[inside]), plane.shape)
     np.add.at(plane.reshape(-1), voxel, events.n[inside])
 
 

@@ -51,7 +51,6 @@ def _content(outcome: Outcome) -> dict[str, Any]:
         "photons_total": dataset.counts.total,
         "photons_per_view": dataset.counts.total / dataset.grid.view_count,
         "crop": f"rows {box[0].start} to {box[0].stop - 1}, columns {box[1].start} to {box[1].stop - 1}",
-        "crop_width": box[1].stop - box[1].start,
         "figure6": _figure6(outcome, box),
         "figure7": _figure7(outcome, box),
         "depth": _depth_panels(outcome, box),
@@ -147,15 +146,15 @@ def _section_panels(
     ]
 
 
-def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, Any]]:
+def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, str]]]:
     """For each method and plane: what is left of the section, the truth, and where they differ."""
     truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
     by_object = object_masks(grid, truth, z_mm) if truth else None
     by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
-    rows: list[dict[str, Any]] = []
+    white = max(picture.white_level(plane, box) for plane in outcome.sections.estimate)
+    rows: list[list[dict[str, str]]] = []
     for focus in outcome.focus:
         cleaned = focus.cleaned
-        white = max(picture.white_level(plane, box) for plane in outcome.sections.estimate)
         for plane, z in enumerate(z_mm):
             image = picture.to_srgb8(cleaned[plane], white)
             panels = [_panel(image, box, f"{focus.method}, {z:g} mm: what is left")]
@@ -165,7 +164,7 @@ def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, Any]]
                 panels.append(_panel(shown, box, f"truth at {z:g} mm"))
                 shown = picture.agreement_image(focus.in_focus[plane], by_object[plane])
                 panels.append(_panel(shown, box, "compared"))
-            rows.append({"panels": panels, "method": focus.method, "z": f"{z:g}"})
+            rows.append(panels)
     return rows
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.geometry import blur_half_extent_px, disparity_spread_px, target_indices
+from pcii.geometry import blur_half_extent_px, disparity_spread_px, landing
 from pcii.statistics import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
 from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
 
@@ -45,8 +45,11 @@ def score(
         shapes += [] if depth is None else [depth.z_mm.shape]
         if any(shape != truth.z_mm.shape for shape in shapes):
             raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shapes[0]}")
-    rows = [row for one in methods for row in _plane_rows(one, truth)]
-    objects = _object_rows(methods[0], truth) if methods and truth is not None else []
+    pooled = [pooled_estimate(one.sections, section_window_px(one.sections)) for one in methods]
+    rows = [
+        row for one, section in zip(methods, pooled, strict=True) for row in _plane_rows(one, section, truth)
+    ]
+    objects = _object_rows(methods[0], pooled[0], truth) if methods and truth is not None else []
     grid = methods[0].sections.grid if methods else None
     errors = _depth_errors(grid, depth, truth)
     return Score(tuple(rows), tuple(objects), errors, dataset)
@@ -80,9 +83,9 @@ def pixel_masks(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> np.ndarray:
     return np.stack([blur_half_extent_px(grid, truth.z_mm, z) <= FOCUS_TOLERANCE_PX for z in z_mm])
 
 
-def _plane_rows(focus: Segmented, truth: Truth | None) -> list[dict[str, Any]]:
+def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> list[dict[str, Any]]:
     grid, z_mm = focus.sections.grid, focus.z_mm
-    before, after = _section_entropies(focus)
+    before, after = _section_entropies(focus, pooled)
     kinds: list[tuple[str, np.ndarray | None]] = [("object", None), ("pixel", None)]
     names: dict[int, list[str]] = {}
     if truth is not None:
@@ -136,9 +139,7 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
     if truth is None or truth.photons is None:
         return {"photon_precision": None, "photon_recall": None}
     grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
-    rows, cols = target_indices(grid, z0, 1)
-    row, col = rows[photons.k, photons.i], cols[photons.l, photons.j]
-    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    row, col, inside = landing(grid, photons, z0)
     kept = focus.in_focus[plane][row[inside], col[inside]]
     if kind == "object":
         own = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
@@ -172,9 +173,8 @@ def _outline(mask: np.ndarray) -> np.ndarray:
     return mask & ~(p[:-2, 1:-1] & p[2:, 1:-1] & p[1:-1, :-2] & p[1:-1, 2:])
 
 
-def _section_entropies(focus: Segmented) -> tuple[list[float], list[float]]:
+def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
     """Entropy of each section before and after removal, mean over the colours, in bits."""
-    pooled = pooled_estimate(focus.sections, section_window_px(focus.sections))
     tops = pooled.max(axis=(1, 2))
     before: list[float] = []
     after: list[float] = []
@@ -185,11 +185,10 @@ def _section_entropies(focus: Segmented) -> tuple[list[float], list[float]]:
     return before, after
 
 
-def _object_rows(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
+def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
     from scipy.ndimage import binary_dilation
 
     grid = focus.sections.grid
-    pooled = pooled_estimate(focus.sections, section_window_px(focus.sections))
     tops = pooled.max(axis=(0, 1, 2))
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):

@@ -5,16 +5,15 @@ from collections.abc import Callable
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.foreground import brightness, foreground, roberts_magnitude, without_specks
+from pcii.foreground import SMALLEST_REGION_PX, outlined
 from pcii.likelihood import cells_to_pixels, focus_scores
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import pooled_estimate, section_window_px
 from pcii.three_step import three_step
-from pcii.types import PhotonCounts, Segmented, check_counts, check_z_mm
+from pcii.types import PhotonCounts, Segmented, check_depth_counts, check_z_mm
 
 FOCUS_SIGMA_PX = 20.0
-SMALLEST_REGION_PX = 100
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -> Segmented:
@@ -29,11 +28,9 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     (2, 1024, 1024)
     """
     z = check_z_mm(z_mm)
-    check_counts(counts)
+    check_depth_counts(counts)
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
-    if counts.grid.view_count < 2:
-        raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")
     return METHODS[method](counts, z)
 
 
@@ -51,9 +48,7 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     masks = []
     for plane, coverage in zip(pooled, sections.coverage, strict=True):
         samples = window_px**2 * float(coverage.mean()) * plane.shape[-1]
-        bright = brightness(plane, samples)
-        mask = foreground(bright, roberts_magnitude(bright))
-        masks.append(without_specks(mask, SMALLEST_REGION_PX))
+        masks.append(outlined(plane, samples, SMALLEST_REGION_PX)[1])
     in_focus = np.stack([mask & (best == plane) for plane, mask in enumerate(masks)])
     steps = {
         "score": np.stack([cells_to_pixels(score, counts) for score in scores[: z_mm.size]]),

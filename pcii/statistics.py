@@ -10,9 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pcii.bayer import colour_cells
-from pcii.geometry import nearest_shifts_px
-from pcii.types import PhotonCounts, Sections
+from pcii.geometry import landing
+from pcii.types import CameraGrid, PhotonCounts, Sections
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
@@ -105,9 +104,7 @@ def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cell
     from scipy.ndimage import uniform_filter
 
     grid, events = counts.grid, counts.events
-    row_shift, col_shift = nearest_shifts_px(grid, z_mm)
-    row, col = events.i + row_shift[events.k], events.j + col_shift[events.l]
-    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    row, col, inside = landing(grid, events, z_mm)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
     cell = (row[inside] // cell_px) * shape[1] + col[inside] // cell_px
     photons = events.n[inside].astype(np.float64)
@@ -131,6 +128,12 @@ def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cell
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
 
 
+def cells_to_pixels(cells: np.ndarray, cell_px: int, grid: CameraGrid) -> np.ndarray:
+    """Values on cells, (H / cell_px, W / cell_px) rounded up, as values on pixels (H, W)."""
+    full = cells.repeat(cell_px, axis=0).repeat(cell_px, axis=1)
+    return full[: grid.height, : grid.width]
+
+
 def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
     """Variance of the non-zero samples of a Poisson variable whose non-zero samples have this mean.
 
@@ -146,8 +149,3 @@ def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
         slope = 1 - m * decay
         rate = np.maximum(rate - value / np.where(np.abs(slope) < 1e-12, 1e-12, slope), 1e-9)
     return np.where(m > 1 + 1e-9, m * np.maximum(1 + rate - m, 0.0), 0.0)
-
-
-def colour_of_events(counts: PhotonCounts) -> np.ndarray:
-    """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
-    return colour_cells(counts.cfa)[counts.events.i % 2, counts.events.j % 2]

@@ -13,13 +13,13 @@ stand between the requested ones, so that what is sharp at none of them is remov
 
 import numpy as np
 
-from pcii.errors import InputError
-from pcii.foreground import brightness, connected_pieces, foreground, roberts_magnitude, without_specks
+from pcii.foreground import SMALLEST_REGION_PX, connected_pieces, outlined
 from pcii.geometry import blur_half_extent_px
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
     ViewSamples,
+    cells_to_pixels,
     pooled_estimate,
     region_entropy_bits,
     section_window_px,
@@ -36,7 +36,6 @@ SAME_SURFACE = 0.15
 """Views of one surface in focus may differ by this share: it is neither flat nor quite at z."""
 SIGMAS = 3.0
 FEWEST_SAMPLES = 8
-SMALLEST_REGION_PX = 100
 LARGEST_MARGIN_PX = 16
 
 
@@ -46,29 +45,26 @@ def three_step(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     `steps` of the result holds `kept` (step 1), `edges` (the Roberts magnitude of step 2),
     `bright` (its outline filled) and `answered` (where step 1 had enough samples).
     """
-    if counts.grid.view_count < 2:
-        raise InputError("counts: one view has no depth; defocus removal needs at least 2 cameras")
     compared = with_probes(counts.grid, z_mm)
     everything = reconstruct(counts, compared)
     window_px = section_window_px(everything)
     pooled = pooled_estimate(everything, window_px)
     samples_per_window = window_px**2 * float(everything.coverage.mean()) * pooled.shape[-1]
-    bright = [brightness(plane, samples_per_window) for plane in pooled]
-    edges = [roberts_magnitude(plane) for plane in bright]
-    masks = [foreground(b, e) for b, e in zip(bright, edges, strict=True)]
-    masks = [without_specks(mask, SMALLEST_REGION_PX) for mask in masks]
 
     count = z_mm.size
-    winner = _sharpest_plane(counts, compared, pooled, masks[:count])
-    cell_px = _cell_px(pooled[:count], masks[:count])
+    # Only the requested planes have regions of their own; the probes are there to be compared with.
+    outlines = [outlined(plane, samples_per_window, SMALLEST_REGION_PX) for plane in pooled[:count]]
+    edges, masks = (list(part) for part in zip(*outlines, strict=True))
+    winner = _sharpest_plane(counts, compared, pooled, masks)
+    cell_px = _cell_px(pooled[:count], masks)
     kept, answered = zip(*(adaptive_threshold(counts, z, cell_px) for z in z_mm), strict=True)
     in_focus = np.stack([masks[p] & (winner == p) & kept[p] for p in range(count)])
     requested = Sections(counts.grid, z_mm, everything.counts[:count], everything.coverage[:count])
     steps = {
         "kept": np.stack(kept),
         "answered": np.stack(answered),
-        "edges": np.stack(edges[:count]),
-        "bright": np.stack(masks[:count]),
+        "edges": np.stack(edges),
+        "bright": np.stack(masks),
     }
     return Segmented(z_mm, in_focus, "three-step", requested, steps)
 
@@ -84,10 +80,7 @@ def adaptive_threshold(counts: PhotonCounts, z_mm: float, cell_px: int) -> tuple
     samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
     known = samples.number >= FEWEST_SAMPLES
     kept = ~known | (samples.variance <= _threshold(samples))
-    shape = (counts.grid.height, counts.grid.width)
-    return tuple(
-        mask.repeat(cell_px, axis=0).repeat(cell_px, axis=1)[: shape[0], : shape[1]] for mask in (kept, known)
-    )  # type: ignore[return-value]
+    return cells_to_pixels(kept, cell_px, counts.grid), cells_to_pixels(known, cell_px, counts.grid)
 
 
 def _threshold(samples: ViewSamples) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from pcii.bayer import channel_count, check_cfa
+from pcii.bayer import channel_count, check_cfa, colour_cells
 from pcii.errors import InputError
 
 Normalisation = Literal["overlap", "views"]
@@ -46,10 +46,12 @@ def _check_size(name: str, value: object) -> None:
         raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
 
 
-def check_counts(value: object) -> None:
-    """Raise `InputError` unless `value` is `PhotonCounts`."""
+def check_depth_counts(value: object) -> None:
+    """Raise `InputError` unless `value` is `PhotonCounts` of at least two views, which depth needs."""
     if not isinstance(value, PhotonCounts):
         raise InputError(f"counts: expected PhotonCounts, got {type(value).__name__}")
+    if value.grid.view_count < 2:
+        raise InputError("counts: one view has no depth; at least 2 cameras are needed")
 
 
 def _check_grid(value: object) -> None:
@@ -254,6 +256,11 @@ class PhotonCounts:
         where = np.nonzero(self._dense)
         n = self._dense[where].astype(np.int64)
         return _events(where, n)
+
+    @cached_property
+    def event_colours(self) -> np.ndarray:
+        """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
+        return read_only(colour_cells(self.cfa)[self.events.i % 2, self.events.j % 2])
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l)."""

@@ -8,7 +8,6 @@ from twins import unit_grid, voxel_of
 
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
-    colour_of_events,
     entropy_bits,
     pooled_estimate,
     region_entropy_bits,
@@ -267,6 +266,6 @@ def test_samples_of_a_flat_scene_have_the_variance_of_poisson_noise():
 def test_events_know_the_colour_of_their_pixel():
     grid = unit_grid(1, 1, 2, 2)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid, cfa="GRBG")
-    assert colour_of_events(counts).tolist() == [1, 0, 2, 1]
+    assert counts.event_colours.tolist() == [1, 0, 2, 1]
     mono = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    assert colour_of_events(mono).tolist() == [0, 0, 0, 0]
+    assert mono.event_colours.tolist() == [0, 0, 0, 0]
