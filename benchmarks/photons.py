@@ -9,6 +9,7 @@ from statistics import median
 
 from simgen import backend, seeds
 from simgen.build import build
+from simgen.candidates import Setup
 from simgen.photons import PhotonList, draw_photons
 from simgen.recipe import Recipe, load_recipe
 from simgen.render import render_view
@@ -33,12 +34,10 @@ def thinned(recipe: Recipe) -> tuple[float, PhotonList]:
     """Seconds to draw the photons of all views of a recipe, and the last draw."""
     scene, folder = load_scene(recipe.scene)
     built = build(backend.load(), scene, folder, recipe.render.max_depth)
-    grid = recipe.grid.camera_grid()
+    setup = Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
 
     def work(seed: int) -> PhotonList:
-        return draw_photons(
-            built, grid, recipe.cfa, recipe.photons, max_depth=recipe.render.max_depth, seed=seed
-        )
+        return draw_photons(setup, recipe.photons, seed=seed)
 
     seconds, drawn = timed(work)
     assert isinstance(drawn, PhotonList)

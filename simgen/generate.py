@@ -39,6 +39,7 @@ from pcii.store import (
 from pcii.types import PhotonCounts
 from simgen import backend, seeds
 from simgen.build import Built, build
+from simgen.candidates import Setup
 from simgen.photons import draw_photons
 from simgen.recipe import Recipe
 from simgen.render import render_view
@@ -237,9 +238,8 @@ def thinning_pays(recipe: Recipe, kind: str) -> bool:
 def _write_thinned(recipe: Recipe, built: Built, out: Path) -> dict[str, Any]:
     """Draw the photons of all views one by one and write them with where each came from."""
     grid, cfa = recipe.grid.camera_grid(), recipe.cfa
-    drawn = draw_photons(
-        built, grid, cfa, recipe.photons, max_depth=recipe.render.max_depth, seed=recipe.seed
-    )
+    setup = Setup(built, grid, cfa, recipe.render.max_depth)
+    drawn = draw_photons(setup, recipe.photons, seed=recipe.seed)
     ones = np.ones(drawn.k.size, dtype=np.int64)
     counts = PhotonCounts.from_events(drawn.k, drawn.l, drawn.i, drawn.j, ones, grid, cfa=cfa)
     _save_events(out, counts)

@@ -1,9 +1,18 @@
 """How bright it can get where: the majorant from which photon candidates are drawn.
 
-The majorant M is constant on square tiles of film and per colour, and shared by all views. A point of
-the scene moves from view to view by its disparity, so the tiles move along with the disparity at which
-most of the light is; what little disparity is left blurs the majorant's edges and costs candidates,
-never correctness. Shifts and tiles are even, so that a tile holds whole Bayer cells.
+A point of the scene moves from view to view by its disparity. So the majorant is kept in layers of
+disparity, each on square tiles that move along with it and are shared by all views: what is seen in one
+view is known for all. A path belongs to the tile of its pixel in the layer of its first hit, if that tile
+is listed, else to the coarse tile of its pixel, which stands still and is dim: the places that no pilot
+found bright. Each path has one owner, so candidates drawn for each owner and accepted only if theirs give
+exactly the light there is, however wrong the guess; what the guess decides is the cost.
+
+A first hit comes with a guess of its radiance that needs no light path: unshadowed light of the lamps.
+A tile has two numbers per colour: `bound`, which its radiance does not exceed, and `shade`, how many
+times its own guess a path's radiance is at most. A candidate whose guess is low can so be rejected before
+any light is looked for.
+
+Shifts and tiles are even, so that a tile holds whole Bayer cells. Plain NumPy; see `candidates` for use.
 """
 
 from dataclasses import dataclass, replace
@@ -11,179 +20,305 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pcii.types import CameraGrid
-from simgen import seeds
-from simgen.build import Built
-from simgen.light import LUMINANCE
-from simgen.paths import Paths, Rays, trace
 
 TILES_ACROSS = 256
 """The longer side of a film has about so many tiles, whatever its pixels."""
 COARSE_TILES = 8
-"""The first, uniform pilot is pooled over 8 x 8 tiles; the second is drawn from what it found."""
-PILOT_PATHS = (1 << 16, 1 << 17)
-FLOOR_SHARE = 0.05
-"""No tile's majorant is below this share of the mean radiance, so that no place is never looked at."""
-EXCESS_SHARE = 3e-4
-"""Share of the light that the pilot leaves above the majorant; `photons` lifts it as it goes."""
-LARGEST_FACTOR = 2.0
-"""What exceeds the bound by more is rare and local, and is lifted where it shows."""
+"""Coarse tiles are 8 x 8 tiles."""
+LAYER_BLUR_TILES = 0.5
+"""Layers are so thin that their tiles are off by no more than this share of a tile in any view."""
+MOST_LAYERS = 64
+DIM_SHARE = 0.08
+"""Coarse tiles take what is dimmer than this share of the mean radiance."""
+DIM_MARGIN = 1.5
 SMALL_SAMPLE = 16
+"""A bound comes from at least so many followed paths."""
+FAINT = 4.0
+"""A coarse tile's bound is raised for what exceeds it by less; for more a tile is listed."""
+LIFT = 1.25
+"""Where a path exceeds its bound, the bound is raised above it by this factor."""
+
+NEXT_LAYERS = (0, -1, 1)
+"""Layers in which a path's tile is looked for: its own, then those beside it."""
+ENDLESS = 1e30
+"""A shade that rejects nothing by the guess."""
+_RING = np.array([(a, b) for a in range(-1, 3) for b in range(-1, 3)])
+_AROUND = np.array([(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)])
 
 
 @dataclass(frozen=True)
-class Majorant:
-    """Upper bound of radiance on tiles: `bound` (tile rows, tile columns, C), C colours of the sensor.
+class Samples:
+    """Paths (N,): where they went through which film, and what they brought.
 
-    Pixel (i, j) of camera (k, l) lies on the tile of row (i + row_shift[k]) // tile_px, and likewise
-    for columns; the shifts are even and not negative, and `tile_px` is even.
+    `guess` and `light` are (N, C); `light` is NaN for paths that were not followed beyond the first
+    hit. `entry` is what each was drawn from, `density` its bound's mean over colours.
+    """
+
+    k: np.ndarray
+    l: np.ndarray
+    row: np.ndarray
+    col: np.ndarray
+    z_mm: np.ndarray
+    guess: np.ndarray
+    light: np.ndarray
+    entry: np.ndarray
+    density: np.ndarray
+
+    @property
+    def followed(self) -> np.ndarray:
+        """Which paths were, (N,) bool."""
+        return np.isfinite(self.light[:, 0])
+
+    def take(self, which: np.ndarray) -> "Samples":
+        """Some of them, by mask or index."""
+        return Samples(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+
+    def join(self, other: "Samples") -> "Samples":
+        """These and others."""
+        names = self.__dataclass_fields__
+        return Samples(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in names))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Layers of disparity and their tiles.
+
+    Pixel (i, j) of camera (k, l) lies on the tile of row (i + row_shift[n, k]) // tile_px of layer n,
+    and likewise for columns. What has a disparity near d `step_px`, in px per camera step along the
+    longer pitch, is in layer `layer_at[d]`.
     """
 
     tile_px: int
+    step_px: float
+    disparity_mm: float
+    """Disparity in px times z in mm."""
+    layer_at: np.ndarray
     row_shift: np.ndarray
     col_shift: np.ndarray
-    bound: np.ndarray
-    paths: int
-    """Paths that the pilot took."""
+    rows: int
+    cols: int
 
-    def tiles_of(self, rays: Rays) -> tuple[np.ndarray, np.ndarray]:
-        """Tile row and column of each ray's pixel."""
-        row = (np.rint(rays.row_px).astype(np.int64) + self.row_shift[rays.k]) // self.tile_px
-        col = (np.rint(rays.col_px).astype(np.int64) + self.col_shift[rays.l]) // self.tile_px
-        return row, col
+    @property
+    def tiles(self) -> int:
+        """How many tiles all layers have."""
+        return len(self.row_shift) * self.rows * self.cols
 
+    def layer_of(self, z_mm: np.ndarray) -> np.ndarray:
+        """Layer of first hits at planar depth `z_mm`; what is too near for all is put in the nearest."""
+        nearness = np.divide(self.disparity_mm / self.step_px, z_mm)
+        return self.layer_at[np.minimum(np.rint(nearness), self.layer_at.size - 1).astype(np.int64)]
 
-def sensed(radiance: np.ndarray, channels: int) -> np.ndarray:
-    """Radiance (N, 3) as the sensor's colours (N, C): R, G, B, or luminance for a monochrome one."""
-    return radiance if channels == 3 else (radiance @ LUMINANCE)[:, None]
+    def tiles_of(self, samples: Samples, aside: int = 0) -> np.ndarray:
+        """Flat index (layer, row, column) of each path's tile, in its own layer or one beside it."""
+        layer = np.clip(self.layer_of(samples.z_mm) + aside, 0, len(self.row_shift) - 1)
+        row = (samples.row + self.row_shift[layer, samples.k]) // self.tile_px
+        col = (samples.col + self.col_shift[layer, samples.l]) // self.tile_px
+        return (layer * self.rows + row) * self.cols + col
 
+    def split(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Layer, row and column of flat indices."""
+        rest, col = np.divmod(tiles, self.cols)
+        layer, row = np.divmod(rest, self.rows)
+        return layer, row, col
 
-def explore(built: Built, grid: CameraGrid, channels: int, *, max_depth: int, seed: int) -> Majorant | None:
-    """A majorant from two pilots; None if no light at all was found.
+    def around(self, tiles: np.ndarray) -> np.ndarray:
+        """Flat indices (N, 9) of each tile and its neighbours; the border's own beyond the border."""
+        layer, row, col = self.split(tiles)
+        near_row = np.clip(row[:, None] + _AROUND[:, 0], 0, self.rows - 1)
+        near_col = np.clip(col[:, None] + _AROUND[:, 1], 0, self.cols - 1)
+        return (layer[:, None] * self.rows + near_row) * self.cols + near_col
 
-    The first pilot samples all films evenly. It shows the disparity of the light and where it is
-    bright. The second is drawn from that: half of it sets the bound, the other half tells by how much
-    the bound has to be raised for all but `EXCESS_SHARE` of the light to lie below.
-    """
-    rng = seeds.generator(seed, view=0, stage="pilot")
-    first = _even_rays(grid, PILOT_PATHS[0], rng)
-    paths = trace(built, grid, first, max_depth=max_depth, seed=seeds.integer(seed, view=0, stage="pilot"))
-    light = sensed(paths.radiance, channels)
-    mean = light.mean(axis=0)
-    if not light.any():
-        return None
-    row_shift, col_shift = _shifts(grid, paths, light)
-    tile_px = 2 * max(1, round(max(grid.height, grid.width) / (2 * TILES_ACROSS)))
-    rows = _tiles(grid.height + row_shift.max(), tile_px)
-    cols = _tiles(grid.width + col_shift.max(), tile_px)
-    level = np.broadcast_to(mean, (rows, cols, channels))
-    start = Majorant(tile_px, row_shift, col_shift, level, sum(PILOT_PATHS))
-    coarse = replace(start, bound=_coarse_bound(start, first, light, FLOOR_SHARE * mean))
+    def ring(self, doubled: np.ndarray) -> np.ndarray:
+        """Flat indices (N, 16) of the 2 x 2 tiles that each tile of twice the size holds, and around."""
+        cols = self.cols // 2
+        rest, col = np.divmod(doubled, cols)
+        layer, row = np.divmod(rest, self.rows // 2)
+        near_row = np.clip(2 * row[:, None] + _RING[:, 0], 0, self.rows - 1)
+        near_col = np.clip(2 * col[:, None] + _RING[:, 1], 0, self.cols - 1)
+        return (layer[:, None] * self.rows + near_row) * self.cols + near_col
 
-    second, weight = draw_even_tiles(coarse, grid, PILOT_PATHS[1], rng)
-    part_seed = seeds.integer(seed, view=0, stage="pilot", part=1)
-    light = sensed(trace(built, grid, second, max_depth=max_depth, seed=part_seed).radiance, channels)
-    half = np.arange(len(light)) % 2 == 0
-    known = replace(coarse, bound=_fine_bound(coarse, second, light, half, FLOOR_SHARE * mean))
-    factor = _needed_factor(known, second, light, weight, ~half)
-    both = np.ones(len(light), dtype=bool)
-    final = _fine_bound(coarse, second, light, both, FLOOR_SHARE * mean)
-    return replace(coarse, bound=final * factor)
+    def merged(self, side: int) -> "Frame":
+        """The same layers with tiles of `side` x `side` of these."""
+        rows, cols = -(-self.rows // side), -(-self.cols // side)
+        return replace(self, tile_px=side * self.tile_px, rows=rows, cols=cols)
 
-
-def draw_even_tiles(
-    majorant: Majorant, grid: CameraGrid, number: int, rng: np.random.Generator
-) -> tuple[Rays, np.ndarray]:
-    """Rays from all views, tiles chosen by their bound's mean over colours; and weights 1 / density."""
-    density = majorant.bound.mean(axis=2)
-    flat = np.searchsorted(np.cumsum(density.ravel()) / density.sum(), rng.random(number))
-    flat = np.minimum(flat, density.size - 1)
-    k, l = rng.integers(0, grid.rows, number), rng.integers(0, grid.cols, number)
-    inside = rng.random((2, number)) * majorant.tile_px - 0.5
-    row = flat // density.shape[1] * majorant.tile_px - majorant.row_shift[k] + inside[0]
-    col = flat % density.shape[1] * majorant.tile_px - majorant.col_shift[l] + inside[1]
-    keep = (row >= -0.5) & (row < grid.height - 0.5) & (col >= -0.5) & (col < grid.width - 0.5)
-    return Rays(k[keep], l[keep], row[keep], col[keep]), 1 / density.ravel()[flat[keep]]
+    def merge(self, tiles: np.ndarray, side: int) -> np.ndarray:
+        """Flat indices, in `merged(side)`, of the tiles that these lie in."""
+        layer, row, col = self.split(tiles)
+        merged = self.merged(side)
+        return (layer * merged.rows + row // side) * merged.cols + col // side
 
 
-def _even_rays(grid: CameraGrid, number: int, rng: np.random.Generator) -> Rays:
-    k, l = rng.integers(0, grid.rows, number), rng.integers(0, grid.cols, number)
-    row, col = rng.random(number) * grid.height - 0.5, rng.random(number) * grid.width - 0.5
-    return Rays(k, l, row, col)
-
-
-def _shifts(grid: CameraGrid, paths: Paths, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Even shifts, from 0 up, that hold still what most of the light comes from.
-
-    The disparity is the median weighted by squared radiance: tiles that are bright cost most.
-    """
-    near = np.isfinite(paths.z_mm)
-    weight = light.sum(axis=1, dtype=np.float64) ** 2 * near
-    order = np.argsort(paths.z_mm)
-    half = np.searchsorted(np.cumsum(weight[order]), weight.sum() / 2)
-    z_mm = float(paths.z_mm[order[min(half, order.size - 1)]])
-    px_per_mm = grid.focal_mm / (z_mm * grid.pixel_mm) if np.isfinite(z_mm) else 0.0
+def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:
+    """Layers for the depths of a pilot's first hits; depths in between go to the nearest of these."""
+    longer = max(grid.pitch_mm)
+    disparity_mm = grid.focal_mm * longer / grid.pixel_mm
+    cameras = max(grid.rows, grid.cols)
+    disparity_px = disparity_mm / z_mm
+    thin = 4 * LAYER_BLUR_TILES * tile_px / max(cameras - 1, 1)
+    step_px = max(thin, float(disparity_px.max()) / MOST_LAYERS)
+    seen = np.unique(np.rint(disparity_px / step_px))
+    steps = np.arange(int(seen[-1]) + 1)
+    layer_at = np.abs(steps[:, None] - seen).argmin(axis=1)
     # Further right a camera sees the point further left, so its film moves right by as much.
-    col = 2 * np.rint(np.arange(grid.cols) * grid.pitch_mm[0] * px_per_mm / 2).astype(np.int64)
-    row = 2 * np.rint(np.arange(grid.rows) * grid.pitch_mm[1] * px_per_mm / 2).astype(np.int64)
-    return row, col
+    disparity = seen[:, None] * step_px
+    col = _even(disparity * np.arange(grid.cols) * grid.pitch_mm[0] / longer)
+    row = _even(disparity * np.arange(grid.rows) * grid.pitch_mm[1] / longer)
+    rows = -(-(grid.height + int(row.max())) // tile_px)
+    cols = -(-(grid.width + int(col.max())) // tile_px)
+    return Frame(tile_px, step_px, disparity_mm, layer_at, row, col, rows, cols)
 
 
-def _tiles(pixels: int, tile_px: int) -> int:
-    """Tiles that cover so many pixels, a whole number of coarse ones."""
-    coarse = tile_px * COARSE_TILES
-    return -(-int(pixels) // coarse) * COARSE_TILES
+def _even(pixels: np.ndarray) -> np.ndarray:
+    return 2 * np.rint(pixels / 2).astype(np.int64)
 
 
-def _tile_maximum(
-    majorant: Majorant, rays: Rays, light: np.ndarray, tiles: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Largest radiance found on each block of `tiles` x `tiles` tiles by colour, and how many rays."""
-    rows, cols, channels = majorant.bound.shape
-    row, col = majorant.tiles_of(rays)
-    flat = (row // tiles) * (cols // tiles) + col // tiles
-    size = (rows // tiles) * (cols // tiles)
-    largest = np.zeros((size, channels))
-    np.maximum.at(largest, flat, light)
-    number = np.bincount(flat, minlength=size)
-    shape = (rows // tiles, cols // tiles)
-    return largest.reshape(*shape, channels), number.reshape(shape)
+def tile_px_for(grid: CameraGrid) -> int:
+    """Side of the fine tiles."""
+    return 2 * max(1, round(max(grid.height, grid.width) / (2 * TILES_ACROSS)))
 
 
-def _coarse_bound(majorant: Majorant, rays: Rays, light: np.ndarray, floor: np.ndarray) -> np.ndarray:
-    from scipy.ndimage import maximum_filter
+class Majorant:
+    """Upper bounds of radiance: coarse tiles of the film first, then the listed tiles of the layers.
 
-    largest, _ = _tile_maximum(majorant, rays, light, COARSE_TILES)
-    spread = np.maximum(maximum_filter(largest, (3, 3, 1)), floor)
-    return spread.repeat(COARSE_TILES, axis=0).repeat(COARSE_TILES, axis=1)
+    Of entry e: `layer` (-1 for coarse tiles), tile `row` and `col`, and (E, C) `bound` and `shade`.
+    `entry_of` tells a tile's entry, -1 if it has none.
+    """
+
+    def __init__(self, grid: CameraGrid, frame: Frame, dim: np.ndarray) -> None:
+        self.frame = frame
+        self.coarse_px = COARSE_TILES * tile_px_for(grid)
+        self.coarse_cols = -(-grid.width // self.coarse_px)
+        self.coarse_count = -(-grid.height // self.coarse_px) * self.coarse_cols
+        self.row, self.col = np.divmod(np.arange(self.coarse_count), self.coarse_cols)
+        self.layer = np.full(self.coarse_count, -1)
+        self.bound = np.tile(DIM_MARGIN * dim, (self.coarse_count, 1))
+        self.shade = np.full(self.bound.shape, ENDLESS)
+        self.entry_of = np.full(frame.tiles, -1, dtype=np.int32)
+
+    @property
+    def side_px(self) -> np.ndarray:
+        """Side of each entry's tile, (E,)."""
+        return np.where(self.layer < 0, self.coarse_px, self.frame.tile_px)
+
+    def owner_of(self, samples: Samples) -> np.ndarray:
+        """The entry that each path belongs to, (N,)."""
+        owner = samples.row // self.coarse_px * self.coarse_cols + samples.col // self.coarse_px
+        for aside in reversed(NEXT_LAYERS):
+            entry = self.entry_of[self.frame.tiles_of(samples, aside)]
+            owner = np.where(entry < 0, owner, entry)
+        return owner
+
+    def list_tiles(self, tiles: np.ndarray, bound: np.ndarray, shade: np.ndarray) -> None:
+        """Add tiles (N,), each once and not listed before, with bound and shade (N, C)."""
+        layer, row, col = self.frame.split(tiles)
+        self.entry_of[tiles] = np.arange(self.layer.size, self.layer.size + tiles.size)
+        self.layer, self.row = np.append(self.layer, layer), np.append(self.row, row)
+        self.col = np.append(self.col, col)
+        self.bound = np.concatenate([self.bound, bound])
+        self.shade = np.concatenate([self.shade, shade])
+
+    def scale(self, factor: float) -> None:
+        """Multiply the limits of all listed tiles."""
+        self.bound[self.coarse_count :] *= factor
+        self.shade[self.coarse_count :] *= factor
+
+    def lift(self, over: Samples) -> None:
+        """Raise the limits, of the tiles of these paths and those around them, above what they brought."""
+        owner = self.owner_of(over)
+        faint = (owner < self.coarse_count) & (over.light < FAINT * self.bound[owner]).all(axis=1)
+        if faint.any():
+            lifted, height = _largest(owner[faint], LIFT * over.light[faint])
+            self.bound[lifted] = np.maximum(self.bound[lifted], height)
+            over = over.take(~faint)
+        if not over.k.size:
+            return
+        near = self.frame.around(self.frame.tiles_of(over)).ravel()
+        unlisted = _distinct(near[self.entry_of[near] < 0])
+        nothing = np.zeros((unlisted.size, over.light.shape[1]))
+        self.list_tiles(unlisted, nothing, nothing)
+        entry = self.entry_of[near]
+        for levels, needed in ((self.bound, over.light), (self.shade, over.light / over.guess)):
+            lifted, height = _largest(entry, LIFT * needed.repeat(9, axis=0))
+            levels[lifted] = np.maximum(levels[lifted], height)
 
 
-def _fine_bound(
-    coarse: Majorant, rays: Rays, light: np.ndarray, use: np.ndarray, floor: np.ndarray
-) -> np.ndarray:
-    """Bound per tile from the rays in `use` on it and its neighbours; coarse where these are few."""
-    from scipy.ndimage import maximum_filter, uniform_filter
+def fit(grid: CameraGrid, frame: Frame, samples: Samples, dim: np.ndarray) -> Majorant:
+    """The majorant that a pilot suggests; `dim` (C,) is the bound of the coarse tiles.
 
-    chosen = Rays(rays.k[use], rays.l[use], rays.row_px[use], rays.col_px[use])
-    largest, number = _tile_maximum(coarse, chosen, light[use], 1)
-    # Neighbours count in full: an outline may cross a tile in few views, and is bright there.
-    around = maximum_filter(largest, (3, 3, 1))
-    nearby = uniform_filter(number.astype(np.float64), 3) * 9
-    bound = np.where((nearby < SMALL_SAMPLE)[..., None], coarse.bound, around)
-    return np.maximum(bound, floor)
+    A tile is listed, and its largest guess looked up, with what lies within half a tile around it.
+    """
+    lit = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
+    samples = samples.take(np.asarray(lit))
+    half = replace(frame, tile_px=frame.tile_px // 2, rows=2 * frame.rows, cols=2 * frame.cols)
+    halves = half.tiles_of(samples)
+    tiles, followed = half.merge(halves, 2), samples.followed
+    light = samples.light[followed]
+    near = _Near(frame, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
+    seen, guess = _largest(halves, samples.guess)
+    shade = near.largest(half.merge(seen, 2))[:, dim.size :]
+    bright = (guess * shade > dim).any(axis=1)
+    listed = _distinct(half.merge(half.around(seen[bright]).ravel(), 2))
+    table = np.zeros((half.tiles, dim.size), dtype=np.float32)
+    table[seen] = guess
+    found = near.largest(listed)
+    light, shade = found[:, : dim.size], found[:, dim.size :]
+    majorant = Majorant(grid, frame, dim)
+    guess = _highest(table, half.ring(listed))
+    majorant.list_tiles(listed, np.minimum(light, guess * shade), shade)
+    return majorant
 
 
-def _needed_factor(
-    majorant: Majorant, rays: Rays, light: np.ndarray, weight: np.ndarray, use: np.ndarray
-) -> float:
-    """By how much to raise the bound for the light above it to be at most `EXCESS_SHARE`."""
-    row, col = majorant.tiles_of(rays)
-    bound = majorant.bound[row, col][use]
-    part, weight = light[use], weight[use, None]
-    total = (part * weight).sum(dtype=np.float64)
-    factor = 0.5
-    while factor < LARGEST_FACTOR:
-        excess = (np.maximum(part - factor * bound, 0) * weight).sum(dtype=np.float64)
-        if excess <= EXCESS_SHARE * total:
-            break
-        factor *= 1.04
-    return factor
+class _Near:
+    """Largest of `values` (N, C), found on `tiles` (N,), in the smallest neighbourhood that shows enough."""
+
+    def __init__(self, frame: Frame, tiles: np.ndarray, values: np.ndarray) -> None:
+        self.frame, self.anywhere = frame, values.max(axis=0)
+        self.levels: list[tuple[int, Frame, np.ndarray, np.ndarray]] = []
+        for side in (1, 2, 4, COARSE_TILES):
+            merged = frame.merged(side)
+            blocks = frame.merge(tiles, side)
+            largest = np.zeros((merged.tiles, values.shape[1]), dtype=np.float32)
+            found, highest = _largest(blocks, values)
+            largest[found] = highest
+            number = np.bincount(blocks, minlength=merged.tiles)
+            self.levels.append((side, merged, largest, number))
+
+    def largest(self, tiles: np.ndarray) -> np.ndarray:
+        """The largest near each tile (M,), in its layer only or else anywhere: (M, C)."""
+        result = np.tile(self.anywhere, (tiles.size, 1))
+        missing = np.arange(tiles.size)
+        for side, merged, largest, number in self.levels:
+            if not missing.size:
+                break
+            blocks, inverse = np.unique(self.frame.merge(tiles[missing], side), return_inverse=True)
+            around = merged.around(blocks)
+            enough = (number[around].sum(axis=1) >= SMALL_SAMPLE)[inverse]
+            highest = _highest(largest, around)
+            result[missing[enough]] = highest[inverse[enough]]
+            missing = missing[~enough]
+        return result
+
+
+def _highest(table: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Largest of a table's rows (T, C) among each list of indices (N, M): (N, C)."""
+    highest = table[near[:, 0]]
+    for index in near.T[1:]:
+        np.maximum(highest, table[index], out=highest)
+    return highest
+
+
+def _distinct(keys: np.ndarray) -> np.ndarray:
+    """Each once, sorted: faster than `np.unique` on some hundred thousand."""
+    keys = np.sort(keys)
+    return keys[np.diff(keys, prepend=-1) > 0]
+
+
+def _largest(keys: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distinct keys, sorted, and the largest of `values` (N, C) that each has."""
+    order = np.argsort(keys)
+    keys, values = keys[order], values[order]
+    first = np.flatnonzero(np.diff(keys, prepend=-1))
+    if not first.size:
+        return keys, values
+    return keys[first], np.maximum.reduceat(values, first, axis=0)

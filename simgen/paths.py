@@ -1,9 +1,10 @@
-"""Light paths, one for each of many camera rays at once: unbiased radiance and what was hit first.
+"""Light paths, one for each of many camera rays at once: what is hit first, and unbiased radiance.
 
 The estimator is path tracing with next-event estimation (Kajiya 1986) and multiple importance sampling
 by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
 chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
-varies, the fewer candidates are needed. Needs a compiled backend.
+varies, the fewer candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays
+of one lane a ray. Needs a compiled backend.
 """
 
 from dataclasses import dataclass
@@ -18,127 +19,152 @@ from simgen.cameras import camera_x_mm, camera_y_mm
 
 STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
+BOUNCES = 2
+"""From the first hit so many directions are followed: a surface nearby that shines on it is rarely met."""
+LEAST_REFLECTANCE = 0.001
+"""A surface is never guessed to be less reflective than this: it may shine."""
+LEAST_RADIANCE = 1e-9
+"""What is guessed of nothing, so that it can be divided by."""
 
 
 @dataclass(frozen=True)
-class Rays:
-    """Camera rays (N,): camera (k, l) and the point of its film in px, pixel centres at integers."""
+class FirstHits:
+    """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
 
-    k: np.ndarray
-    l: np.ndarray
-    row_px: np.ndarray
-    col_px: np.ndarray
-
-
-@dataclass(frozen=True)
-class Paths:
-    """What the rays brought: `radiance` (N, 3) float32, first hit's `object_id` (N,) and `z_mm` (N,)."""
-
-    radiance: np.ndarray
-    object_id: np.ndarray
-    z_mm: np.ndarray
-
-
-def trace(built: Built, grid: CameraGrid, rays: Rays, *, max_depth: int, seed: int) -> Paths:
-    """One path for each ray; linear radiance whose luminance is in cd/m^2, z +inf for a miss.
-
-    The same bytes for the same rays, in the same order, and the same seed.
+    `guess` is the radiance that can be told without a light path: what shines itself, else what the
+    lamps would give if nothing stood in the way, and light from all around.
     """
-    mi, dr = built.mi, load_drjit()
-    if rays.k.size == 0:
-        return Paths(np.zeros((0, 3), np.float32), np.zeros(0, np.int16), np.zeros(0, np.float32))
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, rays.k.size)
-    radiance, shape, z = _estimate(mi, dr, built.scene, _camera_rays(mi, dr, grid, rays), sampler, max_depth)
-    dr.eval(radiance, shape, z)
-    numbers = np.array(shape)
-    return Paths(
-        np.array(radiance).T,
-        built.object_of_shape[numbers],
-        np.where(numbers > 0, np.array(z), np.float32(np.inf)),
-    )
+
+    record: Any
+    shape: Any
+    z_mm: Any
+    guess: Any
 
 
-def _camera_rays(mi: Any, dr: Any, grid: CameraGrid, rays: Rays) -> Any:
+def film_rays(built: Built, grid: CameraGrid, k: Any, l: Any, row_px: Any, col_px: Any) -> Any:
     """Rays through points of the film: to the right is +X, downwards +Y, straight ahead +Z."""
+    mi, dr = built.mi, load_drjit()
     per_px = grid.pixel_mm / grid.focal_mm
-    x = (rays.col_px - (grid.width - 1) / 2) * per_px
-    y = (rays.row_px - (grid.height - 1) / 2) * per_px
-    origin = mi.Point3f(
-        mi.Float(camera_x_mm(grid)[rays.l].astype(np.float32)),
-        mi.Float(camera_y_mm(grid)[rays.k].astype(np.float32)),
-        mi.Float(0),
-    )
-    towards = mi.Vector3f(mi.Float(x.astype(np.float32)), mi.Float(y.astype(np.float32)), mi.Float(1))
-    return mi.RayDifferential3f(mi.Ray3f(origin, dr.normalize(towards)))
+    x_mm = mi.Float(camera_x_mm(grid).astype(np.float32))
+    y_mm = mi.Float(camera_y_mm(grid).astype(np.float32))
+    origin = mi.Point3f(dr.gather(mi.Float, x_mm, l), dr.gather(mi.Float, y_mm, k), 0)
+    x = (col_px - (grid.width - 1) / 2) * per_px
+    y = (row_px - (grid.height - 1) / 2) * per_px
+    return mi.RayDifferential3f(mi.Ray3f(origin, dr.normalize(mi.Vector3f(x, y, 1))))
 
 
-def _estimate(mi: Any, dr: Any, scene: Any, ray: Any, sampler: Any, max_depth: int) -> tuple[Any, Any, Any]:
-    """Radiance, and number and z of the shape hit first, along each ray.
+def hit_first(built: Built, ray: Any, active: Any, ambient: Any) -> FirstHits:
+    """What each active ray hits first; `ambient` is the radiance that is guessed to come from all around."""
+    mi, dr = built.mi, load_drjit()
+    record = built.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
+    found = active & hit.is_valid()
+    shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
+    z_mm = dr.select(found, hit.p.z, dr.inf)
+    guess = hit.emitter(built.scene, active).eval(hit, active)
+    bsdf, context = hit.bsdf(ray), mi.BSDFContext()
+    for lamp in _lamps(built.scene):
+        towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
+        scattered = bsdf.eval(context, hit, hit.to_local(towards.d), found)
+        guess += dr.select(found & (towards.pdf > 0), scattered * weight, 0)
+    reflectance = bsdf.eval_diffuse_reflectance(hit, found)
+    guess += dr.select(found, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
+    return FirstHits(record, shape, z_mm, guess)
 
-    The paths are unrolled into one kernel: `max_depth` is small.
+
+def surrounding_radiance(built: Built) -> np.ndarray:
+    """Mean radiance (3,) of what shines from all around; float64."""
+    mi, dr = built.mi, load_drjit()
+    around = built.scene.environment()
+    if around is None:
+        return np.zeros(3)
+    away = dr.zeros(mi.SurfaceInteraction3f, 256)
+    # Evenly spread directions (a Fibonacci lattice).
+    number = dr.arange(mi.Float, 256) + 0.5
+    up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
+    across = dr.sqrt(1 - up * up)
+    away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
+    return np.array(around.eval(away)).mean(axis=1, dtype=np.float64)
+
+
+def _lamps(scene: Any) -> list[Any]:
+    """Emitters that can be aimed at.
+
+    Light from all around is found by following the surface's own scattering: for uniform surroundings
+    that has no variance but for what stands in the way.
     """
-    context = mi.BSDFContext()
-    radiance, throughput = mi.Spectrum(0), mi.Spectrum(1)
-    active = mi.Bool(True)
-    before = dr.zeros(mi.Interaction3f)  # where the ray came from: the camera, at first
-    pdf, by_chance = mi.Float(1), mi.Bool(False)  # by_chance: lamps could have been sampled instead
-    side = 1
-    # Light from all around is found by following the surface's own scattering: for uniform
-    # surroundings that has no variance but for what stands in the way.
-    lamps = [light for light in scene.emitters() if not light.is_environment()]
-    shape, z = mi.UInt32(0), mi.Float(0)
-    for segment in range(1, max_depth + 1):
-        hit = scene.ray_intersect(ray, active)
-        if segment == 1:
-            shape = dr.reinterpret_array(mi.UInt32, hit.shape)
-            z = mi.Float(hit.p.z)
-        lamp = hit.emitter(scene, active)
-        towards = mi.DirectionSample3f(scene, hit, before)
-        reached = by_chance & hit.is_valid()  # what lies behind everything is no lamp to be aimed at
-        pdf_lamp = dr.select(reached, side**2 * lamp.pdf_direction(before, towards, active), 0)
-        radiance += dr.select(active, throughput * lamp.eval(hit, active) * _share(pdf, pdf_lamp), 0)
-        active &= hit.is_valid()
-        if segment == max_depth:
-            break
+    return [light for light in scene.emitters() if not light.is_environment()]
+
+
+def radiance_along(built: Built, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
+    """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
+
+    The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
+    `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
+    """
+    mi = built.mi
+    tracer = _Tracer(built, sampler)
+    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
+    radiance = hit.emitter(built.scene).eval(hit)
+    return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
+
+
+class _Tracer:
+    """The two halves of path tracing, which call each other: what leaves a hit, what arrives there."""
+
+    def __init__(self, built: Built, sampler: Any) -> None:
+        self.mi, self.dr, self.scene, self.sampler = built.mi, load_drjit(), built.scene, sampler
+        self.context = self.mi.BSDFContext()
+        self.lamps = _lamps(built.scene)
+
+    def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
+        """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""
+        mi, dr, sampler = self.mi, self.dr, self.sampler
+        radiance = mi.Spectrum(0)
+        if left == 0:
+            return radiance
         bsdf = hit.bsdf(ray)
-        side = STRATA if segment == 1 else 1
-        for light in lamps:
+        for lamp in self.lamps:
             for cell in np.ndindex(side, side):
                 point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / side
-                direct = _direct(mi, dr, scene, light, hit, bsdf, context, point, side**2, active)
-                radiance += throughput * direct / side**2
-        sample, weight = bsdf.sample(context, hit, sampler.next_1d(active), sampler.next_2d(active), active)
-        throughput *= weight
-        active &= dr.any(throughput != 0)
-        ray = hit.spawn_ray(hit.to_world(sample.wo))
-        pdf = dr.select(sample.pdf > 0, sample.pdf, 1)
-        by_chance = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
-        before = mi.Interaction3f(hit)
-    return radiance, shape, z
+                radiance += self._direct(lamp, hit, bsdf, point, side**2, bounces, active) / side**2
+        for bounce in range(bounces):
+            across = sampler.next_2d(active)
+            across.x = (across.x + bounce) / bounces
+            sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
+            on = active & dr.any(weight != 0)
+            onward = hit.spawn_ray(hit.to_world(sample.wo))
+            arriving = self._arriving(onward, hit, sample, on, left, side, bounces)
+            radiance += dr.select(on, weight * arriving, 0) / bounces
+        return radiance
 
+    def _arriving(
+        self, ray: Any, before: Any, sample: Any, active: Any, left: int, side: int, bounces: int
+    ) -> Any:
+        """Radiance that arrives at `before` along `ray`, whose direction the surface chose."""
+        mi, dr, scene = self.mi, self.dr, self.scene
+        hit = scene.ray_intersect(ray, active)
+        lamp = hit.emitter(scene, active)
+        towards = mi.DirectionSample3f(scene, hit, mi.Interaction3f(before))
+        # Lamps could have been aimed at instead; what lies behind everything is no such lamp.
+        aimed = hit.is_valid() & ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(before), towards, active)
+        share = dr.select(aimed, _share(bounces * sample.pdf, pdf_lamp), 1)
+        radiance = lamp.eval(hit, active) * share
+        return radiance + self.scattered(ray, hit, active & hit.is_valid(), left - 1, 1, 1)
 
-def _direct(
-    mi: Any,
-    dr: Any,
-    scene: Any,
-    light: Any,
-    hit: Any,
-    bsdf: Any,
-    context: Any,
-    point: Any,
-    tries: int,
-    active: Any,
-) -> Any:
-    """Light that arrives straight from one lamp and is scattered towards where we came from."""
-    able = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-    towards, weight = light.sample_direction(hit, point, able)
-    able &= towards.pdf != 0
-    blocked = scene.ray_test(hit.spawn_ray_to(towards.p), able)
-    outgoing = hit.to_local(towards.d)
-    value, pdf = bsdf.eval_pdf(context, hit, outgoing, able)
-    share = dr.select(towards.delta, 1, _share(tries * towards.pdf, pdf))
-    return dr.select(able & ~blocked, value * weight * share, 0)
+    def _direct(
+        self, lamp: Any, hit: Any, bsdf: Any, point: Any, tries: int, bounces: int, active: Any
+    ) -> Any:
+        """Light that arrives straight from one lamp and is scattered towards where we came from."""
+        mi, dr = self.mi, self.dr
+        able = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        towards, weight = lamp.sample_direction(hit, point, able)
+        able &= towards.pdf != 0
+        blocked = self.scene.ray_test(hit.spawn_ray_to(towards.p), able)
+        value, pdf = bsdf.eval_pdf(self.context, hit, hit.to_local(towards.d), able)
+        share = dr.select(towards.delta, 1, _share(tries * towards.pdf, bounces * pdf))
+        return dr.select(able & ~blocked, value * weight * share, 0)
 
 
 def _share(own: Any, other: Any) -> Any:

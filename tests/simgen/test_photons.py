@@ -10,6 +10,7 @@ from pcii.bayer import colour_index, mosaic
 from pcii.types import CameraGrid
 from simgen import backend
 from simgen.build import Built, build
+from simgen.candidates import Setup
 from simgen.photons import OVERSHOOT_SHARE, PhotonList, draw_photons
 from simgen.recipe import Photons
 from simgen.render import render_view
@@ -68,7 +69,7 @@ def radiance(scene: Built) -> np.ndarray:
 
 def draw(scene: Built, seed: int, **photons: object) -> PhotonList:
     settings = Photons.model_validate(photons)
-    return draw_photons(scene, GRID, "GRBG", settings, max_depth=DEPTH, seed=seed)
+    return draw_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
 
 
 def counted(drawn: PhotonList) -> np.ndarray:
@@ -217,7 +218,7 @@ def test_each_photon_knows_what_it_came_from(scene: Built) -> None:
 
 def test_the_same_seed_gives_the_same_photons_and_another_others(scene: Built) -> None:
     one, again, other = draw(scene, 8, budget=900), draw(scene, 8, budget=900), draw(scene, 9, budget=900)
-    for name in ("k", "l", "i", "j", "object_id", "z_mm", "stream", "rank"):
+    for name in ("k", "l", "i", "j", "object_id", "z_mm", "scope", "rank"):
         np.testing.assert_array_equal(getattr(one, name), getattr(again, name))
     assert (counted(one) != counted(other)).any()
 
