@@ -1,7 +1,7 @@
 """Opening a dataset folder: counts, truth and radiance as the package's types, checked as read."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from pcii.store import (
     RADIANCE,
     TRUTH,
     check_file,
+    nested_name,
     radiance_name,
     read_exr,
     read_manifest,
@@ -32,6 +33,21 @@ class Dataset:
     manifest: Mapping[str, Any]
     grid: CameraGrid
     cfa: str | None
+    budget: float | None = None
+    """Nested photon budget that `counts` are of; None for the recipe's own."""
+
+    def at_budget(self, budget: float) -> "Dataset":
+        """The same dataset with the photons of a smaller, nested budget; `InputError` if it has none."""
+        own = self.manifest.get("recipe", {}).get("photons", {})
+        nested = own.get("nested") or []
+        if budget == own.get("budget"):
+            return replace(self, budget=None)
+        if budget not in nested:
+            known = ", ".join(f"{n:g}" for n in (own.get("budget"), *nested) if n is not None)
+            raise InputError(
+                f"{self.path}: no photons of budget {budget:g} here; there are {known or 'none'}"
+            )
+        return replace(self, budget=budget)
 
     @property
     def name(self) -> str:
@@ -43,15 +59,19 @@ class Dataset:
         """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests, if it does."""
         return self.manifest.get("analysis") or {}
 
+    @property
+    def _counts(self) -> str:
+        return nested_name(COUNTS, self.budget)
+
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; `InputError` if the recipe asked for none."""
-        arrays = self._arrays(COUNTS, "counts")
+        arrays = self._arrays(self._counts, "counts")
         if "dense" in arrays:
             return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
         missing = set("klijn") - set(arrays)
         if missing:
-            raise InputError(f"{self.path / COUNTS}: lacks the array {min(missing)!r}")
+            raise InputError(f"{self.path / self._counts}: lacks the array {min(missing)!r}")
         columns = {name: arrays[name] for name in "klijn"}
         return PhotonCounts.from_events(**columns, grid=self.grid, cfa=self.cfa)
 
@@ -65,13 +85,14 @@ class Dataset:
         return Truth(arrays["z_mm"], arrays["object_id"], names, self._photon_truth())
 
     def _photon_truth(self) -> PhotonTruth | None:
-        if not self.has(PHOTON_TRUTH):
+        part = nested_name(PHOTON_TRUTH, self.budget)
+        if not self.has(part):
             return None
-        known = self._arrays(PHOTON_TRUTH, "photon truth", only=("object_id", "z_mm"))
+        known = self._arrays(part, "photon truth", only=("object_id", "z_mm"))
         events = self.counts.events
         where = {name: getattr(events, name).repeat(events.n) for name in "klij"}
         if known["z_mm"].shape != where["k"].shape:
-            raise InputError(f"{self.path / PHOTON_TRUTH}: does not belong to the counts beside it")
+            raise InputError(f"{self.path / part}: does not belong to the counts beside it")
         return PhotonTruth(**where, **known)
 
     @cached_property

@@ -42,6 +42,14 @@ def radiance_name(k: int, l: int) -> str:
     return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
 
 
+def nested_name(part: str, budget: float | None) -> str:
+    """Name of a part of the dataset for a smaller photon budget; the part's own name for None."""
+    if budget is None:
+        return part
+    stem, suffix = part.rsplit(".", 1)
+    return f"{stem}-{budget:.12g}.{suffix}"
+
+
 def write_bytes_safely(path: Path, content: bytes) -> None:
     """Write a file so that it is either whole under its name or not there at all."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -177,6 +177,8 @@ def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed:
     probability, which keeps the mean exact.
     """
     setup = pool.setup
+    if group.size == 0:
+        return _nothing(setup.channels)
     mi, dr = setup.built.mi, load_drjit()
     sampler = _sampler(mi, seed, group.size)
     lanes = pool.draw(sampler, _unsigned(mi, group), _views(setup, sampler, view))

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
@@ -28,6 +28,7 @@ from pcii.store import (
     check_file,
     hash_file,
     list_files,
+    nested_name,
     radiance_name,
     read_exr,
     read_manifest,
@@ -36,20 +37,20 @@ from pcii.store import (
     write_exr_safely,
     write_json_safely,
 )
-from pcii.types import PhotonCounts
 from simgen import backend, seeds
 from simgen.build import Built, build
-from simgen.candidates import Setup
-from simgen.photons import draw_photons
+from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
+from simgen.detector import full_light_image
+from simgen.exposure import photons_per_radiance
 from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene, load_scene
-from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energies, sense
+from simgen.sensor import sense
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
 MARKER = ".unfinished.json"
-CROSSOVER_PHOTONS_PER_PIXEL = 0.5
-"""With more light than this a dense render costs less than a path or three for every photon."""
+RENDERED = ".rendered"
+"""Exact views that are no product in themselves; gone when the dataset is finished."""
 
 
 @dataclass
@@ -84,26 +85,35 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
         built = build(backend.load(), scene, folder, recipe.render.max_depth)
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
-        if recipe.products.truth or recipe.products.view_truth:
+        products, photons, made = recipe.products, None, None
+        if products.truth or products.view_truth:
             with clock.stage("truth"):
                 _write_truth(recipe, built, out, report)
-        thins = recipe.products.counts and thinning_pays(recipe, engine["kind"])
-        photons = None
-        if thins:
+        if products.counts:
+            with clock.stage("plan"):
+                made = plan(recipe, built, engine["kind"])
+        if made is not None and made.thins:
             with clock.stage("photons"):
-                photons = _write_thinned(recipe, built, out)
-        if recipe.products.radiance != "none" or (recipe.products.counts and not thins):
+                arrivals, photons = thin(recipe, built, made)
+                photons |= write_counts(recipe, arrivals, out)
+        if products.radiance != "none" or (made is not None and not made.thins):
             with clock.stage("radiance"):
-                _render_views(recipe, built, out, report)
-        if recipe.products.counts and not thins:
+                _render_views(recipe, built, made, out, report)
+        if made is not None and not made.thins:
             with clock.stage("counts"):
-                photons = _write_counts(recipe, out, report)
-        manifest = _manifest(recipe, scene, built, engine, identity, clock, photons)
-        if recipe.products.radiance == "none":
-            shutil.rmtree(out / RADIANCE, ignore_errors=True)
+                arrivals, photons = draw_from_views(recipe, _stored_mosaic(recipe, out), made, report)
+                photons |= write_counts(recipe, arrivals, out)
+        shutil.rmtree(out / RENDERED, ignore_errors=True)
         with clock.stage("hash"):
-            manifest["files"] = list_files(out, [TRUTH, PHOTON_TRUTH, COUNTS, RADIANCE])
-        manifest["timings_s"] = clock.seconds
+            budgets = (None, *recipe.photons.nested)
+            parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
+            files = list_files(out, [TRUTH, *parts, RADIANCE])
+        manifest = _manifest(recipe, scene, built, engine, identity) | {
+            "photons": photons,
+            "skipped": _skipped(recipe, made, photons),
+            "timings_s": clock.seconds,
+            "files": files,
+        }
         write_json_safely(out / MANIFEST, manifest)
         (out / MARKER).unlink()
     return manifest
@@ -206,94 +216,73 @@ def _write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> Non
     write_arrays_safely(out / TRUTH, arrays, {"z_mm": "planar depth in mm, +inf for a miss"})
 
 
-def _render_views(recipe: Recipe, built: Built, out: Path, report: Report) -> None:
+def _render_views(recipe: Recipe, built: Built, made: Plan | None, out: Path, report: Report) -> None:
     """Radiance of every view that is not on disk yet."""
-    grid = recipe.grid.camera_grid()
-    colour = recipe.products.radiance == "rgb"
+    grid, light = recipe.grid.camera_grid(), recipe.sensor.full_light
+    samples = recipe.render.samples_per_pixel if made is None or made.thins else made.samples
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        path = out / radiance_name(k, l)
-        if not path.is_file():
+        number, rendered = k * grid.cols + l, out / _rendered_name(recipe, k, l)
+        if not rendered.is_file():
             image = render_view(
                 built,
                 grid,
                 k,
                 l,
-                samples_per_pixel=recipe.render.samples_per_pixel,
-                seed=seeds.integer(recipe.seed, view=k * grid.cols + l, stage="radiance"),
+                samples_per_pixel=samples,
+                seed=seeds.integer(recipe.seed, view=number, stage="radiance"),
             )
-            kept = image if colour else sense(image, recipe.cfa)[..., None]
-            write_exr_safely(path, kept)
+            whole = recipe.products.radiance == "rgb"
+            write_exr_safely(rendered, image if whole else sense(image, recipe.cfa)[..., None])
+        if light is not None and recipe.products.radiance != "none":
+            assert recipe.exposure is not None
+            told = full_light_image(
+                read_exr(rendered),
+                recipe.cfa,
+                photons_per_radiance(recipe.exposure, grid.pixel_mm),
+                recipe.sensor,
+                seeds.generator(recipe.seed, view=number, stage="full light"),
+            )
+            write_exr_safely(out / radiance_name(k, l), told)
         report("views", done, grid.view_count)
 
 
-def thinning_pays(recipe: Recipe, kind: str) -> bool:
-    """Whether photons are drawn one by one (see `photons`) rather than from rendered pixels."""
-    grid, photons = recipe.grid, recipe.photons
-    scopes = {"view": 1.0, "channel": 3.0 if recipe.cfa else 1.0, "scene": 1 / (grid.rows * grid.cols)}
-    per_view = photons.budget * scopes[photons.scope]
-    sparse = per_view <= CROSSOVER_PHOTONS_PER_PIXEL * grid.height * grid.width
-    return kind != "scalar" and sparse
+def _rendered_name(recipe: Recipe, k: int, l: int) -> str:
+    """Where a view's exact radiance is kept while the dataset is made; in the end, if it is a product."""
+    exact = recipe.products.radiance != "none" and recipe.sensor.full_light is None
+    return radiance_name(k, l) if exact else radiance_name(k, l).replace(RADIANCE, RENDERED, 1)
 
 
-def _write_thinned(recipe: Recipe, built: Built, out: Path) -> dict[str, Any]:
-    """Draw the photons of all views one by one and write them with where each came from."""
-    grid, cfa = recipe.grid.camera_grid(), recipe.cfa
-    setup = Setup(built, grid, cfa, recipe.render.max_depth)
-    drawn = draw_photons(setup, recipe.photons, seed=recipe.seed)
-    ones = np.ones(drawn.k.size, dtype=np.int64)
-    counts = PhotonCounts.from_events(drawn.k, drawn.l, drawn.i, drawn.j, ones, grid, cfa=cfa)
-    _save_events(out, counts)
-    if recipe.products.truth:
-        # Both lists are ordered by (k, l, i, j), so photon follows photon of the events.
-        provenance = {"object_id": drawn.object_id, "z_mm": drawn.z_mm}
-        write_arrays_safely(out / PHOTON_TRUTH, provenance, {"z_mm": "planar depth in mm"})
-    dense = grid.view_count * grid.height * grid.width * recipe.render.samples_per_pixel
-    return drawn.log | {
-        "total": counts.total,
-        "pixels_with_photons": int(counts.events.n.size),
-        "normaliser_standard_error": 0.0,
-        "dense_paths_instead": dense,
-    }
+def _stored_mosaic(recipe: Recipe, out: Path) -> Callable[[int, int], np.ndarray]:
+    """Reads what the sensor's pixels see of each rendered view, (H, W)."""
+
+    def mosaic_of(k: int, l: int) -> np.ndarray:
+        image = read_exr(out / _rendered_name(recipe, k, l))
+        return sense(image, recipe.cfa) if image.shape[2] == 3 else image[..., 0]
+
+    return mosaic_of
 
 
-def _save_events(out: Path, counts: PhotonCounts) -> None:
-    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
-    small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
-    arrays = {**small, "n": counts.events.n}
-    write_arrays_safely(out / COUNTS, arrays, {"layout": "events"})
-
-
-def _write_counts(recipe: Recipe, out: Path, report: Report) -> dict[str, Any]:
-    """Draw the photons of all views and write them; what the manifest says of them."""
-    grid, cfa, photons = recipe.grid.camera_grid(), recipe.cfa, recipe.photons
-
-    def raw(k: int, l: int) -> np.ndarray:
-        image = read_exr(out / radiance_name(k, l))
-        return sense(image, cfa) if image.shape[2] == 3 else image[..., 0]
-
-    views = list(np.ndindex(grid.rows, grid.cols))
-    energies = np.array([scope_energies(raw(k, l), cfa, photons.scope) for k, l in views])
-    dark = int((energies <= 0).all(axis=1).sum())
-    normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
-    totals = fixed_totals(photons, energies, seeds.generator(recipe.seed, view=0, stage="totals"))
-    columns: list[list[np.ndarray]] = []
-    for done, (k, l) in enumerate(views, start=1):
-        number = done - 1
-        rates = photon_rates(raw(k, l), cfa, photons, normalisers[number])
-        rng = seeds.generator(recipe.seed, view=number, stage="photons")
-        counts = draw_counts(rates, cfa, rng, None if totals is None else totals[number])
-        i, j = np.nonzero(counts)
-        columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
-        report("counts", done, len(views))
-    k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))
-    made = PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa)
-    _save_events(out, made)
-    return {
-        "method": "dense",
-        "total": made.total,
-        "pixels_with_photons": int(made.events.n.size),
-        "views_without_light": dark,
-    }
+def _skipped(recipe: Recipe, made: Plan | None, photons: dict[str, Any] | None) -> list[str]:
+    """What was not done, why, and what that saved."""
+    grid = recipe.grid.camera_grid()
+    pixels = grid.view_count * grid.height * grid.width
+    skipped = []
+    if made is not None and photons is not None and made.thins:
+        skipped.append(
+            f"rendering for the photon counts: {photons['paths']} light paths instead of "
+            f"{photons['dense_paths_instead']}"
+        )
+    if recipe.products.radiance == "none" and (made is None or made.thins):
+        paths = pixels * recipe.render.samples_per_pixel
+        skipped.append(f"radiance images: the recipe does not ask for them; saved {paths} light paths")
+    elif recipe.products.radiance == "mosaic" and recipe.cfa is not None:
+        skipped.append(
+            "two of three colours of the radiance images: the Bayer pattern hides them; saved "
+            f"{8 * pixels} bytes before compression"
+        )
+    if not recipe.products.view_truth:
+        skipped.append(f"truth of every view: the recipe does not ask for it; saved {pixels} first hits")
+    return skipped
 
 
 def _manifest(
@@ -302,21 +291,8 @@ def _manifest(
     built: Built,
     engine: dict[str, Any],
     identity: str,
-    clock: _Clock,
-    photons: dict[str, Any] | None,
 ) -> dict[str, Any]:
-    skipped = []
-    if photons is not None and photons["method"] == "thinning":
-        skipped.append(
-            f"rendering for the photon counts: {photons['paths']} paths instead of "
-            f"{photons['dense_paths_instead']}"
-        )
-    if recipe.products.radiance == "none":
-        skipped.append("radiance images: the recipe does not ask for them")
-    if not recipe.products.view_truth:
-        skipped.append("truth of every view: the recipe does not ask for it")
-    if recipe.products.radiance != "rgb" and recipe.cfa is not None:
-        skipped.append("two of three colours of every pixel: the Bayer pattern hides them")
+    """What the manifest says of the recipe, the scene and the software."""
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -332,8 +308,4 @@ def _manifest(
         "scene": scene.model_dump(mode="json"),
         "backend": engine,
         "versions": {name: version(name) for name in ("photon-integral-imaging", "numpy", "zarr")},
-        "photons": photons,
-        "skipped": skipped,
-        "timings_s": clock.seconds,
-        "files": {},
     }

@@ -26,7 +26,8 @@ import numpy as np
 from pcii.bayer import colour_cells
 from simgen import seeds
 from simgen.candidates import Pool, Setup, try_candidates
-from simgen.pilot import Pilot, explore
+from simgen.majorant import Majorant
+from simgen.pilot import explore
 from simgen.recipe import Photons
 
 OVERSHOOT_SHARE = 1e-4
@@ -91,61 +92,153 @@ class _Tally:
     overshoot: int = 0
 
 
-def draw_photons(setup: Setup, photons: Photons, *, seed: int) -> PhotonList:
-    """All photons of all views; the same for the same setup, settings and seed."""
-    wanted = int(_scopes(setup, photons, seed).wanted.sum())
-    pilot = explore(setup, wanted, seed)
-    paths, share = pilot.paths, 1.0
-    if pilot.majorant is not None:
-        spent, share = _warm_up(setup, photons, pilot, wanted, seed)
-        paths += spent
-    drawn: list[dict[str, np.ndarray]] = []
-    tally, attempt = _Tally(), 0
-    scopes = _scopes(setup, photons, seed)
-    while pilot.majorant is not None:
-        tally, scopes = _Tally(), _scopes(setup, photons, seed)
-        drawn = []
-        for number, block in enumerate(_blocks(scopes.wanted)):
-            key = attempt, number
-            drawn += _draw_block(setup, photons, pilot, scopes, block, tally, share, seed, key)
-        paths += tally.candidates
-        attempt += 1
-        if tally.overshoot <= OVERSHOOT_SHARE * tally.kept or attempt == ATTEMPTS:
-            break
-    log = {
-        "method": "thinning",
-        "candidates": tally.candidates,
-        "followed": tally.followed,
-        "kept": tally.kept,
-        "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
-        "overshoot_photons": tally.overshoot,
-        "attempts": attempt,
-        "paths": paths,
-        "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
-    }
-    return _joined(setup, drawn, log)
+def draw_photons(
+    setup: Setup, photons: Photons, *, seed: int, photons_per_radiance: float | None = None
+) -> PhotonList:
+    """All photons of all views; the same for the same setup, settings and seed.
 
-
-def _warm_up(setup: Setup, photons: Photons, pilot: Pilot, wanted: int, seed: int) -> tuple[int, float]:
-    """Draw candidates for nothing but to lift the majorant where it is exceeded.
-
-    Returns how many it took and what share of them was kept. What is learned here costs no photon its
-    independence.
+    `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     """
-    assert pilot.majorant is not None
-    number = int(np.clip(WARM_UP_SHARE * wanted / LIKELY_SHARE, *WARM_UP_CANDIDATES))
-    groups = _groups(setup, photons)
-    share = LIKELY_SHARE
-    for done in range(WARM_UP_ROUNDS):
-        pool = Pool(setup, pilot.majorant, groups, pilot.ambient)
-        group = np.arange(number) % len(groups)
-        found = try_candidates(pool, group, None, seeds.integer(seed, view=2, stage="pilot", part=done))
-        factor = _factor(found.ratio)
-        share = max(found.copies.sum() / number / factor, LEAST_SHARE)
-        pilot.majorant.scale(factor)
+    return _Drawing(setup, photons, seed, photons_per_radiance).run()
+
+
+class _Drawing:
+    """One run: the settings, what the pilot found, and what has been drawn so far."""
+
+    def __init__(self, setup: Setup, photons: Photons, seed: int, photons_per_radiance: float | None) -> None:
+        self.setup, self.photons, self.seed = setup, photons, seed
+        self.gain = photons_per_radiance
+        self.groups = [np.arange(4)]
+        if photons.scope == "channel":
+            cells = colour_cells(setup.cfa).ravel()
+            self.groups = [np.flatnonzero(cells == colour) for colour in range(setup.channels)]
+        self.pilot = explore(setup, self._expected, seed)
+        self.share = LIKELY_SHARE
+        self.scopes, self.tally = self._scopes(), _Tally()
+
+    def run(self) -> PhotonList:
+        """Warm up and draw, anew if too many photons came in clumps."""
+        paths, attempt = self.pilot.paths, 0
+        drawn: list[dict[str, np.ndarray]] = []
+        if self.pilot.majorant is not None:
+            paths += self._warm_up()
+        while self.pilot.majorant is not None:
+            self.scopes, self.tally = self._scopes(), _Tally()
+            drawn = list(self._exposed(attempt) if self.gain is not None else self._budgeted(attempt))
+            paths += self.tally.candidates
+            attempt += 1
+            if self.tally.overshoot <= OVERSHOOT_SHARE * self.tally.kept or attempt == ATTEMPTS:
+                break
+        tally, scopes = self.tally, self.scopes
+        log = {
+            "method": "thinning",
+            "candidates": tally.candidates,
+            "followed": tally.followed,
+            "kept": tally.kept,
+            "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
+            "overshoot_photons": tally.overshoot,
+            "attempts": attempt,
+            "paths": paths,
+            "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
+        }
+        return _joined(self.setup, drawn, log)
+
+    def _expected(self, mean: np.ndarray) -> float:
+        """Photons that are expected in all, given the mean radiance of each colour."""
+        if self.gain is None:
+            return float(self._scopes().wanted.sum())
+        grid, cells = self.setup.grid, colour_cells(self.setup.cfa).ravel()
+        return float(self.gain * mean[cells].mean() * grid.view_count * grid.height * grid.width)
+
+    def _scopes(self) -> _Scopes:
+        """The scopes; how many photons each gets of a budget is part of the experiment."""
+        photons, views = self.photons, np.arange(self.setup.grid.view_count)
+        if photons.scope == "scene":
+            views = np.array([-1])
+        groups = np.arange(len(self.groups))
+        view, group = views.repeat(groups.size), np.tile(groups, views.size)
+        nothing = np.zeros(view.size, dtype=np.int64)
+        if self.gain is not None:
+            wanted = np.full(view.size, np.iinfo(np.int64).max)
+        elif photons.statistics == "multinomial":
+            wanted = np.full(view.size, round(photons.budget))
+        else:
+            totals = seeds.generator(self.seed, view=0, stage="totals")
+            wanted = totals.poisson(photons.budget, view.size)
+        return _Scopes(view, group, wanted, nothing, nothing.copy())
+
+    def _warm_up(self) -> int:
+        """Draw candidates for nothing but to lift the majorant where it is exceeded; how many.
+
+        What is learned here costs no photon its independence.
+        """
+        aim = WARM_UP_SHARE * self._expected(self.pilot.mean) / LIKELY_SHARE
+        number = int(np.clip(aim, *WARM_UP_CANDIDATES))
+        majorant = self._majorant()
+        for done in range(WARM_UP_ROUNDS):
+            group = np.arange(number) % len(self.groups)
+            path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
+            found = try_candidates(self._pool(), group, None, path_seed)
+            factor = _factor(found.ratio)
+            self.share = max(found.copies.sum() / number / factor, LEAST_SHARE)
+            majorant.scale(factor)
+            if found.over.k.size:
+                majorant.lift(found.over)
+        return number * WARM_UP_ROUNDS
+
+    def _majorant(self) -> Majorant:
+        assert self.pilot.majorant is not None
+        return self.pilot.majorant
+
+    def _pool(self) -> Pool:
+        return Pool(self.setup, self._majorant(), self.groups, self.pilot.ambient)
+
+    def _budgeted(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
+        """Rounds of candidates until every scope has its photons, or is dark."""
+        for number, block in enumerate(_blocks(self.scopes.wanted)):
+            round_number = 0
+            while (wanting := np.intersect1d(self.scopes.open(), block)).size:
+                missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
+                candidates = _candidates_needed(missing, round_number, self.share)
+                part = attempt << 16 | round_number
+                yield self._round(wanting, candidates, self._pool(), number, part)
+                round_number += 1
+
+    def _exposed(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
+        """The exposure in as many equal parts as make its candidates fit a wavefront each."""
+        assert self.gain is not None
+        views = np.arange(self.setup.grid.view_count)
+        parts = int(np.ceil(self.gain * self._pool().mass[0] * views.size / (WAVEFRONT / 2)))
+        for part in range(parts):
+            pool = self._pool()
+            rng = seeds.generator(self.seed, view=part, stage="totals", part=attempt)
+            candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
+            yield self._round(views, candidates, pool, part, attempt << 16)
+
+    def _round(
+        self, scopes: np.ndarray, candidates: np.ndarray, pool: Pool, number: int, part: int
+    ) -> dict[str, np.ndarray]:
+        """Photons of one round: so many candidates for each of these scopes."""
+        owner = scopes.repeat(candidates)
+        views = None if self.photons.scope == "scene" else self.scopes.view[owner]
+        path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
+        found = try_candidates(pool, self.scopes.group[owner], views, path_seed)
         if found.over.k.size:
-            pilot.majorant.lift(found.over)
-    return number * WARM_UP_ROUNDS, share
+            pool.majorant.lift(found.over)
+        path = np.arange(found.k.size).repeat(found.copies)
+        scope = owner[found.candidate[path]]
+        rank = _ranks(scope, self.scopes.got)
+        taken = rank < self.scopes.wanted[scope]
+        path, scope, rank = path[taken], scope[taken], rank[taken]
+        self.scopes.got += np.bincount(scope, minlength=self.scopes.got.size)
+        self.scopes.tried[scopes] += candidates
+        self.tally.candidates += owner.size
+        self.tally.followed += found.ratio.size
+        self.tally.kept += path.size
+        self.tally.overshoot += int((np.diff(path) == 0).sum())
+        self.share = max(found.copies.sum() / max(owner.size, 1), LEAST_SHARE)
+        names = {field.name for field in fields(PhotonList)} & {field.name for field in fields(found)}
+        return {name: getattr(found, name)[path] for name in names} | {"scope": scope, "rank": rank}
 
 
 def _factor(ratio: np.ndarray) -> float:
@@ -154,80 +247,15 @@ def _factor(ratio: np.ndarray) -> float:
     ratio = np.sort(ratio)[::-1]
     # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
     above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
-    return float(np.clip(ratio[np.searchsorted(above, allowed)], 0.5, 2.0)) if allowed > 0 else 1.0
-
-
-def _groups(setup: Setup, photons: Photons) -> list[np.ndarray]:
-    """Bayer cells (2 a + b) that each scope of a view draws from: all, or those of one colour."""
-    if photons.scope != "channel":
-        return [np.arange(4)]
-    cells = colour_cells(setup.cfa).ravel()
-    return [np.flatnonzero(cells == colour) for colour in range(setup.channels)]
-
-
-def _scopes(setup: Setup, photons: Photons, seed: int) -> _Scopes:
-    """The scopes of the budget; how many photons each gets is part of the experiment."""
-    views = np.array([-1]) if photons.scope == "scene" else np.arange(setup.grid.view_count)
-    groups = np.arange(len(_groups(setup, photons)))
-    view, group = views.repeat(groups.size), np.tile(groups, views.size)
-    if photons.statistics == "multinomial":
-        wanted = np.full(view.size, round(photons.budget))
-    else:
-        wanted = seeds.generator(seed, view=0, stage="totals").poisson(photons.budget, view.size)
-    return _Scopes(view, group, wanted, np.zeros_like(wanted), np.zeros_like(wanted))
+    if allowed <= 0:
+        return 1.0
+    return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))
 
 
 def _blocks(wanted: np.ndarray) -> Iterator[np.ndarray]:
     """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""
     block = (np.cumsum(wanted) - 1) // (WAVEFRONT // 4)
     yield from np.split(np.arange(wanted.size), np.flatnonzero(np.diff(block)) + 1)
-
-
-def _draw_block(
-    setup: Setup,
-    photons: Photons,
-    pilot: Pilot,
-    scopes: _Scopes,
-    block: np.ndarray,
-    tally: _Tally,
-    share: float,
-    seed: int,
-    key: tuple[int, int],
-) -> Iterator[dict[str, np.ndarray]]:
-    """Rounds of candidates until every scope of the block has its photons, or is dark."""
-    attempt, block_number = key
-    majorant = pilot.majorant
-    assert majorant is not None
-    round_number = 0
-    while True:
-        wanting = np.intersect1d(scopes.open(), block)
-        if not wanting.size:
-            return
-        missing = scopes.wanted[wanting] - scopes.got[wanting]
-        numbers = _candidates_needed(missing, round_number, share)
-        owner = wanting.repeat(numbers)
-        pool = Pool(setup, majorant, _groups(setup, photons), pilot.ambient)
-        part = attempt << 16 | round_number
-        views = None if photons.scope == "scene" else scopes.view[owner]
-        path_seed = seeds.integer(seed, view=block_number, stage="paths", part=part)
-        found = try_candidates(pool, scopes.group[owner], views, path_seed)
-        if found.over.k.size:
-            majorant.lift(found.over)
-        path = np.arange(found.k.size).repeat(found.copies)
-        scope = owner[found.candidate[path]]
-        rank = _ranks(scope, scopes.got)
-        taken = rank < scopes.wanted[scope]
-        path, scope, rank = path[taken], scope[taken], rank[taken]
-        scopes.got += np.bincount(scope, minlength=scopes.got.size)
-        scopes.tried[wanting] += numbers
-        tally.candidates += owner.size
-        tally.followed += found.ratio.size
-        tally.kept += path.size
-        tally.overshoot += int((np.diff(path) == 0).sum())
-        share = max(found.copies.sum() / owner.size, LEAST_SHARE)
-        round_number += 1
-        names = {field.name for field in fields(PhotonList)} & {field.name for field in fields(found)}
-        yield {name: getattr(found, name)[path] for name in names} | {"scope": scope, "rank": rank}
 
 
 def _candidates_needed(missing: np.ndarray, round_number: int, share: float) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The pilot: a few paths that find where there is light, and from them the first majorant."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,8 +41,11 @@ class Pilot:
     paths: int
 
 
-def explore(setup: Setup, photons: int, seed: int) -> Pilot:
-    """Find where there is light, and how much at most, with an effort that so many `photons` deserve.
+def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) -> Pilot:
+    """Find where there is light, and how much at most.
+
+    `expected` tells how many photons are wanted in all, given the mean radiance per colour: the effort
+    is what they deserve.
 
     First paths go evenly through all films. They show which depths there are and where it is bright. A
     second set is drawn from that, most of it only to see what it hits.
@@ -59,7 +63,7 @@ def explore(setup: Setup, photons: int, seed: int) -> Pilot:
     coarse = fit(grid, frame_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
     pool = Pool(setup, coarse, [np.arange(4)], ambient)
     seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
-    looks = int(np.clip(photons, *AIMED_LOOKS))
+    looks = int(np.clip(expected(mean), *AIMED_LOOKS))
     aimed = look_around(pool, looks, int(FOLLOWED_SHARE * looks), seed_of_part)
     known = even.join(aimed)
     majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)

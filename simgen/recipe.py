@@ -11,9 +11,13 @@ from pcii.bayer import PATTERNS
 from pcii.errors import InputError
 from pcii.types import CameraGrid
 from simgen.locations import find, recipe_roots
-from simgen.schema import Count, Positive, Strict, read_toml, suggestion, validate
+from simgen.schema import Count, NonNegative, Positive, Strict, read_toml, suggestion, validate
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
+Share = Annotated[float, Field(gt=0, le=1)]
+Share0 = Annotated[float, Field(ge=0, le=1)]
+MOST_PHOTONS = 1e15
+"""Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
@@ -40,28 +44,80 @@ class Grid(Strict):
         return CameraGrid(**self.model_dump())
 
 
+class FullLight(Strict):
+    """Noise of the full-light images; needs the recipe's [exposure]."""
+
+    full_well_e: Positive = 10_000.0
+    """Electrons that a pixel holds at most."""
+    read_noise_e: NonNegative = 2.0
+    """Standard deviation of the noise of reading a pixel, in electrons."""
+    adc_bits: Annotated[int, Field(ge=1, le=24)] = 12
+    """The full well is told in so many steps of equal size: 2^bits - 1."""
+
+
 class Sensor(Strict):
-    """What stands on the pixels."""
+    """What stands on the pixels, and how well they count. Every fault is off by default."""
 
     cfa: Cfa = "GRBG"
     """Bayer pattern by its first two rows, or "none" for a monochrome sensor."""
+    quantum_efficiency: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
+    """Chance that a photon is counted, by the pixel's colour: R, G, B; a monochrome sensor takes G."""
+    dark_counts: NonNegative = 0.0
+    """Mean number of counts that each pixel of a view has without any light."""
+    hot_pixel_share: Share0 = 0.0
+    """Share of the pixels that are hot: the same ones in every view, since one sensor takes them all."""
+    hot_pixel_counts: NonNegative = 1.0
+    """Mean number of counts that a hot pixel has in each view without any light."""
+    dead_pixel_share: Share0 = 0.0
+    """Share of the pixels that never count; the same ones in every view."""
+    counter_bits: Annotated[int, Field(ge=1, le=32)] | None = None
+    """A pixel stops at 2^bits - 1 counts; 1 makes it tell only whether there was a photon."""
+    full_light: FullLight | None = None
+    """Makes the full-light images those of a camera instead of exact radiance."""
 
 
 class Photons(Strict):
     """How much light there is."""
 
-    budget: Positive = 1000.0
-    """Expected photons in each `scope`."""
-    scope: Literal["view", "channel", "scene"] = "view"
-    """What `budget` is counted over: every view, each colour of every view, or all views together."""
+    budget: Annotated[float, Field(gt=0, le=MOST_PHOTONS)] = 1000.0
+    """Expected photons that arrive in each `scope`; not used with scope "exposure"."""
+    scope: Literal["view", "channel", "scene", "exposure"] = "view"
+    """What `budget` is counted over: every view, each colour of every view, or all views together.
+    "exposure": as many as the scene's light, the aperture and the exposure time give."""
     statistics: Literal["poisson", "multinomial"] = "poisson"
     """Poisson counts have a random total with mean `budget`; multinomial counts have it exactly."""
+    nested: tuple[Positive, ...] = ()
+    """Smaller budgets whose photons are kept too, each a subset of the next larger one."""
+
+    @model_validator(mode="after")
+    def _budgets_fit(self) -> Self:
+        if self.scope == "exposure":
+            if self.statistics != "poisson":
+                raise ValueError("statistics: an exposure has no fixed total; use 'poisson'")
+            if self.nested:
+                raise ValueError("nested: an exposure has no budget; use scope 'view', 'channel' or 'scene'")
+        elif self.nested and max(self.nested) >= self.budget:
+            raise ValueError(f"nested: every budget must be less than budget = {self.budget:g}")
+        if len(set(self.nested)) < len(self.nested):
+            raise ValueError("nested: give each budget once")
+        if self.statistics == "multinomial" and any(n % 1 for n in (self.budget, *self.nested)):
+            raise ValueError("budget: with 'multinomial' statistics budgets are whole numbers")
+        return self
+
+
+class Exposure(Strict):
+    """The camera's exposure: how much light makes how many photons."""
+
+    f_number: Positive = 8.0
+    """Focal length by diameter of the aperture."""
+    time_s: Positive = 0.01
 
 
 class Render(Strict):
     """How radiance is estimated."""
 
     samples_per_pixel: Count = 16
+    """Light paths through each pixel of the radiance images; photon counts choose their own number."""
     max_depth: Count = 3
     """Longest light path in segments: 2 is direct light, 3 adds one bounce."""
 
@@ -104,6 +160,7 @@ class Recipe(Strict):
     grid: Grid = Grid()
     sensor: Sensor = Sensor()
     photons: Photons = Photons()
+    exposure: Exposure | None = None
     render: Render = Render()
     products: Products = Products()
     analysis: Analysis = Analysis()
@@ -116,6 +173,16 @@ class Recipe(Strict):
                 f"a view of {self.grid.height} x {self.grid.width} pixels with "
                 f"{self.render.samples_per_pixel} samples each is {paths} paths; fewer than "
                 f"{MOST_PATHS} can be rendered at once"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _exposure_is_known(self) -> Self:
+        if self.exposure is None and self.photons.scope == "exposure":
+            raise ValueError("photons.scope: 'exposure' needs the table [exposure] with f_number and time_s")
+        if self.exposure is None and self.sensor.full_light is not None:
+            raise ValueError(
+                "sensor.full_light: a camera's images need the table [exposure] with f_number and time_s"
             )
         return self
 

@@ -4,12 +4,24 @@ The key is a `SeedSequence.spawn_key` of fixed length, since seeds given as list
 when one list is another with zeros appended.
 """
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
-Stage = Literal["radiance", "photons", "totals", "pilot", "candidates", "paths", "nested"]
-_STAGES: tuple[Stage, ...] = ("radiance", "photons", "totals", "pilot", "candidates", "paths", "nested")
+Stage = Literal[
+    "radiance",
+    "photons",
+    "totals",
+    "pilot",
+    "paths",
+    "nested",
+    "detection",
+    "faulty pixels",
+    "saturation",
+    "full light",
+    "probe",
+]
+_STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 def _sequence(seed: int, view: int, stage: Stage, part: int, scene: int) -> np.random.SeedSequence:

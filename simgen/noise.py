@@ -1,0 +1,72 @@
+"""How many samples a dense rendering needs for its noise not to show in the photon counts.
+
+Counts drawn from a rendered view have the view's noise besides their own: a rate that is off by a random
+amount of variance v makes counts whose variance is larger by v. That share of the Poisson variance is
+to stay below `NOISE_SHARE`, so dimmer light needs fewer samples.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pcii.types import CameraGrid
+from simgen import seeds
+from simgen.build import Built
+from simgen.render import render_view
+from simgen.sensor import sense
+
+NOISE_SHARE = 0.01
+MOST_SAMPLES = 1024
+PROBE_PX = 64
+"""The probe renders a film of so few pixels across, twice."""
+PROBE_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view."""
+
+    mean: float
+    variance: float
+
+    def photon_noise(self, photons_per_radiance: float, samples: int) -> float:
+        """Variance that rendering adds to counts, as a share of their Poisson variance."""
+        if self.mean <= 0:
+            return 0.0
+        return photons_per_radiance * self.variance / (samples * self.mean)
+
+    def samples_for(self, photons_per_radiance: float) -> int:
+        """Samples per pixel that keep that share below `NOISE_SHARE`; `MOST_SAMPLES` at most."""
+        needed = math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE)
+        return min(max(needed, 1), MOST_SAMPLES)
+
+
+def probe(built: Built, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
+    """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
+    scale = max(grid.height, grid.width) / PROBE_PX
+    small = replace(
+        grid,
+        rows=1,
+        cols=1,
+        height=max(2, round(grid.height / scale)),
+        width=max(2, round(grid.width / scale)),
+        pixel_mm=grid.pixel_mm * scale,
+    )
+    first, second = (
+        sense(
+            render_view(
+                built,
+                small,
+                0,
+                0,
+                samples_per_pixel=PROBE_SAMPLES,
+                seed=seeds.integer(seed, view=0, stage="probe", part=part),
+            ),
+            cfa,
+        ).astype(np.float64)
+        for part in range(2)
+    )
+    # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
+    variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
+    return Probe(float((first + second).mean() / 2), float(variance))
