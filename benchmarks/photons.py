@@ -6,6 +6,9 @@ The paper's recipe. Dense views are timed on a few views and scaled to all, sinc
 import time
 from collections.abc import Callable, Iterator
 from statistics import median
+from typing import TypeVar
+
+import numpy as np
 
 from simgen import backend, seeds
 from simgen.build import build
@@ -18,9 +21,10 @@ from simgen.sensor import draw_counts, photon_rates, scope_energies, sense
 
 REPEATS = 5
 DENSE_VIEWS = 4
+Result = TypeVar("Result")
 
 
-def timed(work: Callable[[int], object]) -> tuple[float, object]:
+def timed(work: Callable[[int], Result]) -> tuple[float, Result]:
     """Median seconds of `REPEATS` runs after one that warms up, and the last result."""
     result, seconds = work(0), []
     for repeat in range(1, REPEATS + 1):
@@ -30,40 +34,45 @@ def timed(work: Callable[[int], object]) -> tuple[float, object]:
     return median(seconds), result
 
 
+def setup_of(recipe: Recipe) -> Setup:
+    """The recipe's scene and cameras, ready to draw from."""
+    scene, folder = load_scene(recipe.scene)
+    built = build(backend.load(), scene, folder, recipe.render.max_depth)
+    return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
+
+
 def thinned(recipe: Recipe) -> tuple[float, PhotonList]:
     """Seconds to draw the photons of all views of a recipe, and the last draw."""
-    scene, folder = load_scene(recipe.scene)
-    built = build(backend.load(), scene, folder, recipe.render.max_depth)
-    setup = Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
-
-    def work(seed: int) -> PhotonList:
-        return draw_photons(setup, recipe.photons, seed=seed)
-
-    seconds, drawn = timed(work)
-    assert isinstance(drawn, PhotonList)
-    return seconds, drawn
+    setup = setup_of(recipe)
+    return timed(lambda seed: draw_photons(setup, recipe.photons, seed=seed))
 
 
-def dense(recipe: Recipe, samples_per_pixel: int) -> float:
-    """Seconds to render all views and draw their Poisson counts."""
-    scene, folder = load_scene(recipe.scene)
-    built = build(backend.load(), scene, folder, recipe.render.max_depth)
-    grid = recipe.grid.camera_grid()
+def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
+    """Seconds to render all views and draw their Poisson counts, and of these the draws alone."""
+    setup = setup_of(recipe)
+    drawing = 0.0
 
     def work(seed: int) -> None:
+        nonlocal drawing
+        drawing = 0.0
         for view in range(DENSE_VIEWS):
-            image = render_view(built, grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed)
+            image = render_view(
+                setup.built, setup.grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed
+            )
+            start = time.perf_counter()
             raw = sense(image, recipe.cfa)
             energies = scope_energies(raw, recipe.cfa, "view")
             rates = photon_rates(raw, recipe.cfa, recipe.photons, energies)
             draw_counts(rates, recipe.cfa, seeds.generator(seed, view=view, stage="photons"), None)
+            drawing += time.perf_counter() - start
 
     seconds, _ = timed(work)
-    return seconds * grid.view_count / DENSE_VIEWS
+    scale = setup.grid.view_count / DENSE_VIEWS
+    return seconds * scale, drawing * scale
 
 
 def table() -> Iterator[str]:
-    """The table, line by line as it is measured."""
+    """The tables, line by line as they are measured."""
     recipe, _ = load_recipe("paper")
     yield f"photons of the paper's recipe, {backend.choose().line()}"
     yield ""
@@ -71,19 +80,45 @@ def table() -> Iterator[str]:
     yield "|---|---|---|---|---|"
     base, drawn = thinned(recipe)
     yield _row("thinning, 1000 photons per view", base, base, drawn)
+    costs = {}
     for samples in (1, 16):
-        seconds = dense(recipe, samples)
+        seconds, costs[0] = dense(recipe, samples)
+        costs[samples] = seconds
         yield f"| dense, {samples} samples + Poisson | {seconds:.2f} | {seconds / base:.1f} x | | |"
     larger, _ = load_recipe("paper", ["grid.height=4096", "grid.width=4096", "grid.pixel_mm=0.0088"])
-    yield _row("thinning, 4096 x 4096 pixels", *thinned_against(larger, base))
+    seconds, drawn = thinned(larger)
+    yield _row("thinning, 4096 x 4096 pixels", seconds, base, drawn)
     brighter, _ = load_recipe("paper", ["photons.budget=10000"])
-    yield _row("thinning, 10 000 photons per view", *thinned_against(brighter, base))
+    seconds, drawn = thinned(brighter)
+    yield _row("thinning, 10 000 photons per view", seconds, base, drawn)
+    yield ""
+    yield from _costs(recipe, (seconds - base) / 900_000, costs)
+    yield ""
+    yield from _growth()
 
 
-def thinned_against(recipe: Recipe, base: float) -> tuple[float, float, PhotonList]:
-    """Seconds, seconds to compare with, and the draw of another recipe."""
-    seconds, drawn = thinned(recipe)
-    return seconds, base, drawn
+def _costs(recipe: Recipe, per_photon: float, dense_s: dict[int, float]) -> Iterator[str]:
+    """What `simgen.counts` chooses by."""
+    grid = recipe.grid.camera_grid()
+    pixels = grid.view_count * grid.height * grid.width
+    yield "| cost | microseconds |"
+    yield "|---|---|"
+    yield f"| a photon more, by thinning | {1e6 * per_photon:.2f} |"
+    yield f"| a sample of a dense view | {1e6 * (dense_s[16] - dense_s[1]) / (15 * pixels):.3f} |"
+    yield f"| a pixel of a dense view, its counts drawn | {1e6 * dense_s[0] / pixels:.3f} |"
+
+
+def _growth() -> Iterator[str]:
+    """Time against photons, up to ten million of them in one view."""
+    yield "| photons per view, 2 x 2 views | seconds | microseconds each |"
+    yield "|---|---|---|"
+    for budget in np.geomspace(1e4, 1e7, 4):
+        recipe, _ = load_recipe("paper", ["grid.rows=2", "grid.cols=2", f"photons.budget={budget:g}"])
+        setup = setup_of(recipe)
+        start = time.perf_counter()
+        drawn = draw_photons(setup, recipe.photons, seed=1)
+        seconds = time.perf_counter() - start
+        yield f"| {budget:.0e} | {seconds:.2f} | {1e6 * seconds / drawn.k.size:.2f} |"
 
 
 def _row(name: str, seconds: float, base: float, drawn: PhotonList) -> str:

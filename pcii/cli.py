@@ -7,7 +7,7 @@ from cyclopts import App, Parameter
 
 from pcii import __version__, console, results
 from pcii.console import Stages, say
-from pcii.dataset import open_dataset
+from pcii.dataset import Dataset, open_dataset
 
 app = App(
     name="pcii",
@@ -17,10 +17,19 @@ app = App(
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
+Budget = Annotated[
+    float | None,
+    Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),
+]
+
+
+def _open(dataset: Path, budget: float | None) -> Dataset:
+    data = open_dataset(dataset)
+    return data if budget is None else data.at_budget(budget)
 
 
 @app.command
-def run(dataset: Path, *, out: Out, z_mm: Depths = ()) -> None:
+def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) -> None:
     """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
 
     Example:  pcii run out/paper -o out/paper-results
@@ -37,7 +46,7 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = ()) -> None:
     from pcii.run import run as run_all
 
     with Stages() as report:
-        outcome = run_all(open_dataset(dataset), out, z_mm, report)
+        outcome = run_all(_open(dataset, budget), out, z_mm, report)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -45,7 +54,9 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = ()) -> None:
 
 
 @app.command
-def reconstruct(dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1) -> None:
+def reconstruct(
+    dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1, budget: Budget = None
+) -> None:
     """Reconstruct sections from the photon counts, with a picture of each.
 
     Example:  pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
@@ -65,7 +76,7 @@ def reconstruct(dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1
     from pcii.pipeline import planes_of
     from pcii.reconstruct import reconstruct as make
 
-    data = open_dataset(dataset)
+    data = _open(dataset, budget)
     sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel)
     results.claim(out, data)
     say(f"{results.save_sections(out, sections)}")
@@ -76,7 +87,7 @@ def reconstruct(dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1
 
 
 @app.command
-def depth(dataset: Path, *, out: Out) -> None:
+def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
     """Map the depth of every pixel of the virtual centre, with a picture.
 
     Example:  pcii depth out/paper -o out/depth
@@ -92,7 +103,7 @@ def depth(dataset: Path, *, out: Out) -> None:
     from pcii.picture import depth_image, write_png
     from pcii.pipeline import depth_range_of
 
-    data = open_dataset(dataset)
+    data = _open(dataset, budget)
     z_range = depth_range_of(data)
     found = estimate_depth(data.counts, z_range)
     results.claim(out, data)
@@ -108,6 +119,7 @@ def segment(
     out: Out,
     z_mm: Depths = (),
     method: Literal["three-step", "likelihood"] = "likelihood",
+    budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
 
@@ -128,7 +140,7 @@ def segment(
     from pcii.pipeline import planes_of
     from pcii.segment import segment as remove
 
-    data = open_dataset(dataset)
+    data = _open(dataset, budget)
     focus = remove(data.counts, planes_of(data, z_mm), method=method)
     results.claim(out, data)
     say(f"{results.save_segmented(out, focus)}")
@@ -139,7 +151,7 @@ def segment(
 
 
 @app.command
-def score(dataset: Path, out: Path) -> None:
+def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
     """Compare the results in a folder with the dataset's truth; writes score.json there.
 
     Example:  pcii score out/paper out/paper-results
@@ -154,7 +166,7 @@ def score(dataset: Path, out: Path) -> None:
     from pcii.errors import InputError
     from pcii.score import score as compare
 
-    data = open_dataset(dataset)
+    data = _open(dataset, budget)
     if not out.is_dir():
         raise InputError(f"{out}: there is no such folder of results")
     results.claim(out, data)

@@ -29,13 +29,20 @@ def claim(out: Path, dataset: Dataset) -> None:
         raise InputError(f"{out}: this is a file; name a folder for the results")
     if out.resolve() == dataset.path.resolve():
         raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-    mine = {"format": FORMAT, "dataset": dataset.name, "identity": dataset.manifest.get("identity")}
+    mine = {
+        "format": FORMAT,
+        "dataset": dataset.name,
+        "identity": dataset.manifest.get("identity"),
+        "budget": dataset.budget,
+    }
     if out.is_dir() and any(out.iterdir()):
         held = _read_marker(out)
         if held is None:
             raise InputError(f"{out}: holds something else; name a new or empty folder")
         if held != mine:
-            raise InputError(f"{out}: holds the results of another dataset; name a new or empty folder")
+            raise InputError(
+                f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
+            )
         sweep_temporaries(out)
     write_json_safely(out / MARKER, mine)
 

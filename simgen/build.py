@@ -10,7 +10,7 @@ import numpy as np
 from pcii.errors import InputError
 from simgen.backend import shape_numbers
 from simgen.light import light_plugin
-from simgen.scene import Card, Mesh, Scene, SceneObject, Sphere, asset
+from simgen.scene import Card, Matt, Mesh, Metal, Plastic, Scene, SceneObject, Sphere, asset
 
 BACKDROP = "backdrop"
 LARGEST_TEXTURE_PIXELS = 1 << 26
@@ -43,7 +43,13 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
         plugins[BACKDROP] = {
             "type": "rectangle",
             "to_world": facing @ _card_pose(mi, 2 * half, 2 * half),
-            "bsdf": _diffuse({"type": "rgb", "value": _linear(wall.reflectance)}),
+            "bsdf": {
+                "type": "twosided",
+                "bsdf": {
+                    "type": "diffuse",
+                    "reflectance": {"type": "rgb", "value": _linear(wall.reflectance)},
+                },
+            },
         }
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light)
@@ -101,15 +107,35 @@ def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
 
 
 def _material(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
+    # Two-sided, so that a card or an open mesh seen from behind is not a black hole.
+    return {"type": "twosided", "bsdf": _surface(mi, thing, folder)}
+
+
+def _surface(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
+    match thing.material.finish:
+        case Matt():
+            return {"type": "diffuse", "reflectance": _reflectance(mi, thing, folder)}
+        case Plastic(roughness=alpha):
+            return {
+                "type": "roughplastic",
+                "distribution": "ggx",
+                "alpha": alpha,
+                "diffuse_reflectance": _reflectance(mi, thing, folder),
+            }
+        case Metal(name=name, roughness=alpha):
+            return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+
+
+def _reflectance(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     material = thing.material
     if material.texture is None:
         assert material.reflectance is not None
-        return _diffuse({"type": "rgb", "value": _linear(material.reflectance)})
+        return {"type": "rgb", "value": _linear(material.reflectance)}
     path = asset(folder, material.texture, "material.texture")
     pixels = _read_image(path)
     if isinstance(thing.shape, Card):
         pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
-    texture = {
+    return {
         "type": "bitmap",
         "bitmap": mi.Bitmap(pixels),
         "raw": True,  # linear already, so Mitsuba must not convert it
@@ -117,12 +143,6 @@ def _material(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
         "wrap_mode": "repeat" if isinstance(thing.shape, Sphere) else "clamp",
     }
-    return _diffuse(texture)
-
-
-def _diffuse(reflectance: dict[str, Any]) -> dict[str, Any]:
-    # Two-sided, so that a card or an open mesh seen from behind is not a black hole.
-    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
 
 
 def _linear(srgb: tuple[float, float, float]) -> list[float]:

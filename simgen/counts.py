@@ -22,7 +22,7 @@ from simgen.photons import draw_photons
 from simgen.recipe import Recipe
 from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energies
 
-PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.6, 0.067, 0.03
+PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 """Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
 `make bench` on two cores; only their ratios matter."""
 MOST_SINGLE_PHOTONS = 1 << 27
