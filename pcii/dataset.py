@@ -39,11 +39,12 @@ class Dataset:
     def at_budget(self, budget: float) -> "Dataset":
         """The same dataset with the photons of a smaller, nested budget; `InputError` if it has none."""
         own = self.manifest.get("recipe", {}).get("photons", {})
+        whole = None if own.get("scope") == "exposure" else own.get("budget")
         nested = own.get("nested") or []
-        if budget == own.get("budget"):
+        if budget == whole:
             return replace(self, budget=None)
         if budget not in nested:
-            known = ", ".join(f"{n:g}" for n in (own.get("budget"), *nested) if n is not None)
+            known = ", ".join(f"{n:g}" for n in (whole, *nested) if n is not None)
             raise InputError(
                 f"{self.path}: no photons of budget {budget:g} here; there are {known or 'none'}"
             )
@@ -139,6 +140,7 @@ class _ExrStack:
     def __init__(self, dataset: Dataset, channels: int) -> None:
         self._dataset = dataset
         self.shape = (*dataset.grid.shape_KLHW, channels)
+        self.dtype = np.dtype(np.float32)
 
     def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         path = self._dataset.check(radiance_name(*index))

@@ -105,7 +105,7 @@ def _block_counts(counts: PhotonCounts, z_mm: float) -> np.ndarray:
 
 def _block_coverage(counts: PhotonCounts, z_mm: float) -> np.ndarray:
     """Samples of the section at z by colour and block, (C, blocks, blocks) float64."""
-    coverage = coverage_of(counts.grid, counts.cfa, counts.channel_count, z_mm, 1)
+    coverage = np.moveaxis(coverage_of(counts.grid, counts.cfa, counts.channel_count, z_mm, 1), -1, 0)
     _, H, W = coverage.shape
     height, width = (n * CELL_PX for n in cell_shape(counts))
     whole = np.pad(coverage, ((0, 0), (0, height - H), (0, width - W)))

@@ -312,8 +312,9 @@ class Sections:
     """Sections of the scene at depths `z_mm`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
-    float64 for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
-    the voxel grid is M times finer in both axes.
+    real numbers for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
+    the voxel grid is M times finer in both axes. `variance` is that of the samples of each voxel, if it
+    was asked for.
     """
 
     grid: CameraGrid
@@ -322,6 +323,7 @@ class Sections:
     coverage: np.ndarray
     subpixel: int = 1
     normalisation: Normalisation = "overlap"
+    variance: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         z = check_z_mm(self.z_mm)

@@ -15,9 +15,10 @@ SHARED = {"pcii", "pcii.types", "pcii.bayer", "pcii.errors", "pcii.store", "pcii
 # Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
 PCII_LEVELS = [
     {"errors"},
-    {"bayer", "store", "console"},
+    {"bayer", "store", "console", "kernels"},
     {"types"},
     {"geometry", "dataset", "demosaic", "picture"},
+    {"dense"},
     {"reconstruct", "planes", "foreground"},
     {"statistics"},
     {"likelihood"},

@@ -1,0 +1,211 @@
+"""Compiled loops over photons and pixels (Numba, which needs no system library).
+
+Imported where a loop is about to run and not with the package: loading the compiler takes longer than all
+else. Compiled code is kept beside this file, or in the user's cache where that is not writable, so each
+loop is compiled once per machine.
+"""
+
+import numba as nb
+import numpy as np
+
+compiled = nb.njit(parallel=True, nogil=True, cache=True)
+
+
+def threads() -> int:
+    """How many a loop is shared among."""
+    return nb.get_num_threads()
+
+
+@compiled
+def scatter(
+    counts: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    k: np.ndarray,
+    l: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    n: np.ndarray,
+    bands: int,
+) -> None:
+    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
+
+    `rows` (Z, K, h) and `cols` (Z, L, w) say where each pixel of each camera belongs. The sections are
+    cut into `bands` of rows each; a thread clears a band and looks through all photons for its own.
+    """
+    planes, height, width, _ = counts.shape
+    for part in nb.prange(planes * bands):
+        plane, band = part // bands, part % bands
+        first, last = height * band // bands, height * (band + 1) // bands
+        counts[plane, first:last] = 0
+        for e in range(k.size):
+            row = rows[plane, k[e], i[e]]
+            if first <= row < last:
+                col = cols[plane, l[e], j[e]]
+                if 0 <= col < width:
+                    counts[plane, row, col, colour[e]] += n[e]
+
+
+@compiled
+def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
+    """Each row of `target` (N, M) is one of the few `rows` (P, M), by its `kinds` (N,)."""
+    for row in nb.prange(target.shape[0]):
+        target[row] = rows[kinds[row]]
+
+
+@compiled
+def add_views(
+    total: np.ndarray,
+    squares: np.ndarray,
+    first: np.ndarray,
+    images: np.ndarray,
+    row_shift: np.ndarray,
+    col_shift: np.ndarray,
+    order: np.ndarray,
+    ends: np.ndarray,
+    top: int,
+) -> None:
+    """Add shifted images to running sums of their groups, for the rows of a section from `top` on.
+
+    `images` (V, H, N), N columns times channels; `row_shift` (V,), `col_shift` (V,) in columns times
+    channels; `order` (V,) lists the views group after group, group g up to `ends[g]`. `total` and
+    `squares` (G, h, N) sum differences from the `first` sample of each place, NaN before there is one;
+    `squares` may be empty, then the samples themselves are summed.
+    """
+    _, height, width = images.shape
+    for line in nb.prange(total.shape[1]):
+        row, begin = top + line, 0
+        for g in range(ends.size):
+            if squares.size:
+                _find_first(first[g, line], images, row, row_shift, col_shift, order[begin : ends[g]])
+            for v in order[begin : ends[g]]:
+                source = row - row_shift[v]
+                if source < 0 or source >= height:
+                    continue
+                shift = col_shift[v]
+                low, high = max(0, shift), min(width, width + shift)
+                if low >= high:
+                    continue
+                values = images[v, source, low - shift : high - shift]
+                sums = total[g, line, low:high]
+                if squares.size:
+                    _add_spread(sums, squares[g, line, low:high], first[g, line, low:high], values)
+                else:
+                    _add(sums, values)
+            begin = ends[g]
+
+
+@nb.njit(nogil=True, cache=True)
+def _find_first(first, images, row, row_shift, col_shift, views) -> None:
+    """Take the first sample of each place of a row that has none yet."""
+    _, height, width = images.shape
+    begin = end = 0  # the run of places that are known to have one
+    for v in views:
+        source, shift = row - row_shift[v], col_shift[v]
+        low, high = max(0, shift), min(width, width + shift)
+        if source < 0 or source >= height or low >= high:
+            continue
+        if begin == end or low > end or high < begin:
+            _fill(first, images[v, source], shift, low, high)
+            if begin == end:
+                begin, end = low, high
+            continue
+        _fill(first, images[v, source], shift, low, begin)
+        _fill(first, images[v, source], shift, end, high)
+        begin, end = min(begin, low), max(end, high)
+
+
+@nb.njit(nogil=True, cache=True)
+def _fill(first, values, shift, low, high) -> None:
+    for x in range(low, high):
+        first[x] = first[x] if first[x] == first[x] else values[x - shift]
+
+
+@nb.njit(nogil=True, cache=True)
+def _add(total, values) -> None:
+    for x in range(total.size):
+        total[x] += values[x]
+
+
+@nb.njit(nogil=True, cache=True)
+def _add_spread(total, squares, first, values) -> None:
+    for x in range(total.size):
+        difference = values[x] - first[x]
+        total[x] += difference
+        squares[x] += difference * difference
+
+
+@compiled
+def finite_beside(images: np.ndarray, row_shift: np.ndarray, col_shift: np.ndarray) -> bool:
+    """Whether what falls beside the section is finite; shapes as for `add_views`."""
+    views, height, width = images.shape
+    bad = 0
+    for v in nb.prange(views):
+        down, right = row_shift[v], col_shift[v]
+        found = 0
+        for row in range(height):
+            outside = not 0 <= row + down < height
+            for x in range(width if outside else min(max(-right, 0), width)):
+                found += not np.isfinite(images[v, row, x])
+            for x in range(max(width - right, 0), 0 if outside else width):
+                found += not np.isfinite(images[v, row, x])
+        bad += found
+    return bad == 0
+
+
+@compiled
+def merge_groups(
+    sums: np.ndarray,
+    variance: np.ndarray,
+    total: np.ndarray,
+    squares: np.ndarray,
+    first: np.ndarray,
+    by_row: np.ndarray,
+    by_col: np.ndarray,
+    phases: np.ndarray,
+    top: int,
+) -> None:
+    """Sums and, if asked for, variances per colour (h, W, 3) from the groups of mosaics (4, h, W).
+
+    Group 2 p + q are the views whose row and column shifts have the parities p and q, so that all of its
+    samples at a voxel have one colour; `by_row` (2, H) and `by_col` (2, W) are how many rows and columns
+    of cameras these are. `phases` (4, 2) are the Bayer cells of red, blue and twice green. Groups of
+    one colour are merged as by Chan, Golub and LeVeque 1983.
+    """
+    height, width, _ = sums.shape
+    for line in nb.prange(height):
+        row = top + line
+        for parity in range(2):
+            for phase in range(2):  # red and blue have one group at each voxel
+                p, q = (row + phases[phase, 0]) % 2, (parity + phases[phase, 1]) % 2
+                rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
+                for col in range(parity, width, 2):
+                    n = rows * by_col[q, col]
+                    sums[line, col, colour] = total[g, line, col]
+                    if variance.size:
+                        sums[line, col, colour] += first[g, line, col] * n if n > 0 else 0.0
+                        spread = _spread(total[g, line, col], squares[g, line, col], n)
+                        variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
+            p, q = (row + phases[2, 0]) % 2, (parity + phases[2, 1]) % 2
+            g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells lie across from each other
+            for col in range(parity, width, 2):
+                n, m = by_row[p, row] * by_col[q, col], by_row[1 - p, row] * by_col[1 - q, col]
+                a, b = total[g, line, col], total[h, line, col]
+                sums[line, col, 1] = a + b
+                if variance.size:
+                    spread = _spread(a, squares[g, line, col], n) + _spread(b, squares[h, line, col], m)
+                    if n > 0:
+                        sums[line, col, 1] += first[g, line, col] * n
+                    if m > 0:
+                        sums[line, col, 1] += first[h, line, col] * m
+                    if n > 0 and m > 0:
+                        apart = (first[h, line, col] - first[g, line, col]) + (b / m - a / n)
+                        spread += apart * apart * n * m / (n + m)
+                    variance[line, col, 1] = spread / (n + m - 1) if n + m > 1 else 0.0
+
+
+@nb.njit(nogil=True, cache=True)
+def _spread(total, squares, n) -> float:
+    """Sum of squared deviations from the mean, of n numbers with this sum and sum of squares."""
+    return max(squares - total * total / n, 0.0) if n > 0 else 0.0
