@@ -101,7 +101,9 @@ class _Plane:
         """Bring the running sums of the band to the result."""
         from pcii import kernels
 
-        self.finite = self.finite and bool(np.isfinite(self.total).all())
+        if not np.isfinite(self.total).all():
+            self.finite = False
+            return
         rows = slice(self.top, self.top + self.total.shape[1])
         told = self.variance[rows] if self.spread else self.variance
         if self.cfa is not None:
