@@ -1,6 +1,6 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
-# make bench  run time against error
+# make bench  run time against error; TABLES="sections" for one table
 
 PYTHON ?= python3
 VENV := .venv
@@ -39,7 +39,8 @@ test: llvm
 	$(BIN)/python -m pytest -n 2 -m "not slow"
 
 bench: llvm
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	$(BIN)/python -m benchmarks $(TABLES)
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .

@@ -4,12 +4,11 @@ The paper's recipe. Dense views are timed on a few views and scaled to all, sinc
 """
 
 import time
-from collections.abc import Callable, Iterator
-from statistics import median
-from typing import TypeVar
+from collections.abc import Iterator
 
 import numpy as np
 
+from benchmarks.timing import timed
 from simgen import backend, seeds
 from simgen.build import build
 from simgen.candidates import Setup
@@ -19,19 +18,7 @@ from simgen.render import render_view
 from simgen.scene import load_scene
 from simgen.sensor import draw_counts, photon_rates, scope_energies, sense
 
-REPEATS = 5
 DENSE_VIEWS = 4
-Result = TypeVar("Result")
-
-
-def timed(work: Callable[[int], Result]) -> tuple[float, Result]:
-    """Median seconds of `REPEATS` runs after one that warms up, and the last result."""
-    result, seconds = work(0), []
-    for repeat in range(1, REPEATS + 1):
-        start = time.perf_counter()
-        result = work(repeat)
-        seconds.append(time.perf_counter() - start)
-    return median(seconds), result
 
 
 def setup_of(recipe: Recipe) -> Setup:

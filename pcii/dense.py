@@ -16,7 +16,7 @@ from pcii.errors import InputError
 from pcii.geometry import nearest_shifts_px
 from pcii.types import Views
 
-BATCH = 16
+BATCH = 8
 """Views that are held at a time when they are read from disk."""
 BAND = 32
 """Rows of a section that are summed at a time when all views are in memory: their sums stay in the cache."""
@@ -148,11 +148,12 @@ def _in_memory(data: Views) -> np.ndarray | None:
 
 def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """View numbers (V,) and images (V, H, N), some at a time."""
-    K, L, H, _ = data.grid.shape_KLHW
-    dtype = _dtype(data)
+    K, L, H, W = data.grid.shape_KLHW
+    held = np.empty((min(BATCH, K * L), H, W * data.radiance.shape[4]), dtype=_dtype(data))
     for part in np.split(np.arange(K * L), range(BATCH, K * L, BATCH)):
-        images = [np.asarray(data.radiance[v // L, v % L], dtype=dtype).reshape(H, -1) for v in part.tolist()]
-        yield part, np.stack(images)
+        for place, view in enumerate(part.tolist()):
+            held[place] = np.asarray(data.radiance[view // L, view % L]).reshape(H, -1)
+        yield part, held[: part.size]
 
 
 def _numbers(shift: np.ndarray, size: int) -> np.ndarray:
