@@ -18,8 +18,6 @@ from pcii.types import Views
 
 BATCH = 8
 """Views that are held at a time when they are read from disk."""
-BAND = 32
-"""Rows of a section that are summed at a time when all views are in memory: their sums stay in the cache."""
 
 
 def sum_views(data: Views, z: np.ndarray, *, variance: bool) -> tuple[np.ndarray, np.ndarray | None]:
@@ -28,28 +26,22 @@ def sum_views(data: Views, z: np.ndarray, *, variance: bool) -> tuple[np.ndarray
     A view is read once, however many planes. A voxel below two samples has the variance 0.
     Raises `InputError` for radiance that is NaN or infinite.
     """
-    grid = data.grid
-    whole = _in_memory(data)
     planes = [_Plane(data, depth, variance) for depth in z]
-    if whole is not None:
-        everything = np.arange(grid.view_count)
-        for plane in planes:
-            for top in range(0, grid.height, BAND):
-                plane.start(top, min(BAND, grid.height - top))
-                plane.add(everything, whole)
-                plane.finish()
-        finite = planes[0].finite_beside(everything, whole)
+    everything = _in_memory(data)
+    if everything is not None:
+        numbers = np.arange(data.grid.view_count)
+        finite = planes[0].finite_beside(numbers, everything)
+        finite = all(plane.sum(numbers, everything) for plane in planes) and finite
     else:
         finite = True
         for plane in planes:
-            plane.start(0, grid.height)
-        for views, images in _batches(data):
-            finite = finite and planes[0].finite_beside(views, images)
+            plane.start()
+        for numbers, images in _batches(data):
+            finite = planes[0].finite_beside(numbers, images) and finite
             for plane in planes:
-                plane.add(views, images)
-        for plane in planes:
-            plane.finish()
-    if not finite or not all(plane.finite for plane in planes):
+                plane.add(numbers, images)
+        finite = all(plane.finish() for plane in planes) and finite
+    if not finite:
         _name_the_bad_one(data)
     sums = np.stack([plane.sums for plane in planes]) if len(planes) > 1 else planes[0].sums[None]
     if not variance:
@@ -58,23 +50,31 @@ def sum_views(data: Views, z: np.ndarray, *, variance: bool) -> tuple[np.ndarray
 
 
 class _Plane:
-    """One section in the making: its result, and running sums of a band of its rows."""
+    """One section in the making: its result, and running sums where views come some at a time."""
 
     def __init__(self, data: Views, z_mm: float, spread: bool) -> None:
         grid, C = data.grid, data.channel_count
         self.row_shift, self.col_shift = nearest_shifts_px(grid, z_mm)
-        self.columns, self.cfa, self.spread, self.finite = grid.cols, data.cfa, spread, True
-        self.by_row = _numbers(self.row_shift, grid.height)
-        self.by_col = _numbers(self.col_shift, grid.width)
+        self.columns, self.spread = grid.cols, spread
         self.channels, self.groups = (1, 4) if data.cfa is not None else (C, 1)
+        phases = np.zeros((0, 2), np.int64) if data.cfa is None else _phases(data.cfa)
+        self.merging = _numbers(self.row_shift, grid.height), _numbers(self.col_shift, grid.width), phases
         dtype = _dtype(data)
         self.sums = np.empty((grid.height, grid.width, C), dtype)
         self.variance = np.empty(self.sums.shape if spread else (0, 0, 0), dtype)
 
-    def start(self, top: int, height: int) -> None:
-        """Begin with the rows from `top` on."""
-        shape = (self.groups, height, self.sums.shape[1] * self.channels)
-        self.top, self.total = top, np.zeros(shape)
+    def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
+        """Make the section of images (V, H, N) of all views; whether it is finite."""
+        from pcii import kernels
+
+        result = self.sums, self.variance
+        return kernels.sum_views(*result, images, *self._moves(views), *self.merging)
+
+    def start(self) -> None:
+        """Begin a section of views that come some at a time."""
+        H, W, _ = self.sums.shape
+        shape = (self.groups, H, W * self.channels)
+        self.total = np.zeros(shape)
         self.squares = np.zeros(shape if self.spread else (0, 0, 0))
         self.first = np.full(self.squares.shape, np.nan)
 
@@ -82,48 +82,28 @@ class _Plane:
         """Add images (V, H, N) of these views."""
         from pcii import kernels
 
-        row_shift, col_shift = self._shifts(views)
-        group = np.zeros_like(views)
-        if self.groups == 4:
-            group = 2 * (row_shift % 2) + col_shift % 2
-        order = np.argsort(group, kind="stable")
-        ends = np.searchsorted(group[order], np.arange(self.groups), side="right")
-        sums = self.total, self.squares, self.first
-        kernels.add_views(*sums, images, row_shift, col_shift, order, ends, self.top)
+        kernels.add_views(self.total, self.squares, self.first, images, *self._moves(views))
+
+    def finish(self) -> bool:
+        """Bring the running sums to the result; whether it is finite."""
+        from pcii import kernels
+
+        state = self.total, self.squares, self.first
+        return kernels.merge_groups(self.sums, self.variance, *state, *self.merging)
 
     def finite_beside(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Whether what of the images falls beside the section is finite; the rest shows in the sums."""
         from pcii import kernels
 
-        return kernels.finite_beside(images, *self._shifts(views))
+        return kernels.finite_beside(images, *self._moves(views)[:2])
 
-    def finish(self) -> None:
-        """Bring the running sums of the band to the result."""
-        from pcii import kernels
-
-        if not np.isfinite(self.total).all():
-            self.finite = False
-            return
-        rows = slice(self.top, self.top + self.total.shape[1])
-        told = self.variance[rows] if self.spread else self.variance
-        if self.cfa is not None:
-            phases = _phases(self.cfa)
-            state = self.total, self.squares, self.first, self.by_row, self.by_col
-            kernels.merge_groups(self.sums[rows], told, *state, phases, self.top)
-            return
-        _, W, C = self.sums.shape
-        number = np.outer(self.by_row.sum(axis=0)[rows], self.by_col.sum(axis=0))[..., None]
-        self.sums[rows] = self.total.reshape(-1, W, C)
-        if self.spread:
-            total, squares, first = (
-                part.reshape(-1, W, C) for part in (self.total, self.squares, self.first)
-            )
-            self.sums[rows] = total + np.where(number > 0, number * first, 0)
-            deviation = np.maximum(squares - total**2 / np.maximum(number, 1), 0)
-            self.variance[rows] = np.where(number > 1, deviation / np.maximum(number - 1, 1), 0)
-
-    def _shifts(self, views: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return self.row_shift[views // self.columns], self.col_shift[views % self.columns] * self.channels
+    def _moves(self, views: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Shifts of these views, their order by group, and where each group ends."""
+        down, right = self.row_shift[views // self.columns], self.col_shift[views % self.columns]
+        group = 2 * (down % 2) + right % 2 if self.groups == 4 else np.zeros_like(views)
+        order = np.argsort(group, kind="stable")
+        ends = np.searchsorted(group[order], np.arange(self.groups), side="right")
+        return down, right * self.channels, order, ends
 
 
 def _phases(cfa: str) -> np.ndarray:

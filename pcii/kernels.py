@@ -54,6 +54,45 @@ def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
         target[row] = rows[kinds[row]]
 
 
+BAND = 8
+"""Rows of a section that are summed at a time when all views are at hand: their sums stay in the cache."""
+
+
+@compiled
+def sum_views(
+    sums: np.ndarray,
+    variance: np.ndarray,
+    images: np.ndarray,
+    row_shift: np.ndarray,
+    col_shift: np.ndarray,
+    order: np.ndarray,
+    ends: np.ndarray,
+    by_row: np.ndarray,
+    by_col: np.ndarray,
+    phases: np.ndarray,
+) -> bool:
+    """A section of images that are all at hand: `add_views` and `merge_groups` band by band.
+
+    Returns whether all sums are finite.
+    """
+    height, width = images.shape[1:]
+    bad = 0
+    for band in nb.prange((height + BAND - 1) // BAND):
+        top = band * BAND
+        bottom = min(top + BAND, height)
+        shape = (ends.size, bottom - top, width)
+        total = np.zeros(shape)
+        squares, first = np.zeros(shape if variance.size else (0, 0, 0)), np.zeros((0, 0, 0))
+        if variance.size:
+            first = np.full(shape, np.nan)
+        told = variance[top:bottom] if variance.size else variance
+        for line in range(bottom - top):
+            _add_line(total, squares, first, images, row_shift, col_shift, order, ends, top, line)
+            bad += _not_finite(total[:, line])
+            _merge_line(sums[top:bottom], told, total, squares, first, by_row, by_col, phases, top, line)
+    return bad == 0
+
+
 @compiled
 def add_views(
     total: np.ndarray,
@@ -64,36 +103,75 @@ def add_views(
     col_shift: np.ndarray,
     order: np.ndarray,
     ends: np.ndarray,
-    top: int,
 ) -> None:
-    """Add shifted images to running sums of their groups, for the rows of a section from `top` on.
+    """Add shifted images to running sums of their groups.
 
     `images` (V, H, N), N columns times channels; `row_shift` (V,), `col_shift` (V,) in columns times
     channels; `order` (V,) lists the views group after group, group g up to `ends[g]`. `total` and
-    `squares` (G, h, N) sum differences from the `first` sample of each place, NaN before there is one;
+    `squares` (G, H, N) sum differences from the `first` sample of each place, NaN before there is one;
     `squares` may be empty, then the samples themselves are summed.
     """
-    _, height, width = images.shape
     for line in nb.prange(total.shape[1]):
-        row, begin = top + line, 0
-        for g in range(ends.size):
+        _add_line(total, squares, first, images, row_shift, col_shift, order, ends, 0, line)
+
+
+@compiled
+def merge_groups(
+    sums: np.ndarray,
+    variance: np.ndarray,
+    total: np.ndarray,
+    squares: np.ndarray,
+    first: np.ndarray,
+    by_row: np.ndarray,
+    by_col: np.ndarray,
+    phases: np.ndarray,
+) -> bool:
+    """Sums and, if asked for, variances (H, W, C) from the running sums of the groups.
+
+    Group 2 p + q of a mosaic are the views whose row and column shifts have the parities p and q, so that
+    all of its samples at a voxel have one colour; `by_row` (2, H) and `by_col` (2, W) are how many rows and
+    columns of cameras these are. `phases` (4, 2) are the Bayer cells of red, blue and twice green, and
+    empty where every pixel holds all colours and there is one group. Returns whether all sums are finite.
+    """
+    bad = 0
+    for line in nb.prange(sums.shape[0]):
+        bad += _not_finite(total[:, line])
+        _merge_line(sums, variance, total, squares, first, by_row, by_col, phases, 0, line)
+    return bad == 0
+
+
+@nb.njit(nogil=True, cache=True)
+def _not_finite(values) -> int:
+    found = 0
+    for g in range(values.shape[0]):
+        for x in range(values.shape[1]):
+            found += not np.isfinite(values[g, x])
+    return found
+
+
+@nb.njit(nogil=True, cache=True)
+def _add_line(total, squares, first, images, row_shift, col_shift, order, ends, top, line):
+    """Add what all images have for one row of the section, `line` rows below `top`."""
+    _, height, width = images.shape
+    row, begin = top + line, 0
+    for g in range(ends.size):
+        if squares.size:
+            _find_first(first[g, line], images, row, row_shift, col_shift, order[begin : ends[g]])
+        for v in order[begin : ends[g]]:
+            source = row - row_shift[v]
+            if source < 0 or source >= height:
+                continue
+            shift = col_shift[v]
+            low, high = max(0, shift), min(width, width + shift)
+            if low >= high:
+                continue
+            values = images[v, source, low - shift : high - shift]
+            sums = total[g, line, low:high]
             if squares.size:
-                _find_first(first[g, line], images, row, row_shift, col_shift, order[begin : ends[g]])
-            for v in order[begin : ends[g]]:
-                source = row - row_shift[v]
-                if source < 0 or source >= height:
-                    continue
-                shift = col_shift[v]
-                low, high = max(0, shift), min(width, width + shift)
-                if low >= high:
-                    continue
-                values = images[v, source, low - shift : high - shift]
-                sums = total[g, line, low:high]
-                if squares.size:
-                    _add_spread(sums, squares[g, line, low:high], first[g, line, low:high], values)
-                else:
-                    _add(sums, values)
-            begin = ends[g]
+                _add_spread(sums, squares[g, line, low:high], first[g, line, low:high], values)
+            else:
+                _add(sums, values)
+        begin = ends[g]
 
 
 @nb.njit(nogil=True, cache=True)
@@ -154,55 +232,53 @@ def finite_beside(images: np.ndarray, row_shift: np.ndarray, col_shift: np.ndarr
     return bad == 0
 
 
-@compiled
-def merge_groups(
-    sums: np.ndarray,
-    variance: np.ndarray,
-    total: np.ndarray,
-    squares: np.ndarray,
-    first: np.ndarray,
-    by_row: np.ndarray,
-    by_col: np.ndarray,
-    phases: np.ndarray,
-    top: int,
-) -> None:
-    """Sums and, if asked for, variances per colour (h, W, 3) from the groups of mosaics (4, h, W).
-
-    Group 2 p + q are the views whose row and column shifts have the parities p and q, so that all of its
-    samples at a voxel have one colour; `by_row` (2, H) and `by_col` (2, W) are how many rows and columns
-    of cameras these are. `phases` (4, 2) are the Bayer cells of red, blue and twice green. Groups of
-    one colour are merged as by Chan, Golub and LeVeque 1983.
-    """
-    height, width, _ = sums.shape
-    for line in nb.prange(height):
-        row = top + line
-        for parity in range(2):
-            for phase in range(2):  # red and blue have one group at each voxel
-                p, q = (row + phases[phase, 0]) % 2, (parity + phases[phase, 1]) % 2
-                rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
-                for col in range(parity, width, 2):
-                    n = rows * by_col[q, col]
-                    sums[line, col, colour] = total[g, line, col]
-                    if variance.size:
-                        sums[line, col, colour] += first[g, line, col] * n if n > 0 else 0.0
-                        spread = _spread(total[g, line, col], squares[g, line, col], n)
-                        variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
-            p, q = (row + phases[2, 0]) % 2, (parity + phases[2, 1]) % 2
-            g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells lie across from each other
-            for col in range(parity, width, 2):
-                n, m = by_row[p, row] * by_col[q, col], by_row[1 - p, row] * by_col[1 - q, col]
-                a, b = total[g, line, col], total[h, line, col]
-                sums[line, col, 1] = a + b
+@nb.njit(nogil=True, cache=True)
+def _merge_line(sums, variance, total, squares, first, by_row, by_col, phases, top, line):
+    """One row of `merge_groups`; groups of one colour are merged as by Chan, Golub and LeVeque 1983."""
+    _, width, channels = sums.shape
+    row = top + line
+    if not phases.size:
+        rows = by_row[0, row] + by_row[1, row]
+        for col in range(width):
+            n = rows * (by_col[0, col] + by_col[1, col])
+            for colour in range(channels):
+                place = col * channels + colour
+                sums[line, col, colour] = total[0, line, place]
                 if variance.size:
-                    spread = _spread(a, squares[g, line, col], n) + _spread(b, squares[h, line, col], m)
-                    if n > 0:
-                        sums[line, col, 1] += first[g, line, col] * n
-                    if m > 0:
-                        sums[line, col, 1] += first[h, line, col] * m
-                    if n > 0 and m > 0:
-                        apart = (first[h, line, col] - first[g, line, col]) + (b / m - a / n)
-                        spread += apart * apart * n * m / (n + m)
-                    variance[line, col, 1] = spread / (n + m - 1) if n + m > 1 else 0.0
+                    sums[line, col, colour] = total[0, line, place] + (
+                        first[0, line, place] * n if n else 0.0
+                    )
+                    spread = _spread(total[0, line, place], squares[0, line, place], n)
+                    variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
+        return
+    for parity in range(2):
+        for phase in range(2):  # red and blue have one group at each voxel
+            p, q = (row + phases[phase, 0]) % 2, (parity + phases[phase, 1]) % 2
+            rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
+            for col in range(parity, width, 2):
+                n = rows * by_col[q, col]
+                sums[line, col, colour] = total[g, line, col]
+                if variance.size:
+                    sums[line, col, colour] = total[g, line, col] + (first[g, line, col] * n if n else 0.0)
+                    spread = _spread(total[g, line, col], squares[g, line, col], n)
+                    variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
+        p, q = (row + phases[2, 0]) % 2, (parity + phases[2, 1]) % 2
+        g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells lie across from each other
+        for col in range(parity, width, 2):
+            n, m = by_row[p, row] * by_col[q, col], by_row[1 - p, row] * by_col[1 - q, col]
+            a, b = total[g, line, col], total[h, line, col]
+            whole = a + b
+            if variance.size:
+                spread = _spread(a, squares[g, line, col], n) + _spread(b, squares[h, line, col], m)
+                if n > 0:
+                    whole += first[g, line, col] * n
+                if m > 0:
+                    whole += first[h, line, col] * m
+                if n > 0 and m > 0:
+                    apart = (first[h, line, col] - first[g, line, col]) + (b / m - a / n)
+                    spread += apart * apart * n * m / (n + m)
+                variance[line, col, 1] = spread / (n + m - 1) if n + m > 1 else 0.0
+            sums[line, col, 1] = whole
 
 
 @nb.njit(nogil=True, cache=True)
