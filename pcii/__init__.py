@@ -1,6 +1,6 @@
 """Photon-counted integral imaging: reconstruct, remove what is out of focus, score.
 
-Importing this package loads NumPy and nothing heavier: SciPy, Zarr and Matplotlib are imported
+Importing this package loads NumPy and nothing heavier: SciPy, Numba, Zarr and Matplotlib are imported
 inside the functions that need them. The imports below are eager because modules and the functions
 they are named for share names, and only an eager import leaves the function under that name.
 """
@@ -9,7 +9,7 @@ from pcii.dataset import Dataset, open_dataset
 from pcii.demosaic import demosaic
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
-from pcii.reconstruct import reconstruct
+from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
 from pcii.segment import segment
 from pcii.types import (
@@ -40,6 +40,7 @@ __all__ = [
     "estimate_depth",
     "open_dataset",
     "reconstruct",
+    "reconstruct_each",
     "score",
     "segment",
 ]

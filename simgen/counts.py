@@ -19,7 +19,7 @@ from simgen.detector import Arrivals, detect, members, stop_counting
 from simgen.exposure import photons_per_radiance
 from simgen.noise import NOISE_SHARE, Probe, probe
 from simgen.photons import draw_photons
-from simgen.recipe import Recipe
+from simgen.recipe import MOST_PATHS, MOST_PHOTONS, Recipe
 from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energies
 
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
@@ -56,10 +56,16 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
     samples = seen.samples_for(gain)
     if recipe.products.radiance != "none":
         samples = max(samples, recipe.render.samples_per_pixel)
+    samples = min(samples, (MOST_PATHS - 1) // pixels)
     per_view = gain * seen.mean * pixels
     thinning_cost = PHOTON_COST * per_view
     dense_cost = (SAMPLE_COST * samples + PIXEL_COST) * pixels
     few = per_view * grid.view_count <= MOST_SINGLE_PHOTONS
+    if recipe.photons.nested and not few:
+        raise InputError(
+            f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
+            f"at most {MOST_SINGLE_PHOTONS} can be"
+        )
     relative = np.sqrt(seen.variance / (samples * pixels)) / seen.mean if seen.mean > 0 else 0.0
     return Plan(
         thins=kind != "scalar" and few and thinning_cost <= dense_cost,
@@ -108,6 +114,10 @@ def draw_from_views(
         raw = mosaic_of(k, l)
         if gain is not None:
             rates = raw * gain
+            if not np.nanmax(rates) <= MOST_PHOTONS:
+                raise InputError(
+                    f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
+                )
         else:
             rates = photon_rates(raw, cfa, photons, normalisers[number])
         rng = seeds.generator(recipe.seed, view=number, stage="photons")
@@ -175,11 +185,6 @@ def _photons_per_radiance(recipe: Recipe, seen: Probe) -> float:
 def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:
     """A row for each photon, with its scope and a random rank there, so that budgets can be nested."""
     total = int(arrivals.n.sum())
-    if total > MOST_SINGLE_PHOTONS:
-        raise InputError(
-            f"photons.nested: {total} photons are too many to be told apart; "
-            f"at most {MOST_SINGLE_PHOTONS} can be"
-        )
     grid = recipe.grid.camera_grid()
     rows = arrivals.take(np.arange(arrivals.k.size).repeat(arrivals.n))
     scope = rows.k * grid.cols + rows.l

@@ -105,6 +105,9 @@ def detect(arrivals: Arrivals, grid: CameraGrid, cfa: str | None, sensor: Sensor
 def stop_counting(counts: Arrivals, grid: CameraGrid, bits: int, seed: int) -> Arrivals:
     """Counts after a pixel's counter of so many bits has stopped; which came first is left to chance."""
     most = (1 << bits) - 1
+    if counts.object_id is not None:  # else nobody can tell which of a pixel's counts were kept
+        counts = counts.take(np.arange(counts.n.size).repeat(counts.n))
+        counts = replace(counts, n=np.ones(counts.n.size, dtype=np.int64))
     pixel = np.ravel_multi_index((counts.k, counts.l, counts.i, counts.j), grid.shape_KLHW)
     chance = seeds.generator(seed, view=0, stage="saturation").random(pixel.size)
     order = np.lexsort((chance, pixel))

@@ -1,4 +1,4 @@
-"""Fixtures shared by all tests: the small dataset, made once per worker."""
+"""Fixtures shared by all tests: small datasets, made once per worker."""
 
 from pathlib import Path
 
@@ -16,4 +16,30 @@ def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("data") / "small"
     recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"))
     generate(recipe, near, out)
+    return out
+
+
+@pytest.fixture(scope="session")
+def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """2 x 3 views of 64 x 60 with 400 photons each, of which 120 and 30 are kept as smaller budgets."""
+    from simgen.generate import generate
+    from simgen.recipe import Recipe
+
+    recipe = {
+        "scene": "two_objects",
+        "seed": 5,
+        "grid": {
+            "rows": 2,
+            "cols": 3,
+            "pitch_mm": [18.0, 18.0],
+            "pixel_mm": 0.5632,
+            "height": 64,
+            "width": 60,
+        },
+        "photons": {"budget": 400, "nested": [30, 120]},
+        "sensor": {"dark_counts": 0.01},
+        "analysis": {"z_mm": [540, 620], "z_range_mm": [500, 700]},
+    }
+    out = tmp_path_factory.mktemp("data") / "nested"
+    generate(Recipe.model_validate(recipe), Path(), out)
     return out

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 
 from pcii import cli as pcii_cli
 from pcii import console
@@ -134,6 +135,48 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
         pcii_cli.app, ["run", data, "-o", str(tmp_path / "full")], capsys
     )
     assert not Path(out).exists()
+
+
+def test_a_smaller_budget_is_asked_for_by_option(
+    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    data, totals = str(nested_dataset), []
+    for budget in ("400", "120", "30"):
+        out = tmp_path / budget
+        command = ["reconstruct", data, "--z-mm", "580", "-o", str(out)]
+        assert console.run(pcii_cli.app, [*command, "--budget", budget]) == 0
+        group = zarr.open_group(out / "sections.zarr", mode="r")
+        totals.append(int(np.asarray(group["counts"]).sum()))
+    # Of 6 views of 64 x 60 pixels with 0.01 dark counts each; at 580 mm some fall beside the section.
+    full = [6 * budget + 6 * 64 * 60 * 0.01 for budget in (400, 120, 30)]
+    assert all(0.6 * expected < found < 1.1 * expected for found, expected in zip(totals, full, strict=True))
+    whole = tmp_path / "whole"
+    assert console.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", str(whole)]) == 0
+    group = zarr.open_group(whole / "sections.zarr", mode="r")
+    assert int(np.asarray(group["counts"]).sum()) == totals[0]
+
+
+def test_every_command_takes_a_smaller_budget(
+    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    data, out = str(nested_dataset), str(tmp_path / "out")
+    small = ["--budget", "120"]
+    assert console.run(pcii_cli.app, ["run", data, "--z-mm", "540", "-o", out, *small]) == 0
+    assert console.run(pcii_cli.app, ["segment", data, "--z-mm", "540", "-o", out, *small]) == 0
+    assert console.run(pcii_cli.app, ["depth", data, "-o", out, *small]) == 0
+    assert console.run(pcii_cli.app, ["score", data, out, *small]) == 0
+    capsys.readouterr()
+    for command in (["score", data, out], ["depth", data, "-o", out, "--budget", "30"]):
+        assert "of another dataset or photon budget" in refusal(pcii_cli.app, command, capsys)
+
+
+def test_a_budget_that_is_not_there_is_refused(
+    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    command = ["depth", str(nested_dataset), "-o", str(tmp_path / "out"), "--budget", "31"]
+    assert "there are 400, 30, 120" in refusal(pcii_cli.app, command, capsys)
+    assert "budget" in refusal(pcii_cli.app, [*command[:-1], "few"], capsys)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_failure_is_one_line_and_exit_code_1(

@@ -8,7 +8,7 @@ from twins import bayer_photons, blocky_texture, section_twin, unit_grid
 
 from pcii.bayer import PATTERNS, mosaic
 from pcii.errors import InputError
-from pcii.reconstruct import reconstruct
+from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.types import CameraGrid, PhotonCounts, Views
 
 patterns = st.sampled_from([*PATTERNS, None])
@@ -191,6 +191,16 @@ def test_views_normalisation_darkens_the_border_and_overlap_does_not():
     assert set(ours.ravel()) == {3.0}
     assert paper[3, 3, 0] == 3.0
     assert paper[0, 0, 0] == 3.0 * 2 / 6  # only cameras (0, 0) and (0, 1) reach the corner
+
+
+def test_a_streamed_stack_is_the_stack():
+    grid = unit_grid(3, 3, 8, 8)
+    counts = PhotonCounts.from_dense(random_counts(grid, 4), grid, cfa="GRBG")
+    z = [0.7, 1.0, 3.0]
+    whole, parts = reconstruct(counts, z), list(reconstruct_each(counts, z))
+    assert [float(part.z_mm[0]) for part in parts] == z
+    np.testing.assert_array_equal(np.concatenate([part.counts for part in parts]), whole.counts)
+    np.testing.assert_array_equal(np.concatenate([part.coverage for part in parts]), whole.coverage)
 
 
 def test_planes_do_not_influence_each_other():

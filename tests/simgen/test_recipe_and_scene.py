@@ -59,6 +59,101 @@ def test_a_wrong_recipe_is_told_in_one_sentence(values: dict, message: str) -> N
     assert "\n" not in str(caught.value)
 
 
+def test_a_sensor_has_no_faults_and_a_recipe_no_exposure_unless_told() -> None:
+    recipe = validate(Recipe, {"scene": "x"}, "r.toml")
+    sensor = recipe.sensor
+    assert sensor.quantum_efficiency == (1, 1, 1)
+    assert sensor.dark_counts == sensor.hot_pixel_share == sensor.dead_pixel_share == 0
+    assert (sensor.counter_bits, sensor.full_light, recipe.exposure) == (None, None, None)
+    assert (recipe.photons.nested, recipe.photons.statistics) == ((), "poisson")
+
+
+def test_overrides_reach_the_sensor_the_exposure_and_nested_budgets() -> None:
+    told = ["photons.nested=[100, 300]", "sensor.counter_bits=1", "exposure.time_s=0.5"]
+    recipe, _ = load_recipe("paper", [*told, "sensor.full_light.adc_bits=10"])
+    assert recipe.photons.nested == (100, 300)
+    assert recipe.sensor.counter_bits == 1
+    assert recipe.exposure is not None
+    assert (recipe.exposure.f_number, recipe.exposure.time_s) == (8, 0.5)
+    assert recipe.sensor.full_light is not None
+    assert (recipe.sensor.full_light.adc_bits, recipe.sensor.full_light.full_well_e) == (10, 10_000)
+
+
+EXPOSED = {"f_number": 8.0, "time_s": 0.01}
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"photons": {"nested": [300, 1000]}}, "nested: every budget must be less than budget = 1000"),
+        ({"photons": {"nested": [2e3], "budget": 1500}}, "nested: every budget must be less than budget"),
+        ({"photons": {"nested": [300, 100, 300]}}, "nested: give each budget once"),
+        ({"photons": {"nested": [0]}}, "'photons.nested[0]': input should be greater than 0"),
+        ({"photons": {"nested": [100, -5]}}, "'photons.nested[1]': input should be greater than 0"),
+        ({"photons": {"nested": 100}}, "'photons.nested'"),
+        (
+            {"photons": {"statistics": "multinomial", "budget": 10.5}},
+            "with 'multinomial' statistics budgets are whole numbers",
+        ),
+        (
+            {"photons": {"statistics": "multinomial", "budget": 10, "nested": [2.5]}},
+            "with 'multinomial' statistics budgets are whole numbers",
+        ),
+        ({"photons": {"budget": 2e15}}, "'photons.budget': input should be less than or equal to"),
+        ({"photons": {"scope": "pixel"}}, "'view', 'channel', 'scene' or 'exposure', got 'pixel'"),
+        (
+            {"photons": {"scope": "exposure", "statistics": "multinomial"}, "exposure": EXPOSED},
+            "statistics: an exposure has no fixed total; use 'poisson'",
+        ),
+        (
+            {"photons": {"scope": "exposure", "nested": [10]}, "exposure": EXPOSED},
+            "nested: an exposure has no budget; use scope 'view', 'channel' or 'scene'",
+        ),
+        ({"photons": {"scope": "exposure"}}, "photons.scope: 'exposure' needs the table [exposure]"),
+        ({"sensor": {"full_light": {}}}, "sensor.full_light: a camera's images need the table [exposure]"),
+        ({"exposure": {"f_number": 0}}, "'exposure.f_number': input should be greater than 0, got 0"),
+        ({"exposure": {"time_s": -1}}, "'exposure.time_s'"),
+        ({"exposure": {"time_s": float("inf")}}, "'exposure.time_s'"),
+        ({"exposure": {"time": 1}}, "unknown key 'exposure.time'; did you mean 'time_s'?"),
+        ({"sensor": {"quantum_efficiency": [1, 0, 1]}}, "'sensor.quantum_efficiency[1]'"),
+        ({"sensor": {"quantum_efficiency": [1, 1, 1.01]}}, "'sensor.quantum_efficiency[2]'"),
+        ({"sensor": {"quantum_efficiency": [0.5]}}, "'sensor.quantum_efficiency"),
+        ({"sensor": {"dark_counts": -0.1}}, "'sensor.dark_counts'"),
+        ({"sensor": {"hot_pixel_share": 1.1}}, "'sensor.hot_pixel_share'"),
+        ({"sensor": {"hot_pixel_counts": -1}}, "'sensor.hot_pixel_counts'"),
+        ({"sensor": {"dead_pixel_share": -0.1}}, "'sensor.dead_pixel_share'"),
+        ({"sensor": {"counter_bits": 0}}, "'sensor.counter_bits'"),
+        ({"sensor": {"counter_bits": 33}}, "'sensor.counter_bits'"),
+        ({"sensor": {"counter_bits": 1.5}}, "'sensor.counter_bits'"),
+        ({"sensor": {"dark_count": 1}}, "unknown key 'sensor.dark_count'; did you mean 'dark_counts'?"),
+        ({"sensor": {"full_light": {"adc_bits": 25}}, "exposure": EXPOSED}, "'sensor.full_light.adc_bits'"),
+        ({"sensor": {"full_light": {"full_well_e": 0}}, "exposure": EXPOSED}, "full_light.full_well_e'"),
+        ({"sensor": {"full_light": {"read_noise_e": -1}}, "exposure": EXPOSED}, "full_light.read_noise_e'"),
+    ],
+)
+def test_a_wrong_sensor_or_light_is_told_in_one_sentence(values: dict, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        validate(Recipe, {"scene": "x"} | values, "r.toml")
+    assert message in str(caught.value)
+    assert str(caught.value).startswith("r.toml: ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "limit"),
+    [
+        ({"photons": {"nested": [999.9, 0.5]}}, "just below the budget"),
+        ({"photons": {"statistics": "multinomial", "nested": [1, 999]}}, "whole numbers"),
+        ({"photons": {"scope": "exposure"}, "exposure": {}}, "the exposure's defaults"),
+        ({"photons": {"budget": 1e15}}, "most photons"),
+        ({"sensor": {"counter_bits": 32, "hot_pixel_share": 1, "dead_pixel_share": 1}}, "all there is"),
+        ({"sensor": {"full_light": {"adc_bits": 1, "read_noise_e": 0}}, "exposure": EXPOSED}, "least"),
+    ],
+)
+def test_what_lies_just_within_the_limits_is_accepted(values: dict, limit: str) -> None:
+    assert validate(Recipe, {"scene": "x"} | values, limit).scene == "x"
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
