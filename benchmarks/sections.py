@@ -56,7 +56,7 @@ def by_scipy(images: np.ndarray, grid: CameraGrid) -> np.ndarray:
 
 def by_opencv(images: np.ndarray, grid: CameraGrid) -> np.ndarray:
     """The same with OpenCV."""
-    import cv2
+    import cv2  # pyright: ignore[reportMissingImports]
 
     mean = np.zeros(images.shape[2:4], dtype=np.float32)
     size = images.shape[3], images.shape[2]
@@ -121,7 +121,7 @@ def table() -> Iterator[str]:
 
 
 def _demosaicing() -> Iterator[str]:
-    import colour_demosaicing as peers
+    import colour_demosaicing as peers  # pyright: ignore[reportMissingImports]
 
     raw = np.random.default_rng(0).random((1024, 1024))
     own, _ = timed(lambda _: demosaic(raw, cfa="GRBG"), repeats=15)

@@ -204,11 +204,13 @@ def test_views_without_light_have_no_photons_of_any_budget() -> None:
     assert subset(black, made, 8).k.size == 0
 
 
-def test_too_many_photons_to_be_told_apart_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_many_photons_to_be_told_apart_are_refused_before_any_view_is_rendered(
+    monkeypatch: pytest.MonkeyPatch, two_objects: Built
+) -> None:
     monkeypatch.setattr(module, "MOST_SINGLE_PHOTONS", 300)
-    assert dense(recipe(photons={"budget": 120})).n.sum() > 300
-    with pytest.raises(InputError, match=r"photons\.nested: \d+ photons are too many"):
-        dense(recipe())
+    plan(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
+    with pytest.raises(InputError, match=r"photons\.nested: .* photons are too many"):
+        plan(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
 
 
 def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
