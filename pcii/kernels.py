@@ -241,27 +241,27 @@ def _merge_line(sums, variance, total, squares, first, by_row, by_col, phases, t
         rows = by_row[0, row] + by_row[1, row]
         for col in range(width):
             n = rows * (by_col[0, col] + by_col[1, col])
+            inverse, unbiased = 1 / max(n, 1), 1 / max(n - 1, 1)
             for colour in range(channels):
                 place = col * channels + colour
-                sums[line, col, colour] = total[0, line, place]
+                whole = total[0, line, place]
                 if variance.size:
-                    sums[line, col, colour] = total[0, line, place] + (
-                        first[0, line, place] * n if n else 0.0
-                    )
-                    spread = _spread(total[0, line, place], squares[0, line, place], n)
-                    variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
+                    spread = _spread(whole, squares[0, line, place], inverse)
+                    variance[line, col, colour] = spread * unbiased
+                    whole += first[0, line, place] * n if n > 0 else 0.0
+                sums[line, col, colour] = whole
         return
     for parity in range(2):
         for phase in range(2):  # red and blue have one group at each voxel
             p, q = (row + phases[phase, 0]) % 2, (parity + phases[phase, 1]) % 2
             rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
             for col in range(parity, width, 2):
-                n = rows * by_col[q, col]
-                sums[line, col, colour] = total[g, line, col]
+                whole, n = total[g, line, col], rows * by_col[q, col]
                 if variance.size:
-                    sums[line, col, colour] = total[g, line, col] + (first[g, line, col] * n if n else 0.0)
-                    spread = _spread(total[g, line, col], squares[g, line, col], n)
-                    variance[line, col, colour] = spread / (n - 1) if n > 1 else 0.0
+                    spread = _spread(whole, squares[g, line, col], 1 / max(n, 1))
+                    variance[line, col, colour] = spread / max(n - 1, 1)
+                    whole += first[g, line, col] * n if n > 0 else 0.0
+                sums[line, col, colour] = whole
         p, q = (row + phases[2, 0]) % 2, (parity + phases[2, 1]) % 2
         g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells lie across from each other
         for col in range(parity, width, 2):
@@ -269,22 +269,21 @@ def _merge_line(sums, variance, total, squares, first, by_row, by_col, phases, t
             a, b = total[g, line, col], total[h, line, col]
             whole = a + b
             if variance.size:
-                spread = _spread(a, squares[g, line, col], n) + _spread(b, squares[h, line, col], m)
-                if n > 0:
-                    whole += first[g, line, col] * n
-                if m > 0:
-                    whole += first[h, line, col] * m
-                if n > 0 and m > 0:
-                    apart = (first[h, line, col] - first[g, line, col]) + (b / m - a / n)
-                    spread += apart * apart * n * m / (n + m)
-                variance[line, col, 1] = spread / (n + m - 1) if n + m > 1 else 0.0
+                inverse, other = 1 / max(n, 1), 1 / max(m, 1)
+                spread = _spread(a, squares[g, line, col], inverse) + _spread(b, squares[h, line, col], other)
+                own = first[g, line, col] if n > 0 else 0.0
+                across = first[h, line, col] if m > 0 else 0.0
+                apart = (across - own) + (b * other - a * inverse)
+                spread += apart * apart * (n * m / max(n + m, 1))
+                variance[line, col, 1] = spread / max(n + m - 1, 1)
+                whole += own * n + across * m
             sums[line, col, 1] = whole
 
 
 @nb.njit(nogil=True, cache=True)
-def _spread(total, squares, n) -> float:
-    """Sum of squared deviations from the mean, of n numbers with this sum and sum of squares."""
-    return max(squares - total * total / n, 0.0) if n > 0 else 0.0
+def _spread(total, squares, inverse) -> float:
+    """Sum of squared deviations from the mean, of 1 / `inverse` numbers of this sum and sum of squares."""
+    return max(squares - total * total * inverse, 0.0)
 
 
 @compiled
