@@ -21,8 +21,7 @@ def scatter(
     counts: np.ndarray,
     rows: np.ndarray,
     cols: np.ndarray,
-    k: np.ndarray,
-    l: np.ndarray,
+    starts: np.ndarray,
     i: np.ndarray,
     j: np.ndarray,
     colour: np.ndarray,
@@ -31,18 +30,30 @@ def scatter(
 ) -> None:
     """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
 
-    `rows` (Z, K, h) and `cols` (Z, L, w) say where each pixel of each camera belongs. The sections are
-    cut into `bands` of rows each; a thread clears a band and looks through all photons for its own.
+    `rows` (Z, K, h) and `cols` (Z, L, w) say where each pixel of each camera belongs; `starts` (K L + 1,)
+    where each view's photons begin, which are sorted by row. The sections are cut into `bands` of rows
+    each; a thread clears a band and looks through the photons that fall there.
     """
     planes, height, width, _ = counts.shape
+    across = cols.shape[1]
     for part in nb.prange(planes * bands):
         plane, band = part // bands, part % bands
         first, last = height * band // bands, height * (band + 1) // bands
         counts[plane, first:last] = 0
-        for e in range(k.size):
-            row = rows[plane, k[e], i[e]]
-            if first <= row < last:
-                col = cols[plane, l[e], j[e]]
+        for view in range(starts.size - 1):
+            row_of, col_of = rows[plane, view // across], cols[plane, view % across]
+            low, high = starts[view], starts[view + 1]
+            while low < high:  # the first photon at or below the band's first row
+                middle = (low + high) // 2
+                if row_of[i[middle]] < first:
+                    low = middle + 1
+                else:
+                    high = middle
+            for e in range(low, starts[view + 1]):
+                row = row_of[i[e]]
+                if row >= last:
+                    break
+                col = col_of[j[e]]
                 if 0 <= col < width:
                     counts[plane, row, col, colour[e]] += n[e]
 

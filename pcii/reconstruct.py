@@ -80,10 +80,10 @@ def _scatter(
     events = data.events
     # No voxel gets more than the whole; half the bytes are half the time.
     counts = np.empty(shape, dtype=np.int32 if data.total < 2**31 else np.int64)
-    where = (events.k, events.l, events.i, events.j)
     # A band for each thread: of one section if there is but one, else a section is a band.
     bands = max(1, kernels.threads() // shape[0])
-    kernels.scatter(counts, rows, cols, *where, data.event_colours, events.n, bands)
+    photons = data.view_starts, events.i, events.j, data.event_colours, events.n
+    kernels.scatter(counts, rows, cols, *photons, bands)
     return counts
 
 

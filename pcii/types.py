@@ -262,13 +262,24 @@ class PhotonCounts:
         """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
         return read_only(colour_cells(self.cfa)[self.events.i % 2, self.events.j % 2])
 
+    @cached_property
+    def view_starts(self) -> np.ndarray:
+        """Where each view's events begin, (K L + 1,) int64: view k L + l ends where the next begins."""
+        view = self.events.k.astype(np.int64) * self.grid.cols + self.events.l
+        return read_only(np.searchsorted(view, np.arange(self.grid.view_count + 1)))
+
     def view(self, k: int, l: int) -> np.ndarray:
-        """Dense counts (H, W) of camera (k, l)."""
+        """Dense counts (H, W) of camera (k, l); `InputError` if there is none such."""
+        if not (0 <= k < self.grid.rows and 0 <= l < self.grid.cols):
+            raise InputError(
+                f"view: there is no camera ({k}, {l}) in a grid of {self.grid.rows} x {self.grid.cols}"
+            )
         if self._dense is not None:
             return self._dense[k, l]
         events = self.events
         image = np.zeros((self.grid.height, self.grid.width), dtype=np.int64)
-        here = (events.k == k) & (events.l == l)
+        number = k * self.grid.cols + l
+        here = slice(self.view_starts[number], self.view_starts[number + 1])
         image[events.i[here], events.j[here]] = events.n[here]
         return image
 

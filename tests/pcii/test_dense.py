@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from twins import colour_of, unit_grid, voxel_of
 
 from pcii.dense import BATCH
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
 from pcii.types import PhotonCounts, Views
-from tests.pcii.twins import colour_of, unit_grid, voxel_of
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 

@@ -310,3 +310,14 @@ def test_things_of_another_kind_are_refused_by_name():
         segment(counts, [1.0])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="above 0 mm and never NaN"):
         Truth(np.zeros((2, 2)), np.zeros((2, 2), dtype=int), {})
+
+
+@pytest.mark.parametrize("where", [(2, 0), (0, 3), (-1, 0)])
+def test_a_camera_that_is_not_there_has_no_view(where):
+    grid = unit_grid(2, 3, 4, 4)
+    dense = PhotonCounts.from_dense(np.ones((2, 3, 4, 4), dtype=np.int64), grid, cfa=None)
+    events = dense.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=None)
+    for counts in (dense, sparse):
+        with pytest.raises(InputError, match="no camera"):
+            counts.view(*where)
