@@ -11,10 +11,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from pcii.bayer import colour_cells
-from pcii.dense import sum_views
+from pcii.dense import sum_counts, sum_views
 from pcii.errors import InputError
 from pcii.geometry import target_indices
 from pcii.types import CameraGrid, Normalisation, PhotonCounts, Sections, Views, check_z_mm
+
+MUCH_LIGHT = 1 / 16
+"""Where a larger share of the pixels caught photons, adding whole images takes less time than every photon:
+some 0.3 ns for a pixel against 5 ns for a photon."""
 
 
 def reconstruct(
@@ -49,7 +53,14 @@ def reconstruct(
     grid, spread = data.grid, None
     shape = (z.size, grid.height * subpixel, grid.width * subpixel, data.channel_count)
     rows, cols = _targets(grid, z, subpixel)
-    if isinstance(data, PhotonCounts):
+    if (
+        isinstance(data, PhotonCounts)
+        and not data.is_sparse
+        and subpixel == 1
+        and data.lit_share > MUCH_LIGHT
+    ):
+        sums = sum_counts(data, z)
+    elif isinstance(data, PhotonCounts):
         sums = _scatter(data, shape, rows, cols)
     elif subpixel > 1:
         sums = _fine_sums(data, z, subpixel)

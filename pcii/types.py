@@ -247,6 +247,18 @@ class PhotonCounts:
         """Whether the counts are kept as events."""
         return self._events is not None
 
+    @property
+    def dense(self) -> np.ndarray:
+        """The counts (K, L, H, W) as they are kept; only if they are not sparse."""
+        assert self._dense is not None
+        return self._dense
+
+    @cached_property
+    def lit_share(self) -> float:
+        """Share of the pixels that caught photons."""
+        lit = self.events.n.size if self._dense is None else int(np.count_nonzero(self._dense))
+        return lit / max(math.prod(self.grid.shape_KLHW), 1)
+
     @cached_property
     def events(self) -> PhotonEvents:
         """The counts as events, one per pixel that caught photons, in (k, l, i, j) order."""

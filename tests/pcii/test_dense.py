@@ -122,3 +122,24 @@ def test_variance_is_told_of_views_on_whole_pixels_only() -> None:
     counts = PhotonCounts.from_dense(np.ones((2, 2, 4, 4), dtype=np.int64), grid, cfa=None)
     with pytest.raises(InputError, match="variance"):
         reconstruct(counts, 1.0, variance=True)
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    z=st.floats(0.3, 8),
+    cfa=patterns,
+    most=st.sampled_from([1, 255, 65_535, 10**9]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_bright_counts_are_the_same_as_images_and_as_photons(cameras, pixels, z, cfa, most, seed) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    kind = {1: np.uint8, 255: np.uint8, 65_535: np.uint16, 10**9: np.int64}[most]
+    dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True).astype(kind)
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    as_images, as_photons = reconstruct(bright, z), reconstruct(sparse, z)
+    np.testing.assert_array_equal(as_images.counts, as_photons.counts)
+    np.testing.assert_array_equal(as_images.coverage, as_photons.coverage)
