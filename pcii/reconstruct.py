@@ -18,7 +18,7 @@ from pcii.types import CameraGrid, Normalisation, PhotonCounts, Sections, Views,
 
 MUCH_LIGHT = 1 / 16
 """Where a larger share of the pixels caught photons, adding whole images takes less time than every photon:
-some 0.3 ns for a pixel against 5 ns for a photon."""
+measured on 100 views of 1024 x 1024, 24 ms for the images and 26 ms for the photons of 5.8 % of their pixels."""
 
 
 def reconstruct(
