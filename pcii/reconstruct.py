@@ -17,8 +17,10 @@ from pcii.geometry import target_indices
 from pcii.types import CameraGrid, Normalisation, PhotonCounts, Sections, Views, check_z_mm
 
 MUCH_LIGHT = 1 / 16
-"""Where a larger share of the pixels caught photons, adding whole images takes less time than every photon:
-measured on 100 views of 1024 x 1024, 24 ms for the images and 26 ms for the photons of 5.8 % of their pixels."""
+"""Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.
+
+Measured on 100 views of 1024 x 1024: 24 ms for the images, 26 ms for the photons of 5.8 % of their pixels.
+"""
 
 
 def reconstruct(
