@@ -106,6 +106,7 @@ class Pool:
         )
         self.side_px = _signed(mi, majorant.side_px)
         self.bound, self.shade = _floats(mi, majorant.bound), _floats(mi, majorant.shade)
+        self.dim = _floats(mi, majorant.dim)
         self.ambient = mi.Color3f(*(_opaque(mi.Float, part) for part in ambient))
         self.entry_of = _signed(mi, majorant.entry_of)
         self.layer_at = _signed(mi, frame.layer_at)
@@ -186,7 +187,8 @@ def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed:
     first = hit_first(setup.built, ray, lanes.inside, pool.ambient)
     where = lanes.entry * setup.channels + lanes.colour
     bound, shade = dr.gather(mi.Float, pool.bound, where), dr.gather(mi.Float, pool.shade, where)
-    most = dr.minimum(bound, shade * _of_colour(dr, _sensed(setup, first.guess), lanes.colour))
+    guess = _of_colour(dr, _sensed(setup, first.guess), lanes.colour)
+    most = dr.minimum(bound, dr.maximum(shade * guess, dr.gather(mi.Float, pool.dim, lanes.colour)))
     promising = lanes.inside & (sampler.next_1d() * bound < most)
     promising &= mi.UInt32(pool.owner(lanes, first.z_mm)) == lanes.entry
     chance = sampler.next_1d()
@@ -293,7 +295,7 @@ def _take(dr: Any, lanes: Record, index: Any) -> Record:
 def _nothing(channels: int) -> Found:
     """No photons: the renderer's arrays cannot be empty everywhere."""
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
-    over = Samples(whole, whole, whole, whole, real, colours, colours, whole, real)
+    over = Samples(whole, whole, whole, whole, real, colours, colours)
     object_id = np.zeros(0, np.int16)
     return Found(whole, whole, whole, whole, whole, real, real, object_id, real, whole, real, over)
 
@@ -306,14 +308,11 @@ def _samples(pool: Pool, lanes: _Lanes, first: FirstHits, light: Any) -> Samples
     dr.eval(vars(lanes), guess, brought, first.z_mm)
     seen = np.full((len(lanes.k), setup.channels), np.nan)
     seen[: len(light[0])] = np.stack([np.array(part) for part in brought], axis=1)
-    entry = np.array(lanes.entry)
     return Samples(
         **{name: np.array(getattr(lanes, name)).astype(np.int64) for name in ("k", "l", "row", "col")},
         z_mm=np.array(first.z_mm),
         guess=np.stack([np.array(part) for part in guess], axis=1).astype(np.float64),
         light=seen,
-        entry=entry,
-        density=pool.majorant.bound.mean(axis=1)[entry],
     )
 
 

@@ -10,7 +10,8 @@ exactly the light there is, however wrong the guess; what the guess decides is t
 A first hit comes with a guess of its radiance that needs no light path: unshadowed light of the lamps.
 A tile has two numbers per colour: `bound`, which its radiance does not exceed, and `shade`, how many
 times its own guess a path's radiance is at most. A candidate whose guess is low can so be rejected before
-any light is looked for.
+any light is looked for. Nothing is ever taken to be darker than a coarse tile, in no colour: no place may be
+left out for having looked black.
 
 Shifts and tiles are even, so that a tile holds whole Bayer cells. Plain NumPy; see `candidates` for use.
 """
@@ -31,6 +32,7 @@ MOST_LAYERS = 64
 DIM_SHARE = 0.08
 """Coarse tiles take what is dimmer than this share of the mean radiance."""
 DIM_MARGIN = 1.5
+"""Their bound is so many times that."""
 SMALL_SAMPLE = 16
 """A bound comes from at least so many followed paths."""
 FAINT = 4.0
@@ -51,7 +53,7 @@ class Samples:
     """Paths (N,): where they went through which film, and what they brought.
 
     `guess` and `light` are (N, C); `light` is NaN for paths that were not followed beyond the first
-    hit. `entry` is what each was drawn from, `density` its bound's mean over colours.
+    hit.
     """
 
     k: np.ndarray
@@ -61,8 +63,6 @@ class Samples:
     z_mm: np.ndarray
     guess: np.ndarray
     light: np.ndarray
-    entry: np.ndarray
-    density: np.ndarray
 
     @property
     def followed(self) -> np.ndarray:
@@ -186,7 +186,7 @@ class Majorant:
     """
 
     def __init__(self, grid: CameraGrid, frame: Frame, dim: np.ndarray) -> None:
-        self.frame = frame
+        self.frame, self.dim = frame, dim
         self.coarse_px = COARSE_TILES * tile_px_for(grid)
         self.coarse_cols = -(-grid.width // self.coarse_px)
         self.coarse_count = -(-grid.height // self.coarse_px) * self.coarse_cols
@@ -210,18 +210,19 @@ class Majorant:
         return owner
 
     def list_tiles(self, tiles: np.ndarray, bound: np.ndarray, shade: np.ndarray) -> None:
-        """Add tiles (N,), each once and not listed before, with bound and shade (N, C)."""
+        """Add tiles (N,), each once and not listed before, with bound, `dim` at least, and shade (N, C)."""
         layer, row, col = self.frame.split(tiles)
         self.entry_of[tiles] = np.arange(self.layer.size, self.layer.size + tiles.size)
         self.layer, self.row = np.append(self.layer, layer), np.append(self.row, row)
         self.col = np.append(self.col, col)
-        self.bound = np.concatenate([self.bound, bound])
+        self.bound = np.concatenate([self.bound, np.maximum(bound, self.dim)])
         self.shade = np.concatenate([self.shade, shade])
 
     def scale(self, factor: float) -> None:
         """Multiply the limits of all listed tiles."""
-        self.bound[self.coarse_count :] *= factor
-        self.shade[self.coarse_count :] *= factor
+        listed = slice(self.coarse_count, None)
+        self.bound[listed] = np.maximum(self.bound[listed] * factor, self.dim)
+        self.shade[listed] *= factor
 
     def lift(self, over: Samples) -> None:
         """Raise the limits, of the tiles of these paths and those around them, above what they brought."""

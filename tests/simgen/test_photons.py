@@ -295,6 +295,35 @@ def test_the_number_of_threads_changes_nothing(scene: Built) -> None:
         np.testing.assert_array_equal(getattr(many, name), getattr(alone, name))
 
 
+def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
+    # Little more than a pixel wide: a tile holds red that has no blue, and blue that has no red.
+    stripes = [
+        {
+            "name": f"stripe{number}",
+            "position_mm": (30.0 * number - 225.0, 0.0, 600.0),
+            "shape": {"type": "card", "width_mm": 30.0, "height_mm": 400.0},
+            "material": {"reflectance": (1.0, 0.0, 0.0) if number % 2 else (0.0, 0.0, 1.0)},
+        }
+        for number in range(16)
+    ]
+    scene = lit(stripes)
+    counts = np.sum([counted(draw(scene, seed, budget=50_000)) for seed in range(3)], axis=0)
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 150_000.0)
+    colours = colour_index(32, 32, "GRBG")
+    for colour in range(3):
+        found, own = counts[:, colours == colour].ravel(), expected[:, colours == colour].ravel()
+        assert found[own == 0].sum() == 0
+        found, own = found[own > 1], own[own > 1]  # chi-square wants a photon or two
+        assert stats.chi2.sf(((found - own) ** 2 / own).sum(), own.size) > 1e-3, "RGB"[colour]
+        # The fault: where a colour is dark beside another it gets too little.
+        missing = np.where(own < np.median(own), 0.8, 1.0) * own
+        assert stats.chi2.sf(((found - missing) ** 2 / missing).sum(), own.size) < 1e-3
+
+
 def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
     # 6 mm of film at 100 000 times the brightness of what is around: most of the light is in few pixels.
     lamp = {
