@@ -17,7 +17,7 @@ from simgen.render import render_view
 from simgen.sensor import sense
 
 NOISE_SHARE = 0.01
-MOST_SAMPLES = 1024
+MOST_SAMPLES = 64
 PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
