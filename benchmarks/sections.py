@@ -14,8 +14,9 @@ import numpy as np
 from benchmarks.timing import timed
 from pcii.demosaic import demosaic
 from pcii.geometry import disparity_px, nearest_shifts_px
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
-from pcii.types import CameraGrid, PhotonCounts, Views
+from pcii.types import CameraGrid, Views
 
 Z_MM = 540.0
 PLANES = 64

@@ -9,19 +9,11 @@ from pcii.dataset import Dataset, open_dataset
 from pcii.demosaic import demosaic
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
 from pcii.segment import segment
-from pcii.types import (
-    CameraGrid,
-    DepthMap,
-    PhotonCounts,
-    Score,
-    Sections,
-    Segmented,
-    Truth,
-    Views,
-)
+from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
 
 __version__ = "0.1.0"
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from pcii.bayer import check_cfa
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.store import (
     COUNTS,
     MANIFEST,
@@ -22,7 +23,7 @@ from pcii.store import (
     read_exr,
     read_manifest,
 )
-from pcii.types import CameraGrid, PhotonCounts, PhotonTruth, Truth, Views
+from pcii.types import CameraGrid, PhotonTruth, Truth, Views
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,8 @@ import numpy as np
 from pcii.bayer import colour_cells
 from pcii.errors import InputError
 from pcii.geometry import nearest_shifts_px
-from pcii.types import PhotonCounts, Views
+from pcii.photon_counts import PhotonCounts
+from pcii.types import Views
 
 BATCH = 8
 """Views that are held at a time when they are read from disk."""
@@ -44,10 +45,8 @@ def sum_views(data: Views, z: np.ndarray, *, variance: bool) -> tuple[np.ndarray
         finite = all(plane.finish() for plane in planes) and finite
     if not finite:
         _name_the_bad_one(data)
-    sums = np.stack([plane.sums for plane in planes]) if len(planes) > 1 else planes[0].sums[None]
-    if not variance:
-        return sums, None
-    return sums, np.stack([p.variance for p in planes]) if len(planes) > 1 else planes[0].variance[None]
+    sums = _stacked([plane.sums for plane in planes])
+    return sums, _stacked([plane.variance for plane in planes]) if variance else None
 
 
 def sum_counts(data: PhotonCounts, z: np.ndarray) -> np.ndarray:
@@ -59,7 +58,12 @@ def sum_counts(data: PhotonCounts, z: np.ndarray) -> np.ndarray:
     planes = [_Plane(data, depth, np.int64, spread=False) for depth in z]
     for plane in planes:
         plane.sum(np.arange(data.grid.view_count), images)
-    return np.stack([plane.sums for plane in planes])
+    return _stacked([plane.sums for plane in planes])
+
+
+def _stacked(planes: list[np.ndarray]) -> np.ndarray:
+    """Planes as one array; a single one without copying it."""
+    return np.stack(planes) if len(planes) > 1 else planes[0][None]
 
 
 class _Plane:

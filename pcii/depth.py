@@ -7,7 +7,8 @@ import numpy as np
 from pcii.errors import InputError
 from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
 from pcii.likelihood import cells_to_pixels, flat_deviation, focus_scores, photons_nearby
-from pcii.types import DepthMap, PhotonCounts, check_depth_counts, check_z_mm
+from pcii.photon_counts import PhotonCounts, check_depth_counts
+from pcii.types import DepthMap, check_z_mm
 
 PLANE_STEP_PX = 1.0
 """Planes differ by this much in total disparity spread: finer than a pixel nothing can be told."""

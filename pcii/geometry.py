@@ -8,7 +8,8 @@ likewise in rows, so a camera further right sees it further LEFT.
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.types import CameraGrid, PhotonEvents, PhotonTruth
+from pcii.photon_counts import PhotonEvents
+from pcii.types import CameraGrid, PhotonTruth
 
 
 def camera_position_mm(grid: CameraGrid, k: float, l: float) -> tuple[float, float]:

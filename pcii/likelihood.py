@@ -16,8 +16,8 @@ import numpy as np
 
 from pcii import statistics
 from pcii.geometry import landing
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import coverage_of
-from pcii.types import PhotonCounts
 
 BLOCK_PX = 2
 """Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.

@@ -14,7 +14,8 @@ from pcii.bayer import colour_cells
 from pcii.dense import sum_counts, sum_views
 from pcii.errors import InputError
 from pcii.geometry import target_indices
-from pcii.types import CameraGrid, Normalisation, PhotonCounts, Sections, Views, check_z_mm
+from pcii.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, Normalisation, Sections, Views, check_z_mm
 
 MUCH_LIGHT = 1 / 16
 """Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.

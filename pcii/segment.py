@@ -7,11 +7,12 @@ import numpy as np
 from pcii.errors import InputError
 from pcii.foreground import SMALLEST_REGION_PX, outlined
 from pcii.likelihood import cells_to_pixels, focus_scores
+from pcii.photon_counts import PhotonCounts, check_depth_counts
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import pooled_estimate, section_window_px
 from pcii.three_step import three_step
-from pcii.types import PhotonCounts, Segmented, check_depth_counts, check_z_mm
+from pcii.types import Segmented, check_z_mm
 
 FOCUS_SIGMA_PX = 20.0
 

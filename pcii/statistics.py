@@ -11,7 +11,8 @@ from itertools import pairwise
 import numpy as np
 
 from pcii.geometry import landing
-from pcii.types import CameraGrid, PhotonCounts, Sections
+from pcii.photon_counts import PhotonCounts
+from pcii.types import CameraGrid, Sections
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""

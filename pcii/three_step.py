@@ -15,6 +15,7 @@ import numpy as np
 
 from pcii.foreground import SMALLEST_REGION_PX, connected_pieces, outlined
 from pcii.geometry import blur_half_extent_px
+from pcii.photon_counts import PhotonCounts
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
@@ -26,7 +27,7 @@ from pcii.statistics import (
     truncated_poisson_variance,
     view_samples,
 )
-from pcii.types import PhotonCounts, Sections, Segmented
+from pcii.types import Sections, Segmented
 
 WINDOW_CELLS = 4
 PHOTONS_PER_SAMPLE = 5.0

@@ -43,13 +43,7 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
         plugins[BACKDROP] = {
             "type": "rectangle",
             "to_world": facing @ _card_pose(mi, 2 * half, 2 * half),
-            "bsdf": {
-                "type": "twosided",
-                "bsdf": {
-                    "type": "diffuse",
-                    "reflectance": {"type": "rgb", "value": _linear(wall.reflectance)},
-                },
-            },
+            "bsdf": _two_sided(_matt(_evenly(wall.reflectance))),
         }
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light)
@@ -78,7 +72,7 @@ def _object(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     pose = T().translate(list(thing.position_mm))
     for axis, degrees in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True):
         pose = pose @ T().rotate(list(axis), degrees)
-    return {**_shape(mi, thing.shape, pose, folder), "bsdf": _material(mi, thing, folder)}
+    return {**_shape(mi, thing.shape, pose, folder), "bsdf": _two_sided(_surface(mi, thing, folder))}
 
 
 def _shape(mi: Any, shape: Sphere | Card | Mesh, pose: Any, folder: Path) -> dict[str, Any]:
@@ -106,15 +100,24 @@ def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
 
 
-def _material(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
-    # Two-sided, so that a card or an open mesh seen from behind is not a black hole.
-    return {"type": "twosided", "bsdf": _surface(mi, thing, folder)}
+def _two_sided(surface: dict[str, Any]) -> dict[str, Any]:
+    """The same from behind, so that a card or an open mesh is no black hole there."""
+    return {"type": "twosided", "bsdf": surface}
+
+
+def _matt(reflectance: dict[str, Any]) -> dict[str, Any]:
+    return {"type": "diffuse", "reflectance": reflectance}
+
+
+def _evenly(srgb: tuple[float, float, float]) -> dict[str, Any]:
+    """One colour all over."""
+    return {"type": "rgb", "value": srgb_to_linear(np.array(srgb)).tolist()}
 
 
 def _surface(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     match thing.material.finish:
         case Matt():
-            return {"type": "diffuse", "reflectance": _reflectance(mi, thing, folder)}
+            return _matt(_reflectance(mi, thing, folder))
         case Plastic(roughness=alpha):
             return {
                 "type": "roughplastic",
@@ -130,7 +133,7 @@ def _reflectance(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
     material = thing.material
     if material.texture is None:
         assert material.reflectance is not None
-        return {"type": "rgb", "value": _linear(material.reflectance)}
+        return _evenly(material.reflectance)
     path = asset(folder, material.texture, "material.texture")
     pixels = _read_image(path)
     if isinstance(thing.shape, Card):
@@ -143,10 +146,6 @@ def _reflectance(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
         "wrap_mode": "repeat" if isinstance(thing.shape, Sphere) else "clamp",
     }
-
-
-def _linear(srgb: tuple[float, float, float]) -> list[float]:
-    return srgb_to_linear(np.array(srgb)).tolist()
 
 
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:

@@ -34,14 +34,9 @@ class Setup:
 
 
 @dataclass(frozen=True)
-class Found:
-    """Paths (N,) that gave photons: candidate's number, camera, film point, first hit, and how many.
+class PhotonPaths:
+    """Paths (N,) of photons: camera (k, l), pixel (i, j), film point, first hit's `object_id` and `z_mm`."""
 
-    `ratio` (F,) is radiance by limit of all paths that were followed beyond their first hit, `over`
-    those that exceeded it.
-    """
-
-    candidate: np.ndarray
     k: np.ndarray
     l: np.ndarray
     i: np.ndarray
@@ -50,6 +45,17 @@ class Found:
     col_px: np.ndarray
     object_id: np.ndarray
     z_mm: np.ndarray
+
+
+@dataclass(frozen=True)
+class Found(PhotonPaths):
+    """Paths that gave photons, the number of the `candidate` of each, and how many it gave (`copies`).
+
+    `ratio` (F,) is radiance by limit of all paths that were followed beyond their first hit, `over`
+    those that exceeded it.
+    """
+
+    candidate: np.ndarray
     copies: np.ndarray
     ratio: np.ndarray
     over: Samples
@@ -137,8 +143,7 @@ class Pool:
         layer = dr.gather(mi.Int32, self.layer, entry)
         film = layer < 0
         layer = dr.maximum(layer, 0)
-        shift_row = dr.select(film, 0, dr.gather(mi.Int32, self.row_shift, layer * grid.rows + mi.Int32(k)))
-        shift_col = dr.select(film, 0, dr.gather(mi.Int32, self.col_shift, layer * grid.cols + mi.Int32(l)))
+        shift_row, shift_col = (dr.select(film, 0, shift) for shift in self._shifts(layer, k, l))
         # One number gives the pixel (its whole part) and the place within the pixel (the rest).
         down, right = sampler.next_1d() * mi.Float(side // 2), sampler.next_1d() * mi.Float(side // 2)
         row = dr.gather(mi.Int32, self.row, entry) * side + 2 * mi.Int32(down) + mi.Int32(cell >> 1)
@@ -153,19 +158,23 @@ class Pool:
     def owner(self, lanes: _Lanes, z_mm: Any) -> Any:
         """The entry that each lane's path belongs to (see `majorant`)."""
         mi, dr, frame = self.setup.built.mi, load_drjit(), self.majorant.frame
-        grid = self.setup.grid
         nearness = dr.minimum(self.nearness_mm / z_mm, self.last_step)
         own = dr.gather(mi.Int32, self.layer_at, mi.UInt32(dr.round(nearness)))
         coarse_px, across = self.majorant.coarse_px, self.majorant.coarse_cols
         owner = lanes.row // coarse_px * across + lanes.col // coarse_px
         for aside in reversed(NEXT_LAYERS):
             layer = dr.clip(own + aside, 0, self.last_layer)
-            shift_row = _at(dr, self.row_shift, layer * grid.rows + mi.Int32(lanes.k), lanes.inside)
-            shift_col = _at(dr, self.col_shift, layer * grid.cols + mi.Int32(lanes.l), lanes.inside)
+            shift_row, shift_col = self._shifts(layer, lanes.k, lanes.l, lanes.inside)
             row, col = (lanes.row + shift_row) // frame.tile_px, (lanes.col + shift_col) // frame.tile_px
             listed = _at(dr, self.entry_of, (layer * self.rows + row) * self.cols + col, lanes.inside)
             owner = dr.select(listed < 0, owner, listed)
         return owner
+
+    def _shifts(self, layer: Any, k: Any, l: Any, active: Any = True) -> tuple[Any, Any]:
+        """Rows and columns by which a layer's tiles are moved in each lane's view."""
+        mi, dr, grid = self.setup.built.mi, load_drjit(), self.setup.grid
+        down = _at(dr, self.row_shift, layer * grid.rows + mi.Int32(k), active)
+        return down, _at(dr, self.col_shift, layer * grid.cols + mi.Int32(l), active)
 
 
 def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed: int) -> Found:
@@ -182,9 +191,7 @@ def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed:
         return _nothing(setup.channels)
     mi, dr = setup.built.mi, load_drjit()
     sampler = _sampler(mi, seed, group.size)
-    lanes = pool.draw(sampler, _unsigned(mi, group), _views(setup, sampler, view))
-    ray = film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
-    first = hit_first(setup.built, ray, lanes.inside, pool.ambient)
+    lanes, first = _first_seen(pool, sampler, _unsigned(mi, group), view)
     where = lanes.entry * setup.channels + lanes.colour
     bound, shade = dr.gather(mi.Float, pool.bound, where), dr.gather(mi.Float, pool.shade, where)
     guess = _of_colour(dr, _sensed(setup, first.guess), lanes.colour)
@@ -216,7 +223,7 @@ def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed:
         object_id=setup.built.object_of_shape[np.array(hit.shape)],
         z_mm=np.array(hit.z_mm),
         copies=np.array(copies).astype(np.int64),
-        over=_samples(pool, _take(dr, lanes, over), _take(dr, first, over), _take_one(dr, light, over))
+        over=_samples(pool, _take(dr, lanes, over), _take(dr, first, over), _at(dr, light, over))
         if len(over)
         else _nothing(setup.channels).over,
         ratio=np.array(ratio),
@@ -231,9 +238,7 @@ def look_around(pool: Pool, number: int, follow: int, seed: int) -> Samples:
     setup = pool.setup
     mi, dr = setup.built.mi, load_drjit()
     sampler = _sampler(mi, seed, number)
-    lanes = pool.draw(sampler, dr.zeros(mi.UInt32, number), _views(setup, sampler, None))
-    ray = film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
-    first = hit_first(setup.built, ray, lanes.inside, pool.ambient)
+    lanes, first = _first_seen(pool, sampler, dr.zeros(mi.UInt32, number), None)
     dr.eval(vars(lanes), vars(first))
     inside = dr.compress(lanes.inside)
     lanes, first = _take(dr, lanes, inside), _take(dr, first, inside)
@@ -248,6 +253,17 @@ def _sampler(mi: Any, seed: int, size: int) -> Any:
     return sampler
 
 
+def _first_seen(pool: Pool, sampler: Any, group: Any, view: np.ndarray | None) -> tuple[_Lanes, FirstHits]:
+    """A candidate for each lane, and what it hits first."""
+    setup = pool.setup
+    lanes = pool.draw(sampler, group, _views(setup, sampler, view))
+    return lanes, hit_first(setup.built, _rays(setup, lanes), lanes.inside, pool.ambient)
+
+
+def _rays(setup: Setup, lanes: _Lanes) -> Any:
+    return film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
+
+
 def _views(setup: Setup, sampler: Any, view: np.ndarray | None) -> Any:
     """The lanes' views, drawn evenly if they are not given."""
     mi, count = setup.built.mi, setup.grid.view_count
@@ -258,11 +274,9 @@ def _views(setup: Setup, sampler: Any, view: np.ndarray | None) -> Any:
 
 def _follow(setup: Setup, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
     """Radiance along one path from each first hit, RGB."""
-    mi = setup.built.mi
-    ray = film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
     # Another sampler than the candidates', whose numbers decided which lanes are here.
-    sampler = _sampler(mi, seed ^ 0x9E3779B9, len(lanes.k))
-    return radiance_along(setup.built, ray, first.record, sampler, setup.max_depth)
+    sampler = _sampler(setup.built.mi, seed ^ 0x9E3779B9, len(lanes.k))
+    return radiance_along(setup.built, _rays(setup, lanes), first.record, sampler, setup.max_depth)
 
 
 def _sensed(setup: Setup, rgb: Any) -> list[Any]:
@@ -279,17 +293,13 @@ def _of_colour(dr: Any, values: list[Any], colour: Any) -> Any:
     return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))
 
 
-def _at(dr: Any, table: Any, index: Any, active: Any = True) -> Any:
-    return dr.gather(type(table), table, index, active)
-
-
-def _take_one(dr: Any, array: Any, index: Any) -> Any:
-    return dr.gather(type(array), array, index)
+def _at(dr: Any, array: Any, index: Any, active: Any = True) -> Any:
+    return dr.gather(type(array), array, index, active)
 
 
 def _take(dr: Any, lanes: Record, index: Any) -> Record:
     """Some lanes of a record of arrays."""
-    return type(lanes)(**{name: _take_one(dr, array, index) for name, array in vars(lanes).items()})
+    return type(lanes)(**{name: _at(dr, array, index) for name, array in vars(lanes).items()})
 
 
 def _nothing(channels: int) -> Found:
@@ -297,7 +307,7 @@ def _nothing(channels: int) -> Found:
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
     over = Samples(whole, whole, whole, whole, real, colours, colours)
     object_id = np.zeros(0, np.int16)
-    return Found(whole, whole, whole, whole, whole, real, real, object_id, real, whole, real, over)
+    return Found(whole, whole, whole, whole, real, real, object_id, real, whole, whole, real, over)
 
 
 def _samples(pool: Pool, lanes: _Lanes, first: FirstHits, light: Any) -> Samples:

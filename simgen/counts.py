@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from pcii.bayer import channel_count, colour_index
+from pcii.bayer import channel_count
 from pcii.console import Report
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_arrays_safely
-from pcii.types import CameraGrid, PhotonCounts
+from pcii.types import CameraGrid
 from simgen import seeds
 from simgen.build import Built
 from simgen.candidates import Setup
 from simgen.detector import Arrivals, detect, members, stop_counting
 from simgen.exposure import photons_per_radiance
 from simgen.noise import NOISE_SHARE, Probe, probe
-from simgen.photons import draw_photons
+from simgen.photons import draw_photons, places
 from simgen.recipe import MOST_PATHS, MOST_PHOTONS, Recipe
 from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energies
 
@@ -191,11 +192,10 @@ def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:
     if recipe.photons.scope == "scene":
         scope = np.zeros_like(scope)
     elif recipe.photons.scope == "channel" and recipe.cfa is not None:
-        scope = 3 * scope + colour_index(2, 2, recipe.cfa)[rows.i % 2, rows.j % 2]
+        scope = 3 * scope + rows.colours(recipe.cfa)
     order = np.lexsort((seeds.generator(recipe.seed, view=1, stage="nested").random(total), scope))
-    number = np.bincount(scope)
     rank = np.empty(total, dtype=np.int64)
-    rank[order] = np.arange(total) - (np.cumsum(number) - number)[scope[order]]
+    rank[order] = places(scope[order])
     return Arrivals(rows.k, rows.l, rows.i, rows.j, np.ones(total, dtype=np.int64), scope, rank)
 
 

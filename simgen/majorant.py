@@ -113,6 +113,10 @@ class Frame:
         layer = np.clip(self.layer_of(samples.z_mm) + aside, 0, len(self.row_shift) - 1)
         row = (samples.row + self.row_shift[layer, samples.k]) // self.tile_px
         col = (samples.col + self.col_shift[layer, samples.l]) // self.tile_px
+        return self.flat(layer, row, col)
+
+    def flat(self, layer: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
+        """One index for the tile (row, column) of a layer."""
         return (layer * self.rows + row) * self.cols + col
 
     def split(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -124,18 +128,18 @@ class Frame:
     def around(self, tiles: np.ndarray) -> np.ndarray:
         """Flat indices (N, 9) of each tile and its neighbours; the border's own beyond the border."""
         layer, row, col = self.split(tiles)
-        near_row = np.clip(row[:, None] + _AROUND[:, 0], 0, self.rows - 1)
-        near_col = np.clip(col[:, None] + _AROUND[:, 1], 0, self.cols - 1)
-        return (layer[:, None] * self.rows + near_row) * self.cols + near_col
+        return self._beside(layer, row, col, _AROUND)
 
     def ring(self, doubled: np.ndarray) -> np.ndarray:
         """Flat indices (N, 16) of the 2 x 2 tiles that each tile of twice the size holds, and around."""
-        cols = self.cols // 2
-        rest, col = np.divmod(doubled, cols)
-        layer, row = np.divmod(rest, self.rows // 2)
-        near_row = np.clip(2 * row[:, None] + _RING[:, 0], 0, self.rows - 1)
-        near_col = np.clip(2 * col[:, None] + _RING[:, 1], 0, self.cols - 1)
-        return (layer[:, None] * self.rows + near_row) * self.cols + near_col
+        layer, row, col = self.merged(2).split(doubled)
+        return self._beside(layer, 2 * row, 2 * col, _RING)
+
+    def _beside(self, layer: np.ndarray, row: np.ndarray, col: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+        """Flat indices (N, M) of the tiles at M offsets from each; of those on the border beyond it."""
+        near_row = np.clip(row[:, None] + offsets[:, 0], 0, self.rows - 1)
+        near_col = np.clip(col[:, None] + offsets[:, 1], 0, self.cols - 1)
+        return self.flat(layer[:, None], near_row, near_col)
 
     def merged(self, side: int) -> "Frame":
         """The same layers with tiles of `side` x `side` of these."""
@@ -145,8 +149,7 @@ class Frame:
     def merge(self, tiles: np.ndarray, side: int) -> np.ndarray:
         """Flat indices, in `merged(side)`, of the tiles that these lie in."""
         layer, row, col = self.split(tiles)
-        merged = self.merged(side)
-        return (layer * merged.rows + row // side) * merged.cols + col // side
+        return self.merged(side).flat(layer, row // side, col // side)
 
 
 def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:

@@ -25,7 +25,7 @@ import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen import seeds
-from simgen.candidates import Pool, Setup, try_candidates
+from simgen.candidates import PhotonPaths, Pool, Setup, try_candidates
 from simgen.majorant import Majorant
 from simgen.pilot import explore
 from simgen.recipe import Photons
@@ -48,21 +48,13 @@ DARK_CANDIDATES = 1 << 20
 
 
 @dataclass(frozen=True)
-class PhotonList:
-    """Photons (N,): camera (k, l), pixel (i, j), point of the film, first hit's `object_id` and `z_mm`.
+class PhotonList(PhotonPaths):
+    """One path for each photon (N,), ordered by view and pixel.
 
     `scope` is the number of the scope that each was drawn for and `rank` its place there: the first n
     of a scope are themselves an exact draw of n photons. `log` says how they came about.
     """
 
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    row_px: np.ndarray
-    col_px: np.ndarray
-    object_id: np.ndarray
-    z_mm: np.ndarray
     scope: np.ndarray
     rank: np.ndarray
     log: dict[str, Any]
@@ -75,8 +67,14 @@ class _Scopes:
     view: np.ndarray
     group: np.ndarray
     wanted: np.ndarray
-    got: np.ndarray
-    tried: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.start()
+
+    def start(self) -> None:
+        """Nothing is drawn yet."""
+        self.got = np.zeros(self.view.size, dtype=np.int64)
+        self.tried = np.zeros(self.view.size, dtype=np.int64)
 
     def open(self) -> np.ndarray:
         """Numbers of those that still want photons and are not known to be dark."""
@@ -112,9 +110,9 @@ class _Drawing:
         if photons.scope == "channel":
             cells = colour_cells(setup.cfa).ravel()
             self.groups = [np.flatnonzero(cells == colour) for colour in range(setup.channels)]
+        self.scopes, self.tally = self._scopes(), _Tally()
         self.pilot = explore(setup, self._expected, seed)
         self.share = LIKELY_SHARE
-        self.scopes, self.tally = self._scopes(), _Tally()
 
     def run(self) -> PhotonList:
         """Warm up and draw, anew if too many photons came in clumps."""
@@ -123,7 +121,8 @@ class _Drawing:
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
-            self.scopes, self.tally = self._scopes(), _Tally()
+            self.scopes.start()
+            self.tally = _Tally()
             drawn = list(self._exposed(attempt) if self.gain is not None else self._budgeted(attempt))
             paths += self.tally.candidates
             attempt += 1
@@ -146,7 +145,7 @@ class _Drawing:
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""
         if self.gain is None:
-            return float(self._scopes().wanted.sum())
+            return float(self.scopes.wanted.sum())
         grid, cells = self.setup.grid, colour_cells(self.setup.cfa).ravel()
         return float(self.gain * mean[cells].mean() * grid.view_count * grid.height * grid.width)
 
@@ -157,7 +156,6 @@ class _Drawing:
             views = np.array([-1])
         groups = np.arange(len(self.groups))
         view, group = views.repeat(groups.size), np.tile(groups, views.size)
-        nothing = np.zeros(view.size, dtype=np.int64)
         if self.gain is not None:
             wanted = np.full(view.size, np.iinfo(np.int64).max)
         elif photons.statistics == "multinomial":
@@ -165,7 +163,7 @@ class _Drawing:
         else:
             totals = seeds.generator(self.seed, view=0, stage="totals")
             wanted = totals.poisson(photons.budget, view.size)
-        return _Scopes(view, group, wanted, nothing, nothing.copy())
+        return _Scopes(view, group, wanted)
 
     def _warm_up(self) -> int:
         """Draw candidates for nothing but to lift the majorant where it is exceeded; how many.
@@ -182,8 +180,7 @@ class _Drawing:
             factor = _factor(found.ratio)
             self.share = max(found.copies.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
-            if found.over.k.size:
-                majorant.lift(found.over)
+            majorant.lift(found.over)
         return number * WARM_UP_ROUNDS
 
     def _majorant(self) -> Majorant:
@@ -223,11 +220,10 @@ class _Drawing:
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
         path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
         found = try_candidates(pool, self.scopes.group[owner], views, path_seed)
-        if found.over.k.size:
-            pool.majorant.lift(found.over)
+        pool.majorant.lift(found.over)
         path = np.arange(found.k.size).repeat(found.copies)
         scope = owner[found.candidate[path]]
-        rank = _ranks(scope, self.scopes.got)
+        rank = places(scope) + self.scopes.got[scope]
         taken = rank < self.scopes.wanted[scope]
         path, scope, rank = path[taken], scope[taken], rank[taken]
         self.scopes.got += np.bincount(scope, minlength=self.scopes.got.size)
@@ -237,8 +233,8 @@ class _Drawing:
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
         self.share = max(found.copies.sum() / max(owner.size, 1), LEAST_SHARE)
-        names = {field.name for field in fields(PhotonList)} & {field.name for field in fields(found)}
-        return {name: getattr(found, name)[path] for name in names} | {"scope": scope, "rank": rank}
+        own = {field.name: getattr(found, field.name)[path] for field in fields(PhotonPaths)}
+        return own | {"scope": scope, "rank": rank}
 
 
 def _factor(ratio: np.ndarray) -> float:
@@ -267,11 +263,11 @@ def _candidates_needed(missing: np.ndarray, round_number: int, share: float) -> 
     return np.clip(aim / share, 16, max(WAVEFRONT // missing.size, 16)).astype(np.int64)
 
 
-def _ranks(scope: np.ndarray, got: np.ndarray) -> np.ndarray:
-    """Place of each photon in its scope; `scope` is sorted, so that a scope's photons are a run."""
-    number = np.bincount(scope, minlength=got.size)
+def places(scope: np.ndarray) -> np.ndarray:
+    """Place (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
+    number = np.bincount(scope)
     first = np.cumsum(number) - number
-    return np.arange(scope.size) - first[scope] + got[scope]
+    return np.arange(scope.size) - first[scope]
 
 
 def _joined(setup: Setup, drawn: list[dict[str, np.ndarray]], log: dict[str, Any]) -> PhotonList:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from tiny import TINY_RECIPE
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -28,17 +29,8 @@ def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from simgen.generate import generate
     from simgen.recipe import Recipe
 
-    recipe = {
-        "scene": "two_objects",
+    recipe = TINY_RECIPE | {
         "seed": 5,
-        "grid": {
-            "rows": 2,
-            "cols": 3,
-            "pitch_mm": [18.0, 18.0],
-            "pixel_mm": 0.5632,
-            "height": 64,
-            "width": 60,
-        },
         "photons": {"budget": 400, "nested": [30, 120]},
         "sensor": {"dark_counts": 0.01},
         "analysis": {"z_mm": [540, 620], "z_range_mm": [500, 700]},

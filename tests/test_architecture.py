@@ -11,12 +11,22 @@ ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"mitsuba", "drjit", "colour"}
 # What simgen may share with pcii: nouns, masks, the file format and how commands behave. Not its
 # geometry or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
-SHARED = {"pcii", "pcii.types", "pcii.bayer", "pcii.errors", "pcii.store", "pcii.dataset", "pcii.console"}
+SHARED = {
+    "pcii",
+    "pcii.types",
+    "pcii.photon_counts",
+    "pcii.bayer",
+    "pcii.errors",
+    "pcii.store",
+    "pcii.dataset",
+    "pcii.console",
+}
 # Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
 PCII_LEVELS = [
     {"errors"},
     {"bayer", "store", "console", "kernels"},
     {"types"},
+    {"photon_counts"},
     {"geometry", "dataset", "demosaic", "picture"},
     {"dense"},
     {"reconstruct", "planes", "foreground"},

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, patch_views, square_mask, unit_grid
 
-from pcii.types import CameraGrid, PhotonCounts
+from pcii.photon_counts import PhotonCounts
+from pcii.types import CameraGrid
 
 
 class TwoSquares(NamedTuple):

@@ -8,8 +8,9 @@ from twins import colour_of, unit_grid, voxel_of
 
 from pcii.dense import BATCH
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
-from pcii.types import PhotonCounts, Views
+from pcii.types import Views
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 

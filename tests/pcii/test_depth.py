@@ -8,7 +8,8 @@ import pcii.depth
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.geometry import disparity_spread_px
-from pcii.types import DepthMap, PhotonCounts
+from pcii.photon_counts import PhotonCounts
+from pcii.types import DepthMap
 
 RANGE_MM = (1 / 9, 1 / 1)
 

@@ -14,8 +14,8 @@ from pcii.likelihood import (
     flat_information,
     focus_scores,
 )
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
-from pcii.types import PhotonCounts
 
 DISPARITIES = np.arange(1, 9)  # z = 1 / d mm on a unit grid
 

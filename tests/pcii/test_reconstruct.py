@@ -8,8 +8,9 @@ from twins import bayer_photons, blocky_texture, section_twin, unit_grid
 
 from pcii.bayer import PATTERNS, mosaic
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
-from pcii.types import CameraGrid, PhotonCounts, Views
+from pcii.types import CameraGrid, Views
 
 patterns = st.sampled_from([*PATTERNS, None])
 # Depths whose disparity is exact, so that the twin's order of operations cannot matter.

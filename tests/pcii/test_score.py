@@ -5,9 +5,10 @@ import pytest
 
 from pcii.errors import InputError
 from pcii.geometry import blur_half_extent_px
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
 from pcii.score import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
-from pcii.types import CameraGrid, DepthMap, PhotonCounts, Segmented, Truth
+from pcii.types import CameraGrid, DepthMap, Segmented, Truth
 
 GRID = CameraGrid(rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=24, width=32)
 Z = np.array([540.0, 620.0])

@@ -4,9 +4,9 @@ from twins import intersection_over_union, unit_grid
 
 from pcii.errors import InputError
 from pcii.foreground import roberts_magnitude, without_specks
+from pcii.photon_counts import PhotonCounts
 from pcii.planes import with_probes
 from pcii.segment import METHODS, segment
-from pcii.types import PhotonCounts
 
 methods = pytest.mark.parametrize("method", sorted(METHODS))
 

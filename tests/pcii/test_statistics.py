@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import unit_grid, voxel_of
 
+from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
 from pcii.statistics import (
     entropy_bits,
@@ -14,7 +15,7 @@ from pcii.statistics import (
     truncated_poisson_variance,
     view_samples,
 )
-from pcii.types import CameraGrid, PhotonCounts
+from pcii.types import CameraGrid
 
 PAPER_RATE = 1000 * 3.4e-4
 

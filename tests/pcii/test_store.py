@@ -15,6 +15,7 @@ from twins import unit_grid
 from pcii import store
 from pcii.dataset import open_dataset
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.store import (
     COUNTS,
     FORMAT,
@@ -33,7 +34,6 @@ from pcii.store import (
     write_exr_safely,
     write_json_safely,
 )
-from pcii.types import PhotonCounts
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)

@@ -13,8 +13,8 @@ from pcii.bayer import colour_index
 from pcii.console import silent
 from pcii.dataset import Dataset, open_dataset
 from pcii.errors import InputError
+from pcii.photon_counts import PhotonCounts
 from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
-from pcii.types import PhotonCounts
 from simgen import backend
 from simgen import counts as module
 from simgen.build import Built, build

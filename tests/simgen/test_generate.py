@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiny import TINY_RECIPE
 
 from pcii.dataset import open_dataset
 from pcii.errors import InputError
@@ -16,17 +17,8 @@ from simgen.generate import MARKER, generate, verify
 from simgen.recipe import Recipe
 
 pytestmark = pytest.mark.renders
-TINY = {
-    "scene": "two_objects",
+TINY = TINY_RECIPE | {
     "seed": 3,
-    "grid": {
-        "rows": 2,
-        "cols": 3,
-        "pitch_mm": [18.0, 18.0],
-        "pixel_mm": 0.5632,
-        "height": 64,
-        "width": 60,
-    },
     "photons": {"budget": 200},
     "render": {"samples_per_pixel": 2},
     "products": {"radiance": "mosaic", "view_truth": True},

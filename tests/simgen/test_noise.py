@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from lit_scenes import two_balls
 
 from pcii.types import CameraGrid
 from simgen import backend
@@ -19,36 +20,9 @@ GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=1
 DRAWS = 60
 
 
-def ball(name: str, x_mm: float, z_mm: float, colour: tuple[float, float, float]) -> dict:
-    return {
-        "name": name,
-        "position_mm": (x_mm, 0.0, z_mm),
-        "shape": {"type": "sphere", "radius_mm": 120.0},
-        "material": {"reflectance": colour},
-    }
-
-
-def scene_with(lights: list[dict]) -> Built:
-    values = {
-        "title": "test",
-        "objects": [ball("red", -130.0, 600.0, (0.9, 0.2, 0.1)), ball("blue", 150.0, 700.0, (0.1, 0.3, 0.9))],
-        "lights": lights,
-        "backdrop": {"z_mm": 1500.0, "reflectance": [0.1, 0.1, 0.1]},
-    }
-    return build(backend.load(), Scene.model_validate(values), Path(), 3)
-
-
 @pytest.fixture(scope="module")
 def scene() -> Built:
-    lamp = {
-        "type": "area",
-        "position_mm": (-200, -300, 200),
-        "target_mm": (0, 0, 600),
-        "width_mm": 200,
-        "height_mm": 200,
-        "luminance_cd_m2": 2000.0,
-    }
-    return scene_with([lamp, {"type": "uniform", "luminance_cd_m2": 30.0}])
+    return two_balls()
 
 
 def seen(built: Built, samples: int, seed: int) -> np.ndarray:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lit_scenes import DEPTH, EVENLY, ball, lit, two_balls
 from scipy import stats
 
 from pcii.bayer import colour_index, mosaic
@@ -22,39 +23,11 @@ pytestmark = [
     pytest.mark.skipif(backend.choose().kind == "scalar", reason="thinning needs a compiled backend"),
 ]
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
-DEPTH = 3
-
-
-def lit(objects: list[dict], lights: list[dict] | None = None) -> Built:
-    lamp = {
-        "type": "area",
-        "position_mm": (-200, -300, 200),
-        "target_mm": (0, 0, 600),
-        "width_mm": 200,
-        "height_mm": 200,
-        "luminance_cd_m2": 2000.0,
-    }
-    values = {
-        "title": "test",
-        "objects": objects,
-        "lights": lights or [lamp, {"type": "uniform", "luminance_cd_m2": 30.0}],
-        "backdrop": {"z_mm": 1500.0, "reflectance": [0.1, 0.1, 0.1]},
-    }
-    return build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
-
-
-def ball(name: str, x: float, z: float, colour: tuple[float, float, float]) -> dict:
-    return {
-        "name": name,
-        "position_mm": (x, 0.0, z),
-        "shape": {"type": "sphere", "radius_mm": 120.0},
-        "material": {"reflectance": colour},
-    }
 
 
 @pytest.fixture(scope="module")
 def scene() -> Built:
-    return lit([ball("red", -130.0, 600.0, (0.9, 0.2, 0.1)), ball("blue", 150.0, 700.0, (0.1, 0.3, 0.9))])
+    return two_balls()
 
 
 @pytest.fixture(scope="module")
@@ -256,7 +229,7 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     plastic, gold = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1)), ball("gold", 150.0, 700.0, (0, 0, 0))
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
-    scene = lit([plastic, gold], [lamp, {"type": "uniform", "luminance_cd_m2": 30.0}])
+    scene = lit([plastic, gold], [lamp, EVENLY])
     drawn = draw(scene, 1, budget=30_000)
     assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
     views = [

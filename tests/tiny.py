@@ -1,0 +1,15 @@
+"""A recipe that takes a second: the paper's two objects on few, coarse pixels."""
+
+from typing import Any
+
+TINY_RECIPE: dict[str, Any] = {
+    "scene": "two_objects",
+    "grid": {
+        "rows": 2,
+        "cols": 3,
+        "pitch_mm": [18.0, 18.0],
+        "pixel_mm": 0.5632,
+        "height": 64,
+        "width": 60,
+    },
+}
