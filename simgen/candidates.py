@@ -1,21 +1,17 @@
 """Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
 
-All of it runs in the renderer's arrays, one lane a candidate; what leaves is NumPy.
+What all backends share. `lanes` works on a whole wavefront at once, `singles` on one ray after the other.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Protocol
 
 import numpy as np
 
 from pcii.bayer import channel_count, colour_cells
 from pcii.types import CameraGrid
-from simgen.backend import load_drjit
 from simgen.build import Built
-from simgen.light import LUMINANCE
-from simgen.majorant import NEXT_LAYERS, Majorant, Samples
-from simgen.paths import FirstHits, film_rays, hit_first, radiance_along
+from simgen.majorant import Majorant, Samples
 
 
 @dataclass(frozen=True)
@@ -61,292 +57,56 @@ class Found(PhotonPaths):
     over: Samples
 
 
+class Pool(Protocol):
+    """A majorant as candidates are drawn from it.
+
+    They come of groups of Bayer cells, each candidate of one. `mass` (G,) is the sum of the bounds of the
+    pixels of each group in one view, border tiles counted whole.
+    """
+
+    majorant: Majorant
+    mass: np.ndarray
+
+    def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Found:
+        """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
+
+        `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
+        Where a path exceeds its bound r times, it gives floor(r) photons and one more with the remaining
+        probability, which keeps the mean exact.
+        """
+        ...
+
+    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+        """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
+
+        Those that fall beside the film are left out. How much the others tell depends on the backend.
+        """
+        ...
+
+
 @dataclass(frozen=True)
-class _Lanes:
-    """Candidates as the renderer holds them: camera, pixel, film point, entry, colour."""
+class Chances:
+    """Where the candidates of a group of Bayer cells fall: entry of the majorant and cell (2 a + b).
 
-    k: Any
-    l: Any
-    row: Any
-    col: Any
-    row_px: Any
-    col_px: Any
-    entry: Any
-    colour: Any
-    inside: Any
-
-
-Record = TypeVar("Record", _Lanes, FirstHits)
-
-
-class Pool:
-    """A majorant as the kernels read it: where candidates come from, and with what chance.
-
-    `groups` are sets of Bayer cells (2 a + b), each candidate being drawn from one of them. `mass`
-    (G,) is the sum of the bounds of the pixels of each group in one view, border tiles counted whole.
-    `ambient` (3,) is the radiance that is guessed to come from all around.
+    `running` (N,) are the sums of the bounds of all pixels up to and with these; the last is their mass.
     """
 
-    def __init__(
-        self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
-    ) -> None:
-        self.setup, self.majorant = setup, majorant
-        mi, frame = setup.built.mi, majorant.frame
-        colours = colour_cells(setup.cfa).ravel()
-        per_cell = majorant.bound[:, colours] * (majorant.side_px**2 / 4)[:, None]
-        running = [np.cumsum(per_cell[:, cells].ravel()) for cells in groups]
-        entries = np.arange(majorant.layer.size)
-        ends = np.cumsum([part.size for part in running])
-        self.mass = np.array([part[-1] for part in running])
-        self.running = _doubles(mi, np.concatenate(running))
-        self.start, self.stop = _unsigned(mi, np.append(0, ends[:-1])), _unsigned(mi, ends - 1)
-        # Numbers that change from pilot to pilot are passed as data: as constants they would be
-        # compiled into the kernel, and each pilot would wait for its own.
-        self.steps = 6 * -(-max(part.size for part in running).bit_length() // 6)
-        self.group_mass = _doubles(mi, self.mass)
-        self.entry = _unsigned(mi, np.concatenate([entries.repeat(own.size) for own in groups]))
-        self.cell = _unsigned(mi, np.concatenate([np.tile(own, entries.size) for own in groups]))
-        self.colour = _unsigned(mi, colours)
-        self.layer, self.row, self.col = (
-            _signed(mi, part) for part in (majorant.layer, majorant.row, majorant.col)
-        )
-        self.side_px = _signed(mi, majorant.side_px)
-        self.bound, self.shade = _floats(mi, majorant.bound), _floats(mi, majorant.shade)
-        self.dim = _floats(mi, majorant.dim)
-        self.ambient = mi.Color3f(*(_opaque(mi.Float, part) for part in ambient))
-        self.entry_of = _signed(mi, majorant.entry_of)
-        self.layer_at = _signed(mi, frame.layer_at)
-        self.nearness_mm = _opaque(mi.Float, frame.disparity_mm / frame.step_px)
-        self.last_step = _opaque(mi.Float, frame.layer_at.size - 1)
-        self.last_layer = _opaque(mi.Int32, len(frame.row_shift) - 1)
-        self.rows, self.cols = _opaque(mi.Int32, frame.rows), _opaque(mi.Int32, frame.cols)
-        self.row_shift, self.col_shift = _signed(mi, frame.row_shift), _signed(mi, frame.col_shift)
-
-    def draw(self, sampler: Any, group: Any, view: Any) -> _Lanes:
-        """One candidate for each lane's group and view: tile and cell by the bound, the rest evenly."""
-        mi, dr = self.setup.built.mi, load_drjit()
-        grid = self.setup.grid
-        # Two draws make one fine enough for tiles that are chosen once in a hundred million.
-        fine = dr.floor(sampler.next_1d() * 2**22) + mi.Float64(sampler.next_1d())
-        target = mi.Float64(fine) * 2**-22 * dr.gather(mi.Float64, self.group_mass, group)
-        low, high = dr.gather(mi.UInt32, self.start, group), dr.gather(mi.UInt32, self.stop, group)
-        for _ in range(self.steps):
-            middle = (low + high) >> 1
-            beyond = dr.gather(mi.Float64, self.running, middle) <= target
-            low, high = (
-                dr.select(beyond, dr.minimum(middle + 1, high), low),
-                dr.select(beyond, high, middle),
-            )
-        entry, cell = dr.gather(mi.UInt32, self.entry, low), dr.gather(mi.UInt32, self.cell, low)
-        side = dr.gather(mi.Int32, self.side_px, entry)
-        k, l = view // grid.cols, view % grid.cols
-        layer = dr.gather(mi.Int32, self.layer, entry)
-        film = layer < 0
-        layer = dr.maximum(layer, 0)
-        shift_row, shift_col = (dr.select(film, 0, shift) for shift in self._shifts(layer, k, l))
-        # One number gives the pixel (its whole part) and the place within the pixel (the rest).
-        down, right = sampler.next_1d() * mi.Float(side // 2), sampler.next_1d() * mi.Float(side // 2)
-        row = dr.gather(mi.Int32, self.row, entry) * side + 2 * mi.Int32(down) + mi.Int32(cell >> 1)
-        col = dr.gather(mi.Int32, self.col, entry) * side + 2 * mi.Int32(right) + mi.Int32(cell & 1)
-        row, col = row - shift_row, col - shift_col
-        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
-        row_px = mi.Float(row) + (down - dr.floor(down)) - 0.5
-        col_px = mi.Float(col) + (right - dr.floor(right)) - 0.5
-        colour = dr.gather(mi.UInt32, self.colour, cell)
-        return _Lanes(k, l, row, col, row_px, col_px, entry, colour, inside)
-
-    def owner(self, lanes: _Lanes, z_mm: Any) -> Any:
-        """The entry that each lane's path belongs to (see `majorant`)."""
-        mi, dr, frame = self.setup.built.mi, load_drjit(), self.majorant.frame
-        nearness = dr.minimum(self.nearness_mm / z_mm, self.last_step)
-        own = dr.gather(mi.Int32, self.layer_at, mi.UInt32(dr.round(nearness)))
-        coarse_px, across = self.majorant.coarse_px, self.majorant.coarse_cols
-        owner = lanes.row // coarse_px * across + lanes.col // coarse_px
-        for aside in reversed(NEXT_LAYERS):
-            layer = dr.clip(own + aside, 0, self.last_layer)
-            shift_row, shift_col = self._shifts(layer, lanes.k, lanes.l, lanes.inside)
-            row, col = (lanes.row + shift_row) // frame.tile_px, (lanes.col + shift_col) // frame.tile_px
-            listed = _at(dr, self.entry_of, (layer * self.rows + row) * self.cols + col, lanes.inside)
-            owner = dr.select(listed < 0, owner, listed)
-        return owner
-
-    def _shifts(self, layer: Any, k: Any, l: Any, active: Any = True) -> tuple[Any, Any]:
-        """Rows and columns by which a layer's tiles are moved in each lane's view."""
-        mi, dr, grid = self.setup.built.mi, load_drjit(), self.setup.grid
-        down = _at(dr, self.row_shift, layer * grid.rows + mi.Int32(k), active)
-        return down, _at(dr, self.col_shift, layer * grid.cols + mi.Int32(l), active)
+    running: np.ndarray
+    entry: np.ndarray
+    cell: np.ndarray
 
 
-def try_candidates(pool: Pool, group: np.ndarray, view: np.ndarray | None, seed: int) -> Found:
-    """Draw a candidate for each lane, keep it with probability radiance / bound.
-
-    `group` (N,) says which cells each may fall on, `view` (N,) on which film; None draws the view too.
-    A candidate is rejected in two steps: by its first hit, whose guess times the tile's shade may be
-    less than the bound, and if it survives that, by its path's radiance compared with that product.
-    Where a path exceeds it r times, it gives floor(r) photons and one more with the remaining
-    probability, which keeps the mean exact.
-    """
-    setup = pool.setup
-    if group.size == 0:
-        return _nothing(setup.channels)
-    mi, dr = setup.built.mi, load_drjit()
-    sampler = _sampler(mi, seed, group.size)
-    lanes, first = _first_seen(pool, sampler, _unsigned(mi, group), view)
-    where = lanes.entry * setup.channels + lanes.colour
-    bound, shade = dr.gather(mi.Float, pool.bound, where), dr.gather(mi.Float, pool.shade, where)
-    guess = _of_colour(dr, _sensed(setup, first.guess), lanes.colour)
-    most = dr.minimum(bound, dr.maximum(shade * guess, dr.gather(mi.Float, pool.dim, lanes.colour)))
-    promising = lanes.inside & (sampler.next_1d() * bound < most)
-    promising &= mi.UInt32(pool.owner(lanes, first.z_mm)) == lanes.entry
-    chance = sampler.next_1d()
-    dr.eval(promising, vars(lanes), vars(first), most, chance)
-    rest = dr.compress(promising)
-    if len(rest) == 0:
-        return _nothing(setup.channels)
-    lanes, first = _take(dr, lanes, rest), _take(dr, first, rest)
-    light = _follow(setup, lanes, first, seed)
-    ratio = _of_colour(dr, _sensed(setup, light), lanes.colour) / dr.gather(mi.Float, most, rest)
-    copies = mi.UInt32(ratio + dr.gather(mi.Float, chance, rest))
-    dr.eval(copies, ratio, light)
-    kept, over = dr.compress(copies > 0), dr.compress(ratio > 1)
-    photon, hit = _take(dr, lanes, kept), _take(dr, first, kept)
-    candidate, copies = dr.gather(mi.UInt32, rest, kept), dr.gather(mi.UInt32, copies, kept)
-    dr.eval(vars(photon), hit.shape, hit.z_mm, candidate, copies)
-    return Found(
-        candidate=np.array(candidate),
-        k=np.array(photon.k).astype(np.int64),
-        l=np.array(photon.l).astype(np.int64),
-        i=np.array(photon.row).astype(np.int64),
-        j=np.array(photon.col).astype(np.int64),
-        row_px=np.array(photon.row_px),
-        col_px=np.array(photon.col_px),
-        object_id=setup.built.object_of_shape[np.array(hit.shape)],
-        z_mm=np.array(hit.z_mm),
-        copies=np.array(copies).astype(np.int64),
-        over=_samples(pool, _take(dr, lanes, over), _take(dr, first, over), _at(dr, light, over))
-        if len(over)
-        else _nothing(setup.channels).over,
-        ratio=np.array(ratio),
-    )
+def chances(setup: Setup, majorant: Majorant, cells: np.ndarray) -> Chances:
+    """The chances of a group of cells under a majorant."""
+    colours = colour_cells(setup.cfa).ravel()[cells]
+    mass = majorant.bound[:, colours] * (majorant.side_px**2 / 4)[:, None]
+    entries = majorant.layer.size
+    return Chances(np.cumsum(mass.ravel()), np.arange(entries).repeat(cells.size), np.tile(cells, entries))
 
 
-def look_around(pool: Pool, number: int, follow: int, seed: int) -> Samples:
-    """A pilot: `number` candidates from all views and cells, of which the first `follow` are followed.
-
-    Those that fall beside the film are left out.
-    """
-    setup = pool.setup
-    mi, dr = setup.built.mi, load_drjit()
-    sampler = _sampler(mi, seed, number)
-    lanes, first = _first_seen(pool, sampler, dr.zeros(mi.UInt32, number), None)
-    dr.eval(vars(lanes), vars(first))
-    inside = dr.compress(lanes.inside)
-    lanes, first = _take(dr, lanes, inside), _take(dr, first, inside)
-    some = dr.arange(mi.UInt32, min(follow, len(inside)))
-    light = _follow(setup, _take(dr, lanes, some), _take(dr, first, some), seed)
-    return _samples(pool, lanes, first, light)
-
-
-def _sampler(mi: Any, seed: int, size: int) -> Any:
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(seed, size)
-    return sampler
-
-
-def _first_seen(pool: Pool, sampler: Any, group: Any, view: np.ndarray | None) -> tuple[_Lanes, FirstHits]:
-    """A candidate for each lane, and what it hits first."""
-    setup = pool.setup
-    lanes = pool.draw(sampler, group, _views(setup, sampler, view))
-    return lanes, hit_first(setup.built, _rays(setup, lanes), lanes.inside, pool.ambient)
-
-
-def _rays(setup: Setup, lanes: _Lanes) -> Any:
-    return film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
-
-
-def _views(setup: Setup, sampler: Any, view: np.ndarray | None) -> Any:
-    """The lanes' views, drawn evenly if they are not given."""
-    mi, count = setup.built.mi, setup.grid.view_count
-    if view is not None:
-        return _unsigned(mi, view)
-    return load_drjit().minimum(mi.UInt32(sampler.next_1d() * count), count - 1)
-
-
-def _follow(setup: Setup, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
-    """Radiance along one path from each first hit, RGB."""
-    # Another sampler than the candidates', whose numbers decided which lanes are here.
-    sampler = _sampler(setup.built.mi, seed ^ 0x9E3779B9, len(lanes.k))
-    return radiance_along(setup.built, _rays(setup, lanes), first.record, sampler, setup.max_depth)
-
-
-def _sensed(setup: Setup, rgb: Any) -> list[Any]:
-    """RGB as the sensor's colours: R, G, B, or luminance for a monochrome one."""
-    if setup.cfa is not None:
-        return list(rgb)
-    return [sum(float(share) * part for share, part in zip(LUMINANCE, rgb, strict=True))]
-
-
-def _of_colour(dr: Any, values: list[Any], colour: Any) -> Any:
-    """Each lane's value of its own colour."""
-    if len(values) == 1:
-        return values[0]
-    return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))
-
-
-def _at(dr: Any, array: Any, index: Any, active: Any = True) -> Any:
-    return dr.gather(type(array), array, index, active)
-
-
-def _take(dr: Any, lanes: Record, index: Any) -> Record:
-    """Some lanes of a record of arrays."""
-    return type(lanes)(**{name: _at(dr, array, index) for name, array in vars(lanes).items()})
-
-
-def _nothing(channels: int) -> Found:
-    """No photons: the renderer's arrays cannot be empty everywhere."""
+def nothing(channels: int) -> Found:
+    """No photons."""
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
     over = Samples(whole, whole, whole, whole, real, colours, colours)
     object_id = np.zeros(0, np.int16)
     return Found(whole, whole, whole, whole, real, real, object_id, real, whole, whole, real, over)
-
-
-def _samples(pool: Pool, lanes: _Lanes, first: FirstHits, light: Any) -> Samples:
-    """Lanes as NumPy, of which the first were followed and brought `light`."""
-    dr, setup = load_drjit(), pool.setup
-    guess = _sensed(setup, first.guess)
-    brought = _sensed(setup, light)
-    dr.eval(vars(lanes), guess, brought, first.z_mm)
-    seen = np.full((len(lanes.k), setup.channels), np.nan)
-    seen[: len(light[0])] = np.stack([np.array(part) for part in brought], axis=1)
-    return Samples(
-        **{name: np.array(getattr(lanes, name)).astype(np.int64) for name in ("k", "l", "row", "col")},
-        z_mm=np.array(first.z_mm),
-        guess=np.stack([np.array(part) for part in guess], axis=1).astype(np.float64),
-        light=seen,
-    )
-
-
-def _unsigned(mi: Any, values: np.ndarray) -> Any:
-    return _upload(mi.UInt32, values, np.uint32)
-
-
-def _signed(mi: Any, values: np.ndarray) -> Any:
-    return _upload(mi.Int32, values, np.int32)
-
-
-def _floats(mi: Any, values: np.ndarray) -> Any:
-    return _upload(mi.Float, values, np.float32)
-
-
-def _doubles(mi: Any, values: np.ndarray) -> Any:
-    return _upload(mi.Float64, values, np.float64)
-
-
-def _upload(kind: Any, values: np.ndarray, dtype: Any) -> Any:
-    flat = np.ascontiguousarray(values, dtype=dtype).ravel()
-    # Where NumPy happened to put a single number is compiled into the kernel, if it is handed over.
-    return _opaque(kind, flat[0].item()) if flat.size == 1 else kind(flat)
-
-
-def _opaque(kind: Any, value: float) -> Any:
-    return load_drjit().opaque(kind, value)

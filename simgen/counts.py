@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pcii.bayer import channel_count
-from pcii.console import Report
+from pcii.console import Report, silent
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
 from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_arrays_safely
@@ -26,8 +26,10 @@ from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energie
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 """Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
 `make bench` on two cores; only their ratios matter."""
-MOST_SINGLE_PHOTONS = 1 << 27
-"""So many photons are kept one by one at most; each takes some 50 bytes."""
+SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST = 77.0, 0.3
+"""The same without a compiled backend."""
+MOST_SINGLE_PHOTONS = 1 << 25
+"""So many photons are kept one by one at most; each takes some 200 bytes."""
 
 
 @dataclass(frozen=True)
@@ -48,50 +50,53 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
     """Thin, or render densely, whichever takes less time for counts without rendering noise.
 
     Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
-    each needs, which are more the more light there is. Thinning needs a compiled backend.
+    each needs, which are more the more light there is. Where it cannot take enough, photons are thinned
+    as long as there is memory for them.
     """
     grid = recipe.grid.camera_grid()
     pixels = grid.height * grid.width
     seen = probe(built, grid, recipe.cfa, recipe.seed)
     gain = _photons_per_radiance(recipe, seen)
-    samples = seen.samples_for(gain)
+    scope_pixels = _scope_pixels(recipe)
+    samples = seen.samples_for(gain, scope_pixels)
     if recipe.products.radiance != "none":
         samples = max(samples, recipe.render.samples_per_pixel)
     samples = min(samples, (MOST_PATHS - 1) // pixels)
     per_view = gain * seen.mean * pixels
-    thinning_cost = PHOTON_COST * per_view
-    dense_cost = (SAMPLE_COST * samples + PIXEL_COST) * pixels
+    photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
+    if kind == "scalar":
+        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+    noise = seen.photon_noise(gain, samples)
+    cheaper = photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
     few = per_view * grid.view_count <= MOST_SINGLE_PHOTONS
     if recipe.photons.nested and not few:
         raise InputError(
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
-    relative = np.sqrt(seen.variance / (samples * pixels)) / seen.mean if seen.mean > 0 else 0.0
     return Plan(
-        thins=kind != "scalar" and few and thinning_cost <= dense_cost,
+        thins=few and (cheaper or noise > NOISE_SHARE),
         samples=samples,
         photons_per_view=per_view,
-        noise=seen.photon_noise(gain, samples),
-        normaliser_error=0.0 if recipe.photons.scope == "exposure" else float(relative),
+        noise=noise,
+        normaliser_error=0.0 if scope_pixels is None else seen.light_error(samples * scope_pixels),
     )
 
 
-def thin(recipe: Recipe, built: Built, made: Plan) -> tuple[Arrivals, dict[str, Any]]:
+def thin(
+    recipe: Recipe, built: Built, made: Plan, report: Report = silent
+) -> tuple[Arrivals, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them."""
     grid = recipe.grid.camera_grid()
     setup = Setup(built, grid, recipe.cfa, recipe.render.max_depth)
-    drawn = draw_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=absolute_gain(recipe))
+    gain = absolute_gain(recipe)
+    drawn = draw_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
+    names = ("k", "l", "i", "j", "scope", "rank")
     arrivals = Arrivals(
-        drawn.k,
-        drawn.l,
-        drawn.i,
-        drawn.j,
-        np.ones(drawn.k.size, dtype=np.int64),
-        drawn.scope,
-        drawn.rank,
-        drawn.object_id.astype(np.int64),
-        drawn.z_mm,
+        **{name: getattr(drawn, name).astype(np.int64) for name in names},
+        n=np.ones(drawn.k.size, dtype=np.int64),
+        object_id=drawn.object_id,
+        z_mm=drawn.z_mm,
     )
     return arrivals, drawn.log | {
         "dense_paths_instead": made.samples * grid.view_count * grid.height * grid.width,
@@ -181,6 +186,14 @@ def _photons_per_radiance(recipe: Recipe, seen: Probe) -> float:
     scopes = {"view": 1.0, "channel": float(channel_count(recipe.cfa)), "scene": 1 / grid.view_count}
     per_view = recipe.photons.budget * scopes[recipe.photons.scope]
     return per_view / (grid.height * grid.width * seen.mean) if seen.mean > 0 else 0.0
+
+
+def _scope_pixels(recipe: Recipe) -> int | None:
+    """Pixels over which a budget is counted, of the rarest colour at worst; None without a budget."""
+    grid, pixels = recipe.grid.camera_grid(), recipe.grid.height * recipe.grid.width
+    by_colour = max(pixels // 4, 1) if recipe.cfa is not None else pixels
+    scopes = {"view": pixels, "channel": by_colour, "scene": pixels * grid.view_count}
+    return scopes.get(recipe.photons.scope)
 
 
 def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:

@@ -94,7 +94,7 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
                 made = plan(recipe, built, engine["kind"])
         if made is not None and made.thins:
             with clock.stage("photons"):
-                arrivals, photons = thin(recipe, built, made)
+                arrivals, photons = thin(recipe, built, made, report)
                 photons |= write_counts(recipe, arrivals, out)
         if products.radiance != "none" or (made is not None and not made.thins):
             with clock.stage("radiance"):

@@ -2,7 +2,8 @@
 
 Counts drawn from a rendered view have the view's noise besides their own: a rate that is off by a random
 amount of variance v makes counts whose variance is larger by v. That share of the Poisson variance is
-to stay below `NOISE_SHARE`, so dimmer light needs fewer samples.
+to stay below `NOISE_SHARE`, so dimmer light needs fewer samples. A budget is divided by a view's light,
+whose own standard error is to stay below `NORMALISER_ERROR`.
 """
 
 import math
@@ -17,6 +18,7 @@ from simgen.render import render_view
 from simgen.sensor import sense
 
 NOISE_SHARE = 0.01
+NORMALISER_ERROR = 0.003
 MOST_SAMPLES = 64
 PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
@@ -36,10 +38,18 @@ class Probe:
             return 0.0
         return photons_per_radiance * self.variance / (samples * self.mean)
 
-    def samples_for(self, photons_per_radiance: float) -> int:
-        """Samples per pixel that keep that share below `NOISE_SHARE`; `MOST_SAMPLES` at most."""
-        needed = math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE)
-        return min(max(needed, 1), MOST_SAMPLES)
+    def light_error(self, paths: int) -> float:
+        """Standard error of the light that so many paths find, as a share of it."""
+        return math.sqrt(self.variance / paths) / self.mean if self.mean > 0 else 0.0
+
+    def samples_for(self, photons_per_radiance: float, pixels: int | None = None) -> int:
+        """Samples per pixel that keep the noise below `NOISE_SHARE`; `MOST_SAMPLES` at most for that.
+
+        With a budget that is counted over so many `pixels`, enough for `NORMALISER_ERROR` too.
+        """
+        noise = min(math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE), MOST_SAMPLES)
+        error = 0.0 if pixels is None else self.light_error(pixels) / NORMALISER_ERROR
+        return max(noise, math.ceil(error**2), 1)
 
 
 def probe(built: Built, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:

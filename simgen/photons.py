@@ -24,10 +24,12 @@ from typing import Any
 import numpy as np
 
 from pcii.bayer import colour_cells
+from pcii.console import Report, silent
 from simgen import seeds
-from simgen.candidates import PhotonPaths, Pool, Setup, try_candidates
+from simgen.candidates import PhotonPaths, Pool, Setup
 from simgen.majorant import Majorant
 from simgen.pilot import explore
+from simgen.pools import pool_for
 from simgen.recipe import Photons
 
 OVERSHOOT_SHARE = 1e-4
@@ -43,6 +45,13 @@ LIKELY_SHARE = 0.3
 LEAST_SHARE = 1e-4
 WAVEFRONT = 1 << 21
 """Candidates traced at once at most."""
+KINDS = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int32) | {
+    "row_px": np.float32,
+    "col_px": np.float32,
+    "object_id": np.int16,
+    "z_mm": np.float32,
+}
+"""How the columns of a list of photons are kept."""
 DARK_CANDIDATES = 1 << 20
 """A scope in which so many candidates in a row find no light has none."""
 
@@ -91,20 +100,27 @@ class _Tally:
 
 
 def draw_photons(
-    setup: Setup, photons: Photons, *, seed: int, photons_per_radiance: float | None = None
+    setup: Setup,
+    photons: Photons,
+    *,
+    seed: int,
+    photons_per_radiance: float | None = None,
+    report: Report = silent,
 ) -> PhotonList:
     """All photons of all views; the same for the same setup, settings and seed.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     """
-    return _Drawing(setup, photons, seed, photons_per_radiance).run()
+    return _Drawing(setup, photons, seed, photons_per_radiance, report).run()
 
 
 class _Drawing:
     """One run: the settings, what the pilot found, and what has been drawn so far."""
 
-    def __init__(self, setup: Setup, photons: Photons, seed: int, photons_per_radiance: float | None) -> None:
-        self.setup, self.photons, self.seed = setup, photons, seed
+    def __init__(
+        self, setup: Setup, photons: Photons, seed: int, photons_per_radiance: float | None, report: Report
+    ) -> None:
+        self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
         self.gain = photons_per_radiance
         self.groups = [np.arange(4)]
         if photons.scope == "channel":
@@ -176,7 +192,7 @@ class _Drawing:
         for done in range(WARM_UP_ROUNDS):
             group = np.arange(number) % len(self.groups)
             path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
-            found = try_candidates(self._pool(), group, None, path_seed)
+            found = self._pool().try_candidates(group, None, path_seed)
             factor = _factor(found.ratio)
             self.share = max(found.copies.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
@@ -188,7 +204,7 @@ class _Drawing:
         return self.pilot.majorant
 
     def _pool(self) -> Pool:
-        return Pool(self.setup, self._majorant(), self.groups, self.pilot.ambient)
+        return pool_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
 
     def _budgeted(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
         """Rounds of candidates until every scope has its photons, or is dark."""
@@ -200,6 +216,7 @@ class _Drawing:
                 part = attempt << 16 | round_number
                 yield self._round(wanting, candidates, self._pool(), number, part)
                 round_number += 1
+                self.report("photons", int(self.scopes.got.sum()), int(self.scopes.wanted.sum()))
 
     def _exposed(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
@@ -211,6 +228,7 @@ class _Drawing:
             rng = seeds.generator(self.seed, view=part, stage="totals", part=attempt)
             candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
             yield self._round(views, candidates, pool, part, attempt << 16)
+            self.report("parts of the exposure", part + 1, parts)
 
     def _round(
         self, scopes: np.ndarray, candidates: np.ndarray, pool: Pool, number: int, part: int
@@ -219,7 +237,7 @@ class _Drawing:
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
         path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
-        found = try_candidates(pool, self.scopes.group[owner], views, path_seed)
+        found = pool.try_candidates(self.scopes.group[owner], views, path_seed)
         pool.majorant.lift(found.over)
         path = np.arange(found.k.size).repeat(found.copies)
         scope = owner[found.candidate[path]]
@@ -233,8 +251,9 @@ class _Drawing:
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
         self.share = max(found.copies.sum() / max(owner.size, 1), LEAST_SHARE)
-        own = {field.name: getattr(found, field.name)[path] for field in fields(PhotonPaths)}
-        return own | {"scope": scope, "rank": rank}
+        own = {field.name: getattr(found, field.name) for field in fields(PhotonPaths)}
+        columns = {name: column[path] for name, column in own.items()} | {"scope": scope, "rank": rank}
+        return {name: column.astype(KINDS[name]) for name, column in columns.items()}
 
 
 def _factor(ratio: np.ndarray) -> float:
@@ -272,12 +291,12 @@ def places(scope: np.ndarray) -> np.ndarray:
 
 def _joined(setup: Setup, drawn: list[dict[str, np.ndarray]], log: dict[str, Any]) -> PhotonList:
     """All batches as one list, ordered by view and pixel, those of one pixel as they were drawn."""
-    kinds = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int64)
-    kinds |= {"row_px": np.float32, "col_px": np.float32, "object_id": np.int16, "z_mm": np.float32}
-    empty = {name: np.zeros(0, kind) for name, kind in kinds.items()}
-    columns = {name: np.concatenate([batch[name] for batch in [empty, *drawn]]) for name in kinds}
-    pixel = np.ravel_multi_index([columns[name] for name in "klij"], setup.grid.shape_KLHW)
+    drawn = [{name: np.zeros(0, kind) for name, kind in KINDS.items()}, *drawn]
+    pixel = np.concatenate(
+        [np.ravel_multi_index([b[n] for n in "klij"], setup.grid.shape_KLHW) for b in drawn]
+    )
     # With the place in the list as a last digit no two are equal, and any sort will do.
     order = np.argsort(pixel * pixel.size + np.arange(pixel.size))
-    columns = {name: values[order] for name, values in columns.items()}
+    # A column leaves its batches when it is joined: there may be tens of millions of photons.
+    columns = {name: np.concatenate([batch.pop(name) for batch in drawn])[order] for name in KINDS}
     return PhotonList(**columns, log=log)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simgen import seeds
-from simgen.candidates import Pool, Setup, look_around
+from simgen.candidates import Setup
 from simgen.majorant import (
     COARSE_TILES,
     DIM_SHARE,
@@ -16,7 +16,7 @@ from simgen.majorant import (
     frame_for,
     tile_px_for,
 )
-from simgen.paths import surrounding_radiance
+from simgen.pools import pool_for, surroundings
 
 EVEN_PATHS = 1 << 15
 MOST_EVEN_PATHS = 1 << 20
@@ -50,7 +50,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     First paths go evenly through all films. They show which depths there are and where it is bright. A
     second set is drawn from that, most of it only to see what it hits.
     """
-    ambient = surrounding_radiance(setup.built)
+    ambient = surroundings(setup)
     even, paths = _look_evenly(setup, seed, ambient)
     mean = even.light.mean(axis=0)
     if not even.light.any():
@@ -61,10 +61,10 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     grid = setup.grid
     fine_px = tile_px_for(grid)
     coarse = fit(grid, frame_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
-    pool = Pool(setup, coarse, [np.arange(4)], ambient)
+    pool = pool_for(setup, coarse, [np.arange(4)], ambient)
     seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
     looks = int(np.clip(expected(mean), *AIMED_LOOKS))
-    aimed = look_around(pool, looks, int(FOLLOWED_SHARE * looks), seed_of_part)
+    aimed = pool.look_around(looks, int(FOLLOWED_SHARE * looks), seed_of_part)
     known = even.join(aimed)
     majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)
     return Pilot(majorant, mean, ambient, paths + looks)
@@ -73,11 +73,11 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
 def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
     nowhere = frame_for(setup.grid, tile_px_for(setup.grid), np.array([np.inf]))
     flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
-    pool = Pool(setup, flat, [np.arange(4)], ambient)
+    pool = pool_for(setup, flat, [np.arange(4)], ambient)
     part, paths, spent = 0, EVEN_PATHS, 0
     while True:
         number = seeds.integer(seed, view=1, stage="pilot", part=part)
-        even = look_around(pool, paths, paths, number)
+        even = pool.look_around(paths, paths, number)
         spent += paths
         if even.light.any() or paths >= MOST_EVEN_PATHS:
             return even, spent

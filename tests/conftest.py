@@ -16,10 +16,7 @@ def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     out = tmp_path_factory.mktemp("data") / "small"
     recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"))
-    with pytest.MonkeyPatch.context() as patch:
-        # Without a compiled backend the counts come from rendered views, whose noise no test here minds.
-        patch.setattr("simgen.noise.MOST_SAMPLES", recipe.render.samples_per_pixel)
-        generate(recipe, near, out)
+    generate(recipe, near, out)
     return out
 
 

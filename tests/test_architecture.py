@@ -48,6 +48,8 @@ SIMGEN_LEVELS = [
     {"build", "detector", "exposure", "sensor"},
     {"majorant", "paths", "render", "truth"},
     {"candidates"},
+    {"lanes", "singles"},
+    {"pools"},
     {"pilot"},
     {"photons", "noise"},
     {"counts"},

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,11 +22,10 @@ from simgen.build import Built, build
 from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import Arrivals, members
 from simgen.generate import verify
-from simgen.noise import MOST_SAMPLES, NOISE_SHARE
+from simgen.noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.recipe import MOST_PATHS, Recipe
 from simgen.scene import Scene, load_scene
 
-COMPILED = pytest.mark.skipif(backend.choose().kind == "scalar", reason="thinning needs a compiled backend")
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 BUDGETS = (120, 40, 8)
 HEIGHT, WIDTH = 8, 10
@@ -109,7 +109,6 @@ def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
 
 
 @pytest.mark.renders
-@COMPILED
 def test_totals_of_thinned_nested_budgets_are_poisson(two_objects: Built) -> None:
     made = recipe(20, 30)  # 600 views, whose photons know nothing of each other
     arrivals = thin(made, two_objects, PLAN)[0]
@@ -123,7 +122,7 @@ def test_totals_of_thinned_nested_budgets_are_poisson(two_objects: Built) -> Non
 
 @pytest.mark.renders
 @pytest.mark.parametrize("scope", ["view", "channel", "scene"])
-@pytest.mark.parametrize("thins", [pytest.param(True, marks=COMPILED), False])
+@pytest.mark.parametrize("thins", [True, False])
 def test_multinomial_totals_of_nested_budgets_are_exact(two_objects: Built, scope: str, thins: bool) -> None:
     made = recipe(photons=nested(scope=scope, statistics="multinomial"))
     arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
@@ -134,7 +133,7 @@ def test_multinomial_totals_of_nested_budgets_are_exact(two_objects: Built, scop
 
 @pytest.mark.renders
 @pytest.mark.parametrize("statistics", ["poisson", "multinomial"])
-@pytest.mark.parametrize("thins", [pytest.param(True, marks=COMPILED), False])
+@pytest.mark.parametrize("thins", [True, False])
 def test_each_budget_is_a_subset_of_the_next(two_objects: Built, statistics: str, thins: bool) -> None:
     made = recipe(photons=nested(statistics=statistics))
     arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
@@ -306,9 +305,30 @@ PROBED = {"rows": 2, "cols": 3, "height": 64, "width": 64, "pixel_mm": 0.5}
 def test_little_light_is_thinned_and_much_is_rendered(two_objects: Built) -> None:
     little = recipe(grid=PROBED, photons={"budget": 100})
     much = recipe(grid=PROBED, photons={"budget": 1e8})
-    assert plan(little, two_objects, "llvm").thins
-    assert not plan(little, two_objects, "scalar").thins
-    assert not plan(much, two_objects, "llvm").thins
+    for kind in ("llvm", "scalar"):
+        assert plan(little, two_objects, kind).thins
+        assert not plan(much, two_objects, kind).thins
+
+
+@pytest.mark.renders
+def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objects: Built) -> None:
+    # Some hundred photons per pixel, whose rates are not known to 1 % of their own noise.
+    bright = recipe(grid=PROBED, photons={"budget": 3e5})
+    made = plan(bright, two_objects, "scalar")
+    assert made.noise > NOISE_SHARE
+    assert made.thins
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("scope", "pixels"), [("view", 4096), ("channel", 1024), ("scene", 6 * 4096)])
+def test_a_budget_is_divided_by_light_that_is_known_well(two_objects: Built, scope: str, pixels: int) -> None:
+    dim = recipe(grid=PROBED, photons={"budget": 0.1, "scope": scope})
+    seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", dim.seed)
+    made = plan(dim, two_objects, "llvm")
+    error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
+    assert made.normaliser_error == pytest.approx(error)
+    assert error <= NORMALISER_ERROR
+    assert error * np.sqrt(made.samples / (made.samples - 1)) > NORMALISER_ERROR  # and no better than that
 
 
 @pytest.mark.renders
@@ -318,19 +338,27 @@ def test_a_plan_expects_the_photons_of_its_scope(two_objects: Built, scope: str,
     assert made.photons_per_view == pytest.approx(600 * share, rel=1e-9)
 
 
+def exposed(built: Built, photons_per_view: float, **changes: Any) -> Recipe:
+    """No budget, but an exposure that brings about so many photons."""
+
+    def of(time_s: float) -> Recipe:
+        scope = {"scope": "exposure"}
+        return recipe(grid=PROBED, photons=scope, exposure={"time_s": time_s}, **changes)
+
+    found = plan(of(1e-9), built, "scalar").photons_per_view
+    return of(1e-9 * photons_per_view / found)
+
+
 @pytest.mark.renders
 def test_a_plan_takes_more_samples_for_more_light(two_objects: Built) -> None:
-    plans = [
-        plan(recipe(grid=PROBED, photons={"budget": n}), two_objects, "scalar") for n in (0.1, 10, 40, 1e9)
-    ]
+    plans = [plan(exposed(two_objects, n), two_objects, "scalar") for n in (0.1, 10, 40, 1e9)]
     samples = [made.samples for made in plans]
     assert samples[0] == 1
     assert samples[0] < samples[1] < samples[2] < samples[3] == MOST_SAMPLES
     assert all(made.noise <= NOISE_SHARE for made in plans[:3])
     assert plans[3].noise > NOISE_SHARE  # more than is allowed are needed, and it says so
-    with_images = recipe(
-        grid=PROBED, photons={"budget": 1}, products={"radiance": "rgb"}, render={"samples_per_pixel": 33}
-    )
+    images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
+    with_images = exposed(two_objects, 1, **images)
     assert plan(with_images, two_objects, "scalar").samples == 33
 
 
@@ -385,10 +413,6 @@ def test_from_one_budget_another_can_be_reached(nested_dataset: Path) -> None:
 @pytest.mark.renders
 def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None:
     whole = open_dataset(nested_dataset)
-    if json.loads((nested_dataset / MANIFEST).read_text())["photons"]["method"] == "dense":
-        assert whole.truth is not None
-        assert whole.truth.photons is None
-        return
     for dataset in (whole, whole.at_budget(120), whole.at_budget(30)):
         assert dataset.truth is not None
         photons = dataset.truth.photons

@@ -23,7 +23,6 @@ LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
 """Photons per pixel: 16 of 555 nm. The 4.09e15 in a lumen second are rounded to 1 in 1000."""
 Draw = Callable[[Recipe, Built], Arrivals]
-COMPILED = pytest.mark.skipif(backend.choose().kind == "scalar", reason="thinning needs a compiled backend")
 
 
 def recipe(**changes: object) -> Recipe:
@@ -87,7 +86,7 @@ def test_photons_grow_with_time_and_with_areas() -> None:
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize("draw", [pytest.param(thinned, marks=COMPILED), dense])
+@pytest.mark.parametrize("draw", [thinned, dense])
 @pytest.mark.parametrize("cfa", ["GRBG", "none"])
 def test_an_even_light_gives_the_photons_by_hand(lit_evenly: Built, draw: Draw, cfa: str) -> None:
     made = recipe(sensor={"cfa": cfa})
@@ -109,7 +108,7 @@ def test_an_even_light_gives_the_photons_by_hand(lit_evenly: Built, draw: Draw, 
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize("draw", [pytest.param(thinned, marks=COMPILED), dense])
+@pytest.mark.parametrize("draw", [thinned, dense])
 def test_a_longer_exposure_gives_more_photons(lit_evenly: Built, draw: Draw) -> None:
     longer = recipe(exposure={"f_number": F_NUMBER, "time_s": 3 * TIME_S})
     mean = counted(draw(longer, lit_evenly)).mean()

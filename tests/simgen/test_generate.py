@@ -153,17 +153,14 @@ def test_scene_scope_shares_one_budget_among_views(tmp_path: Path) -> None:
 
 
 def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) -> None:
-    generate(recipe(photons={"budget": 4e6}), Path(), tmp_path / "bright")
+    generate(recipe(photons={"budget": 6e6}), Path(), tmp_path / "bright")
     bright, dim = open_dataset(tmp_path / "bright"), open_dataset(made)
     assert bright.manifest["photons"]["method"] == "dense"
-    assert abs(bright.counts.total - 24e6) < 5 * np.sqrt(24e6)
-    assert (
-        bright.manifest["photons"]["rendering_noise"] > 0.01
-    )  # more samples than are allowed, so it says so
+    assert abs(bright.counts.total - 36e6) < 5 * np.sqrt(36e6)
+    # More samples are needed than are allowed, and it says so.
+    assert bright.manifest["photons"]["rendering_noise"] > 0.01
     assert bright.truth is not None
     assert bright.truth.photons is None
-    if dim.manifest["backend"]["kind"] == "scalar":
-        return
     photons = dim.manifest["photons"]
     assert photons["method"] == "thinning"
     assert photons["kept"] == dim.counts.total

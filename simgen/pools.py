@@ -1,0 +1,27 @@
+"""Which way candidates are worked on: all at once where a compiled backend runs, else one by one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from simgen.candidates import Pool, Setup
+from simgen.lanes import LanePool
+from simgen.majorant import Majorant
+from simgen.paths import surrounding_radiance
+from simgen.singles import SinglePool
+
+
+def pool_for(setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray) -> Pool:
+    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (3,) all around."""
+    if _is_scalar(setup):
+        return SinglePool(setup, majorant, groups)
+    return LanePool(setup, majorant, groups, ambient)
+
+
+def surroundings(setup: Setup) -> np.ndarray:
+    """Mean radiance (3,) that shines from all around, where candidates are guessed at; else zeros."""
+    return np.zeros(3) if _is_scalar(setup) else surrounding_radiance(setup.built)
+
+
+def _is_scalar(setup: Setup) -> bool:
+    return setup.built.mi.variant().startswith("scalar")

@@ -1,0 +1,157 @@
+"""Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call of the renderer each.
+
+A call takes about a microsecond, so there is no first guess: who is not rejected by chance is followed.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pcii.bayer import colour_cells
+from simgen.backend import shape_numbers
+from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.candidates import Found, Setup, chances
+from simgen.light import LUMINANCE
+from simgen.majorant import Majorant, Samples
+
+PATHS = 4
+"""Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""
+GUESS = 1e-9
+"""What majorants take for a guess: the same of every candidate, and less than any bound."""
+PART = 1 << 14
+
+
+@dataclass(frozen=True)
+class _Rays:
+    """Candidates (N,): camera, pixel, point of the film, entry of the majorant, colour."""
+
+    k: np.ndarray
+    l: np.ndarray
+    row: np.ndarray
+    col: np.ndarray
+    row_px: np.ndarray
+    col_px: np.ndarray
+    entry: np.ndarray
+    colour: np.ndarray
+
+    def take(self, which: np.ndarray) -> "_Rays":
+        return _Rays(**{name: column[which] for name, column in vars(self).items()})
+
+
+class SinglePool:
+    """The `Pool` of scalar mode."""
+
+    def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
+        self.setup, self.majorant = setup, majorant
+        self.groups = [chances(setup, majorant, cells) for cells in groups]
+        self.mass = np.array([own.running[-1] for own in self.groups])
+
+    def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Found:
+        """See `candidates`."""
+        rng = np.random.default_rng(seed)
+        rays, chance = self._draw(rng, group, view), rng.random(group.size)
+        candidate = self._inside(rays)
+        rays, chance = rays.take(candidate), chance[candidate]
+        object_id, z_mm = self._first_hits(rays)
+        own = self.majorant.owner_of(self._samples(rays, z_mm)) == rays.entry
+        rays, candidate, chance = rays.take(own), candidate[own], chance[own]
+        object_id, z_mm = object_id[own], z_mm[own]
+        light = self._follow(rays, seed)
+        at = np.arange(light.shape[0]), rays.colour
+        ratio = light[at] / self.majorant.bound[rays.entry, rays.colour]
+        copies = (ratio + chance).astype(np.int64)
+        kept, over = np.flatnonzero(copies), np.flatnonzero(ratio > 1)
+        photon = rays.take(kept)
+        return Found(
+            k=photon.k,
+            l=photon.l,
+            i=photon.row,
+            j=photon.col,
+            row_px=photon.row_px,
+            col_px=photon.col_px,
+            object_id=object_id[kept],
+            z_mm=z_mm[kept],
+            candidate=candidate[kept],
+            copies=copies[kept],
+            ratio=ratio,
+            over=self._samples(rays.take(over), z_mm[over], light[over]),
+        )
+
+    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+        """See `candidates`; only those that are followed tell anything."""
+        rng = np.random.default_rng(seed)
+        rays = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)
+        rays = rays.take(self._inside(rays))
+        return self._samples(rays, self._first_hits(rays)[1], self._follow(rays, seed))
+
+    def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> _Rays:
+        """Tile and cell by the bound, the rest evenly."""
+        grid, majorant = self.setup.grid, self.majorant
+        if view is None:
+            view = rng.integers(0, grid.view_count, group.size)
+        target, entry = rng.random(group.size), np.empty(group.size, dtype=np.int64)
+        cell = np.empty(group.size, dtype=np.int64)
+        for number, own in enumerate(self.groups):
+            here = group == number
+            found = np.searchsorted(own.running, target[here] * own.running[-1], side="right")
+            found = np.minimum(found, own.running.size - 1)
+            entry[here], cell[here] = own.entry[found], own.cell[found]
+        side, layer = majorant.side_px[entry], majorant.layer[entry]
+        k, l = np.divmod(view, grid.cols)
+        # One number gives the pixel (its whole part) and the place within the pixel (the rest).
+        down, right = rng.random((2, group.size)) * (side // 2)
+        row = majorant.row[entry] * side + 2 * down.astype(np.int64) + (cell >> 1)
+        col = majorant.col[entry] * side + 2 * right.astype(np.int64) + (cell & 1)
+        row -= np.where(layer < 0, 0, majorant.frame.row_shift[layer, k])
+        col -= np.where(layer < 0, 0, majorant.frame.col_shift[layer, l])
+        row_px, col_px = row + down % 1 - 0.5, col + right % 1 - 0.5
+        return _Rays(k, l, row, col, row_px, col_px, entry, colour_cells(self.setup.cfa).ravel()[cell])
+
+    def _inside(self, rays: _Rays) -> np.ndarray:
+        """Numbers of those that fall on the film."""
+        H, W = self.setup.grid.height, self.setup.grid.width
+        return np.flatnonzero((rays.row >= 0) & (rays.row < H) & (rays.col >= 0) & (rays.col < W))
+
+    def _first_hits(self, rays: _Rays) -> tuple[np.ndarray, np.ndarray]:
+        """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
+        built, intersect = self.setup.built, self.setup.built.scene.ray_intersect
+        numbers = zip(built.scene.shapes(), shape_numbers(built.scene), strict=True)
+        ids = {shape.id(): built.object_of_shape[number] for shape, number in numbers}
+        object_id, z_mm = np.zeros(rays.k.size, np.int16), np.full(rays.k.size, np.inf, np.float32)
+        for number, ray in enumerate(self._traced(rays)):
+            hit = intersect(ray)
+            if hit.is_valid():
+                object_id[number], z_mm[number] = ids[hit.shape.id()], hit.p.z
+        return object_id, z_mm
+
+    def _follow(self, rays: _Rays, seed: int) -> np.ndarray:
+        """Radiance (N, C) of each, the mean of `PATHS` paths."""
+        built = self.setup.built
+        sampler = built.mi.load_dict({"type": "independent"})
+        sampler.seed(seed, 1)
+        sample, scene = built.scene.integrator().sample, built.scene
+        rgb = np.empty((rays.k.size, 3))
+        for number, ray in enumerate(self._traced(rays)):
+            rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
+        rgb /= PATHS
+        return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
+
+    def _traced(self, rays: _Rays) -> Iterator[Any]:
+        """The renderer's rays: to the right is +X, downwards +Y, straight ahead +Z."""
+        mi, grid = self.setup.built.mi, self.setup.grid
+        per_px = grid.pixel_mm / grid.focal_mm
+        x = (rays.col_px - (grid.width - 1) / 2) * per_px
+        y = (rays.row_px - (grid.height - 1) / 2) * per_px
+        ahead = 1 / np.sqrt(1 + x * x + y * y)
+        left, top = camera_x_mm(grid)[rays.l], camera_y_mm(grid)[rays.k]
+        columns = np.stack([left, top, x * ahead, y * ahead, ahead], axis=1)
+        # Python's numbers take several times the memory of NumPy's, so there are never many at once.
+        for part in np.split(columns, range(PART, len(columns), PART)):
+            for x_mm, y_mm, *direction in part.tolist():
+                yield mi.RayDifferential3f(mi.Point3f(x_mm, y_mm, 0), mi.Vector3f(direction))
+
+    def _samples(self, rays: _Rays, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
+        guess = np.full((rays.k.size, self.setup.channels), GUESS)
+        return Samples(rays.k, rays.l, rays.row, rays.col, z_mm, guess, guess if light is None else light)
