@@ -1,8 +1,9 @@
-"""Demosaicing of Bayer images: Laroche and Prescott's gradient based interpolation.
+"""Demosaicing of Bayer images: Laroche and Prescott's gradient based interpolation, and others to compare.
 
 Muniraj et al. 2017, Eqs. 4-6, with their misprints put right: Eq. 4's second case is the vertical
 pair (G33 + G53) / 2, Eq. 5's (G24 + G44) / 2, and Eq. 6 is three kinds of site, not three cases of
-one. Written for the site, not for the pattern, so all four Bayer patterns are one code.
+one. Written for the site, not for the pattern, so all four Bayer patterns are one code. Bilinear
+interpolation, Malvar et al. 2004 and Menon et al. 2007 come from the package colour-demosaicing.
 """
 
 from collections.abc import Callable
@@ -18,7 +19,8 @@ def demosaic(
 ) -> np.ndarray:
     """Colour image (H, W, 3) float64 from a Bayer mosaic (H, W).
 
-    Borders continue the image by reflection about the border pixels, which keeps the Bayer phase.
+    `method` is "laroche-prescott", "bilinear", "malvar" or "menon". Borders continue the image by
+    reflection about the border pixels, which keeps the Bayer phase.
     Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity.
 
     >>> demosaic(np.ones((4, 4)), cfa="GRBG").shape
@@ -47,4 +49,40 @@ def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     return image
 
 
-METHODS: dict[str, Callable[[np.ndarray, str], np.ndarray]] = {"laroche-prescott": laroche_prescott}
+def bilinear(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """The mean of the nearest sites of each colour."""
+    from colour_demosaicing import demosaicing_CFA_Bayer_bilinear
+
+    return _beyond_the_border(demosaicing_CFA_Bayer_bilinear, raw, cfa)
+
+
+def malvar(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Linear interpolation corrected by gradients: Malvar, He and Cutler 2004."""
+    from colour_demosaicing import demosaicing_CFA_Bayer_Malvar2004
+
+    return _beyond_the_border(demosaicing_CFA_Bayer_Malvar2004, raw, cfa)
+
+
+def menon(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Directional filtering with a decision afterwards: Menon, Andriani and Calvagno 2007."""
+    from colour_demosaicing import demosaicing_CFA_Bayer_Menon2007
+
+    return _beyond_the_border(demosaicing_CFA_Bayer_Menon2007, raw, cfa)
+
+
+BORDER_PX = 8
+"""Further than any of these looks; even, so that the Bayer phase stays."""
+
+
+def _beyond_the_border(method: Callable[..., np.ndarray], raw: np.ndarray, cfa: str) -> np.ndarray:
+    """A method of the package on the image continued by reflection: its own borders mix colours."""
+    image = method(np.pad(raw, BORDER_PX, mode="reflect"), cfa)
+    return np.ascontiguousarray(image[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX])
+
+
+METHODS: dict[str, Callable[[np.ndarray, str], np.ndarray]] = {
+    "laroche-prescott": laroche_prescott,
+    "bilinear": bilinear,
+    "malvar": malvar,
+    "menon": menon,
+}

@@ -1,8 +1,8 @@
 """Parallel-camera geometry: where a point appears, and how far a section shifts each view.
 
-Notation: d disparity in px per camera step; (k, l) camera; (K, L) grid; z planar depth.
-A point (X, Y, Z) appears in camera (k, l) at column (W-1)/2 + (focal / pixel) (X - X_l) / Z and
-likewise in rows, so a camera further right sees it further LEFT.
+Notation: d disparity in px per camera step; (k, l) camera; (K, L) grid; z planar depth; s shear.
+A point (X, Y, Z) appears in camera (k, l) at column (W-1)/2 + (l - (L-1)/2) s + (focal / pixel)
+(X - X_l) / Z and likewise in rows, so without shear a camera further right sees it further LEFT.
 """
 
 import numpy as np
@@ -29,54 +29,68 @@ def project_px(
     X, Y, Z = point_mm
     x_camera, y_camera = camera_position_mm(grid, k, l)
     scale_px = grid.focal_mm / grid.pixel_mm
-    i = (grid.height - 1) / 2 + scale_px * (Y - y_camera) / Z
-    j = (grid.width - 1) / 2 + scale_px * (X - x_camera) / Z
+    i = (grid.height - 1) / 2 + (k - (grid.rows - 1) / 2) * grid.shear_px[1] + scale_px * (Y - y_camera) / Z
+    j = (grid.width - 1) / 2 + (l - (grid.cols - 1) / 2) * grid.shear_px[0] + scale_px * (X - x_camera) / Z
     return i, j
 
 
-def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """(horizontal, vertical) disparity at depth z in px per camera step; 0 at infinity."""
+def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """(horizontal, vertical) disparity at depth z that the cameras' distance makes, in px per camera step."""
     scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
     return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
+
+
+def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """(horizontal, vertical) disparity at depth z in px per camera step: parallax less shear."""
+    across, down = parallax_px(grid, z_mm)
+    return across - grid.shear_px[0], down - grid.shear_px[1]
 
 
 def _check_near(grid: CameraGrid, z_mm: float) -> tuple[float, float]:
     """The disparities at z, if shifts by them can be counted in whole pixels."""
     with np.errstate(over="ignore", divide="ignore"):
         d_x, d_y = disparity_px(grid, z_mm)
-    if not max(d_x * grid.cols, d_y * grid.rows) < 2**31:
+    if not max(abs(d_x) * grid.cols, abs(d_y) * grid.rows) < 2**31:
         raise InputError(f"z_mm: {z_mm:g} mm is so near that views shift by more than 2^31 pixels")
     return float(d_x), float(d_y)
 
 
-def nearest_shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whole-pixel shifts (rows (K,), columns (L,)), int64, that bring each view to the centre.
+def exact_shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts (rows (K,), columns (L,)), float64, that bring each view to the virtual centre.
 
-    Row i of camera row k belongs to row i + floor((k - (K-1)/2) d + 1/2) of the virtual centre.
+    What camera row k sees in row i belongs to row i + (k - (K-1)/2) d, with a fraction in general.
+    """
+    d_x, d_y = _check_near(grid, z_mm)
+    rows = (np.arange(grid.rows) - (grid.rows - 1) / 2) * d_y
+    return rows, (np.arange(grid.cols) - (grid.cols - 1) / 2) * d_x
+
+
+def nearest_shifts_px(grid: CameraGrid, z_mm: float, step_px: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """The same, int64, to the nearest multiple of `step_px`: floor(x + 1/2) for whole pixels.
+
     `floor(x + 1/2)` and not `round`, which rounds half to even and makes half-pixel shifts
     alternate.
     """
-    d_x, d_y = _check_near(grid, z_mm)
-    rows = np.floor((np.arange(grid.rows) - (grid.rows - 1) / 2) * d_y + 0.5)
-    cols = np.floor((np.arange(grid.cols) - (grid.cols - 1) / 2) * d_x + 0.5)
+    rows, cols = (step_px * np.floor(shift / step_px + 0.5) for shift in exact_shifts_px(grid, z_mm))
     return rows.astype(np.int64), cols.astype(np.int64)
 
 
-def target_indices(grid: CameraGrid, z_mm: float, subpixel: int) -> tuple[np.ndarray, np.ndarray]:
+def target_indices(
+    grid: CameraGrid, z_mm: float, subpixel: int, step_px: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
     """Voxel rows (K, H) and columns (L, W), int64, to which each pixel of each camera belongs.
 
-    With `subpixel` = 1 every camera moves by a whole number of pixels; with M > 1 the centre of
+    With `subpixel` = 1 every camera moves by a multiple of `step_px` pixels; with M > 1 the centre of
     pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M). Indices outside the section are
     outside the voxel grid.
     """
     i, j = np.arange(grid.height), np.arange(grid.width)
     if subpixel == 1:
-        row_shift, col_shift = nearest_shifts_px(grid, z_mm)
+        row_shift, col_shift = nearest_shifts_px(grid, z_mm, step_px)
         return i + row_shift[:, None], j + col_shift[:, None]
-    d_x, d_y = _check_near(grid, z_mm)
-    k, l = np.arange(grid.rows)[:, None], np.arange(grid.cols)[:, None]
-    rows = np.floor((i + 0.5 + (k - (grid.rows - 1) / 2) * d_y) * subpixel)
-    cols = np.floor((j + 0.5 + (l - (grid.cols - 1) / 2) * d_x) * subpixel)
+    row_shift, col_shift = exact_shifts_px(grid, z_mm)
+    rows = np.floor((i + 0.5 + row_shift[:, None]) * subpixel)
+    cols = np.floor((j + 0.5 + col_shift[:, None]) * subpixel)
     return rows.astype(np.int64), cols.astype(np.int64)
 
 
@@ -91,8 +105,8 @@ def landing(
 
 
 def disparity_spread_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
-    """Total disparity over the longer axis of the grid in px, (N - 1) d: the scale of depth errors."""
-    d_x, d_y = disparity_px(grid, z_mm)
+    """Total parallax over the longer axis of the grid in px, (N - 1) d: the scale of depth errors."""
+    d_x, d_y = parallax_px(grid, z_mm)
     return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
 
 

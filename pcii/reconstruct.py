@@ -7,15 +7,16 @@ ever spread by interpolation.
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from pcii.bayer import colour_cells
-from pcii.dense import sum_counts, sum_views
+from pcii.dense import Moves, moves, sum_counts, sum_fine, sum_views
 from pcii.errors import InputError
 from pcii.geometry import target_indices
 from pcii.photon_counts import PhotonCounts
-from pcii.types import CameraGrid, Normalisation, Sections, Views, check_z_mm
+from pcii.types import CameraGrid, Normalisation, Sections, Shifts, Views, check_z_mm
 
 MUCH_LIGHT = 1 / 16
 """Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.
@@ -30,6 +31,7 @@ def reconstruct(
     *,
     subpixel: int = 1,
     normalisation: Normalisation = "overlap",
+    shifts: Shifts = "nearest",
     variance: bool = False,
 ) -> Sections:
     """Sections of photon counts (Eq. 3) or radiance (Eq. 2) at the depths `z_mm`.
@@ -37,122 +39,117 @@ def reconstruct(
     Returns `Sections` with arrays (Z, H M, W M, C): M = `subpixel`, C = 3 for Bayer or colour data,
     1 for monochrome. `normalisation` "overlap" divides by the samples that reach a voxel, "views"
     by the number of cameras as the paper does, which darkens borders. `variance` adds the unbiased
-    variance of the samples at each voxel, for radiance on whole pixels.
-    Raises `InputError` for a depth not above 0 or a subpixel division below 1.
+    variance of the samples at each voxel, 0 below two.
+
+    `shifts` are "nearest" (views move by whole pixels), "bilinear" (radiance only: each sample is shared
+    by the four voxels around its place; `coverage` is then the sum of the shares) or "even". With "even"
+    raw Bayer samples are added without telling colours apart, as the paper does, and the section is a
+    mosaic to be demosaiced: `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for
+    even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
+
+    Raises `InputError` for a depth not above 0, a subpixel division below 1, or options that do not go
+    together.
 
     >>> sections = reconstruct(counts, z_mm=[540, 620])          # doctest: +SKIP
     >>> sections.estimate.shape                                  # doctest: +SKIP
     (2, 1024, 1024, 3)
     """
     z = check_z_mm(z_mm)
+    _check(data, subpixel, normalisation, shifts, variance)
+    grid, spread = data.grid, None
+    cfa = None if shifts == "even" else data.cfa
+    shape = (z.size, grid.height * subpixel, grid.width * subpixel)
+    shape = (*shape, 1 if shifts == "even" else data.channel_count)
+    rows, cols = _targets(grid, z, subpixel, 2 if shifts == "even" else 1)
+    if shifts == "bilinear":
+        coverage = _shared_coverage(grid, cfa, shape, z)
+    else:
+        coverage = _coverage(grid, cfa, shape, rows, cols)
+    if isinstance(data, PhotonCounts):
+        if not data.is_sparse and subpixel == 1 and data.lit_share > MUCH_LIGHT:
+            sums = sum_counts(data, z, shifts)
+        else:
+            sums = _scatter(data, data.events.n, shape, rows, cols)
+        if variance:
+            spread = _count_variance(data, sums, coverage, rows, cols)
+    elif subpixel > 1:
+        sums, spread = sum_fine(data, z, subpixel, coverage, variance=variance)
+    else:
+        sums, spread = sum_views(data, z, shifts, variance=variance)
+    mosaic = data.cfa if shifts == "even" else None
+    return Sections(grid, z, sums, coverage, subpixel, normalisation, spread, mosaic)
+
+
+def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
+    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane."""
+    for depth in check_z_mm(z_mm):
+        yield reconstruct(data, depth, **options)
+
+
+def _check(
+    data: PhotonCounts | Views, subpixel: int, normalisation: Normalisation, shifts: Shifts, variance: bool
+) -> None:
     if not isinstance(data, PhotonCounts | Views):
         raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
     if isinstance(subpixel, bool) or not isinstance(subpixel, int) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
     if normalisation not in ("overlap", "views"):
         raise InputError(f"normalisation: use 'overlap' or 'views', not {normalisation!r}")
-    if variance and (subpixel > 1 or not isinstance(data, Views)):
-        raise InputError("variance: is told of Views on whole pixels (subpixel = 1) only")
-    grid, spread = data.grid, None
-    shape = (z.size, grid.height * subpixel, grid.width * subpixel, data.channel_count)
-    rows, cols = _targets(grid, z, subpixel)
-    if (
-        isinstance(data, PhotonCounts)
-        and not data.is_sparse
-        and subpixel == 1
-        and data.lit_share > MUCH_LIGHT
-    ):
-        sums = sum_counts(data, z)
-    elif isinstance(data, PhotonCounts):
-        sums = _scatter(data, shape, rows, cols)
-    elif subpixel > 1:
-        sums = _fine_sums(data, z, subpixel)
-    else:
-        sums, spread = sum_views(data, z, variance=variance)
-    coverage = _coverage(grid, data.cfa, shape, rows, cols)
-    return Sections(grid, z, sums, coverage, subpixel, normalisation, spread)
-
-
-def reconstruct_each(
-    data: PhotonCounts | Views,
-    z_mm: object,
-    *,
-    subpixel: int = 1,
-    normalisation: Normalisation = "overlap",
-) -> Iterator[Sections]:
-    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane."""
-    for depth in check_z_mm(z_mm):
-        yield reconstruct(data, depth, subpixel=subpixel, normalisation=normalisation)
+    if shifts not in ("nearest", "bilinear", "even"):
+        raise InputError(f"shifts: use 'nearest', 'bilinear' or 'even', not {shifts!r}")
+    if shifts != "nearest" and subpixel > 1:
+        raise InputError(f"shifts: {shifts!r} is for whole pixels (subpixel = 1)")
+    if shifts == "even" and data.cfa is None:
+        raise InputError("shifts: 'even' is for Bayer mosaics; these data have no pattern (cfa)")
+    if shifts == "bilinear" and isinstance(data, PhotonCounts):
+        raise InputError("shifts: photon counts are never interpolated; use 'nearest', or finer voxels")
+    if shifts == "bilinear" and variance:
+        raise InputError("variance: samples that are shared between voxels have none; use 'nearest' shifts")
 
 
 def _scatter(
-    data: PhotonCounts, shape: tuple[int, int, int, int], rows: np.ndarray, cols: np.ndarray
+    data: PhotonCounts,
+    n: np.ndarray,
+    shape: tuple[int, ...],
+    rows: np.ndarray,
+    cols: np.ndarray,
 ) -> np.ndarray:
-    """Photons per voxel and colour; the cost follows the photons."""
+    """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
     from pcii import kernels
 
     events = data.events
     # No voxel gets more than the whole; half the bytes are half the time.
-    counts = np.empty(shape, dtype=np.int32 if data.total < 2**31 else np.int64)
+    counts = np.empty(shape, dtype=np.int32 if n is events.n and data.total < 2**31 else np.int64)
     # A band for each thread: of one section if there is but one, else a section is a band.
     bands = max(1, kernels.threads() // shape[0])
-    photons = data.view_starts, events.i, events.j, data.event_colours, events.n
-    kernels.scatter(counts, rows, cols, *photons, bands)
+    colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
+    kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n, bands)
     return counts
 
 
-def _targets(grid: CameraGrid, z: np.ndarray, subpixel: int) -> tuple[np.ndarray, np.ndarray]:
+def _count_variance(
+    data: PhotonCounts, sums: np.ndarray, coverage: np.ndarray, rows: np.ndarray, cols: np.ndarray
+) -> np.ndarray:
+    """Unbiased variance of the counts that meet at each voxel, those of zero included: float64.
+
+    (m Q - S^2) / (m (m - 1)) of m samples with the sum S and sum of squares Q: in integers, it cannot cancel.
+    """
+    n = data.events.n
+    if n.size and int(n.max()) * data.total * data.grid.view_count >= 2**62:
+        raise InputError("variance: the counts are too large for their squares to be added up exactly")
+    squares = _scatter(data, n * n, sums.shape, rows, cols)
+    samples = coverage.astype(np.int64)
+    spread = samples * squares - sums.astype(np.int64) ** 2
+    return spread / np.maximum(samples * (samples - 1), 1)
+
+
+def _targets(
+    grid: CameraGrid, z: np.ndarray, subpixel: int, step_px: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
     """Voxel rows (Z, K, H) and columns (Z, L, W) of each pixel of each camera."""
-    targets = [target_indices(grid, depth, subpixel) for depth in z]
+    targets = [target_indices(grid, depth, subpixel, step_px) for depth in z]
     rows, cols = (np.stack(axis).astype(np.int32) for axis in zip(*targets, strict=True))
     return rows, cols
-
-
-def _fine_sums(data: Views, z: np.ndarray, subpixel: int) -> np.ndarray:
-    """Sums (Z, H M, W M, C) of radiance on finer voxels; a view is read once, however many planes."""
-    grid, C = data.grid, data.channel_count
-    cells = colour_cells(data.cfa)
-    targets = [target_indices(grid, depth, subpixel) for depth in z]
-    sums = np.zeros((z.size, C, grid.height * subpixel, grid.width * subpixel))
-    for k in range(grid.rows):
-        for l in range(grid.cols):
-            image = data.view(k, l)
-            for plane, (rows, cols) in zip(sums, targets, strict=True):
-                if data.cfa is None:
-                    for colour in range(image.shape[2]):
-                        _add_image(plane[colour], image[..., colour], rows[k], cols[l])
-                    continue
-                for (a, b), colour in np.ndenumerate(cells):
-                    cell = image[a::2, b::2, 0]
-                    _add_image(plane[colour], cell, rows[k, a::2], cols[l, b::2])
-    return np.ascontiguousarray(np.moveaxis(sums, 1, -1))
-
-
-def _add_image(plane: np.ndarray, image: np.ndarray, row: np.ndarray, col: np.ndarray) -> None:
-    """Add pixels at voxel (row[i], col[j]); within one camera no two pixels share a voxel."""
-    H, W = plane.shape
-    i, j = _inside(row, H), _inside(col, W)
-    row, col = row[i], col[j]
-    if row.size and col.size:
-        # Targets are equally spaced but for a rounding once in 1e13, which a slice would miss.
-        if _is_spaced(row) and _is_spaced(col):
-            plane[_strided(row), _strided(col)] += image[i, j]
-        else:
-            plane[np.ix_(row, col)] += image[i, j]
-
-
-def _inside(target: np.ndarray, size: int) -> slice:
-    """The run of pixels whose (increasing) targets fall on the voxel grid."""
-    return slice(int(np.searchsorted(target, 0)), int(np.searchsorted(target, size)))
-
-
-def _is_spaced(target: np.ndarray) -> bool:
-    return bool(np.all(np.diff(target, 2) == 0))
-
-
-def _strided(target: np.ndarray) -> slice:
-    step = int(target[1] - target[0]) if target.size > 1 else 1
-    return slice(int(target[0]), int(target[-1]) + 1, step)
 
 
 def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, subpixel: int) -> np.ndarray:
@@ -161,8 +158,32 @@ def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, s
     return _coverage(grid, cfa, shape, *_targets(grid, np.array([z_mm]), subpixel))[0]
 
 
+def _shared_coverage(grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], z: np.ndarray) -> np.ndarray:
+    """The sum of the shares that samples have in each voxel (Z, H, W, C), float64: it separates too."""
+    coverage = np.zeros(shape)
+    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
+    for plane, depth in zip(coverage, z, strict=True):
+        by_row, by_col = (
+            np.sum([_shares(move, size) for move in axis], axis=0)
+            for axis, size in zip(moves(grid, depth, "bilinear"), shape[1:3], strict=True)
+        )
+        for (a, b), colour in np.ndenumerate(cells):
+            plane[..., colour] += by_row[a][:, None] * by_col[b]
+        if cfa is None:
+            plane[..., 1:] = plane[..., :1]  # all pixels see all colours
+    return coverage
+
+
+def _shares(move: Moves, size: int) -> np.ndarray:
+    """What samples at pixels of even and of odd number bring to each voxel row (or column), (2, size)."""
+    pixel = np.arange(size) - move.px[:, None]
+    inside = (pixel >= 0) & (pixel < size)
+    weight = np.where(inside, move.weight[:, None], 0)
+    return np.array([np.where(pixel % 2 == parity, weight, 0).sum(axis=0) for parity in (0, 1)])
+
+
 def _coverage(
-    grid: CameraGrid, cfa: str | None, shape: tuple[int, int, int, int], rows: np.ndarray, cols: np.ndarray
+    grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:
     """The same for all planes (Z, H M, W M, C).
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, TypeGuard
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pcii.bayer import check_cfa
 from pcii.errors import InputError
 
 Normalisation = Literal["overlap", "views"]
+Shifts = Literal["nearest", "bilinear", "even"]
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -44,9 +45,13 @@ def _check_size(name: str, value: object) -> None:
         raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
 
 
-def _check_length(name: str, value: object) -> None:
+def _is_finite(value: object) -> TypeGuard[float]:
     number = isinstance(value, int | float | np.integer | np.floating)
-    if isinstance(value, bool) or not number or not (math.isfinite(value) and value > 0):
+    return number and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _check_length(name: str, value: object) -> None:
+    if not (_is_finite(value) and value > 0):
         raise InputError(f"{name}: expected a finite length above 0 mm, got {value!r}")
 
 
@@ -57,7 +62,10 @@ class CameraGrid:
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
     Y = (k - (rows-1)/2) pitch_y. `pitch_mm` is (pitch_x, pitch_y). Each image has `height` x `width`
     square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
-    ((height-1)/2, (width-1)/2). Raises `InputError` for a size below 1 or a length not above 0.
+    ((height-1)/2, (width-1)/2). In a sheared grid `shear_px` (x, y) is not 0: each camera's axis meets it
+    further right (down) by so many px per camera step, counted from the centre of the grid, so that what
+    has that much disparity stands still. Raises `InputError` for a size below 1, a length not above 0 or
+    a shear that is not finite.
     """
 
     rows: int
@@ -67,6 +75,7 @@ class CameraGrid:
     pixel_mm: float
     height: int
     width: int
+    shear_px: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("rows", "cols", "height", "width"):
@@ -79,6 +88,10 @@ class CameraGrid:
         for name in ("focal_mm", "pixel_mm"):
             _check_length(name, getattr(self, name))
         object.__setattr__(self, "pitch_mm", (float(pitch[0]), float(pitch[1])))
+        shear = self.shear_px
+        if not isinstance(shear, tuple | list) or len(shear) != 2 or not all(map(_is_finite, shear)):
+            raise InputError(f"shear_px: expected two finite numbers (x, y) of pixels, got {shear!r}")
+        object.__setattr__(self, "shear_px", (float(shear[0]), float(shear[1])))
 
     @property
     def view_count(self) -> int:
@@ -145,7 +158,7 @@ class Sections:
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
     real numbers for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
     the voxel grid is M times finer in both axes. `variance` is that of the samples of each voxel, if it
-    was asked for.
+    was asked for. `cfa` is the Bayer pattern of sections that are mosaics themselves (of even shifts).
     """
 
     grid: CameraGrid
@@ -155,6 +168,7 @@ class Sections:
     subpixel: int = 1
     normalisation: Normalisation = "overlap"
     variance: np.ndarray | None = None
+    cfa: str | None = None
 
     def __post_init__(self) -> None:
         z = check_z_mm(self.z_mm)

@@ -193,7 +193,7 @@ def test_nan_and_infinity_are_refused(bad):
 
 def test_an_unknown_method_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"^method: .*laroche-prescott"):
-        demosaic(np.zeros((4, 4)), method="bilinear")
+        demosaic(np.zeros((4, 4)), method="nearest")
 
 
 @pytest.mark.parametrize("bad", ["grbg", "RGB", None])
@@ -204,3 +204,40 @@ def test_a_bad_pattern_is_refused(bad):
 
 def test_no_photons_stay_no_photons():
     assert not demosaic(np.zeros((5, 5), dtype=np.uint8)).any()
+
+
+# Other methods
+
+COMPARED = ["bilinear", "malvar", "menon"]
+
+
+@pytest.mark.parametrize("method", COMPARED)
+@pytest.mark.parametrize("cfa", PATTERNS)
+def test_every_method_keeps_its_sites_and_a_grey_image(method, cfa):
+    rng = np.random.default_rng(1)
+    raw = rng.random((12, 15))
+    image = demosaic(raw, cfa=cfa, method=method)
+    own = np.take_along_axis(image, colour_index(12, 15, cfa)[..., None].astype(np.int64), axis=2)[..., 0]
+    np.testing.assert_allclose(own, raw, rtol=1e-12)
+    np.testing.assert_allclose(demosaic(np.full((9, 8), 0.3), cfa=cfa, method=method), 0.3, rtol=1e-12)
+
+
+@pytest.mark.parametrize("method", COMPARED)
+def test_colours_do_not_mix_at_the_border_by_any_method(method):
+    # Red is 1 and the rest 0.2: the package alone lets a border's red leak into the other colours.
+    flat = mosaic(np.broadcast_to([1.0, 0.2, 0.2], (10, 10, 3)), "RGGB")
+    image = demosaic(flat, cfa="RGGB", method=method)
+    np.testing.assert_allclose(image, np.broadcast_to([1.0, 0.2, 0.2], image.shape), atol=1e-12)
+
+
+def test_bilinear_is_the_mean_of_the_neighbours_by_hand():
+    raw = at((42, 4), (44, 8), (33, 100), (53, 200), (43, 10))
+    assert demosaic(raw, method="bilinear")[3, 2].tolist() == [0.0, (4 + 8 + 100 + 200) / 4, 10.0]
+
+
+@pytest.mark.parametrize("method", COMPARED)
+@pytest.mark.parametrize("shape", [(2, 2), (2, 7), (3, 3), (5, 2)])
+def test_small_images_have_an_answer_by_every_method(method, shape):
+    image = demosaic(np.arange(np.prod(shape), dtype=float).reshape(shape), method=method)
+    assert image.shape == (*shape, 3)
+    assert np.isfinite(image).all()

@@ -6,6 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import colour_of, unit_grid, voxel_of
 
+from pcii.bayer import mosaic
+from pcii.demosaic import demosaic
 from pcii.dense import BATCH
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
@@ -15,14 +17,14 @@ from pcii.types import Views
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 
 
-def samples_twin(images: np.ndarray, grid, cfa: str | None, z_mm: float) -> dict:
+def samples_twin(images: np.ndarray, grid, cfa: str | None, z_mm: float, subpixel: int = 1) -> dict:
     """The samples that meet at each (row, column, colour), by loops."""
     K, L, H, W, C = images.shape
     meeting: dict[tuple[int, int, int], list[float]] = {}
     for k, l, i, j in np.ndindex(K, L, H, W):
-        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, 1)
-        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, 1)
-        if 0 <= row < H and 0 <= col < W:
+        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, subpixel)
+        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, subpixel)
+        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
             for channel in range(C):
                 colour = channel if cfa is None else colour_of(i, j, cfa)
                 meeting.setdefault((row, col, colour), []).append(float(images[k, l, i, j, channel]))
@@ -116,13 +118,167 @@ def test_more_views_than_are_held_at_a_time() -> None:
         np.testing.assert_allclose(read.variance, held.variance, rtol=1e-12)
 
 
-def test_variance_is_told_of_views_on_whole_pixels_only() -> None:
+# Depths whose disparity is exact, so that the twin's order of operations cannot matter.
+exact_depths = st.sampled_from([0.25, 0.5, 1.0, 2.0, 4.0])
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
+    pixels=st.tuples(st.integers(1, 6), st.integers(1, 6)),
+    z=exact_depths,
+    cfa=patterns,
+    subpixel=st.integers(1, 3),
+    most=st.sampled_from([1, 3, 10**6]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_variances_of_counts_and_on_finer_voxels_are_those_of_the_samples(
+    cameras, pixels, z, cfa, subpixel, most, seed
+) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
+    samples = samples_twin(dense[..., None], grid, cfa, z, subpixel)
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    views = Views(dense[..., None].astype(np.float32), grid, cfa)
+    for data in (bright, sparse, views):
+        sections = reconstruct(data, z, subpixel=subpixel, variance=True)
+        expected = np.zeros(sections.counts.shape[1:])
+        for voxel, values in samples.items():
+            expected[voxel] = np.var(values, ddof=1) if len(values) > 1 else 0
+        assert sections.variance is not None
+        np.testing.assert_allclose(sections.variance[0], expected, rtol=1e-6, atol=1e-9 * most)
+        without = reconstruct(data, z, subpixel=subpixel)
+        np.testing.assert_allclose(sections.counts, without.counts, rtol=1e-12)
+
+
+def test_variance_of_counts_survives_a_mean_of_a_million_deviations() -> None:
+    grid = unit_grid(10, 10, 4, 4)
+    dense = np.random.default_rng(6).integers(10**6, 10**6 + 3, grid.shape_KLHW)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid), 1e6, variance=True)
+    assert sections.variance is not None
+    exact = dense.reshape(100, 4, 4).astype(np.longdouble).var(axis=0, ddof=1)
+    np.testing.assert_allclose(sections.variance[0, ..., 0], exact.astype(float), rtol=1e-12)
+    with pytest.raises(InputError, match="variance: the counts are too large"):
+        reconstruct(PhotonCounts.from_dense(dense * 2**18, grid), 1e6, variance=True)
+
+
+# Bilinear shifts
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
+    pixels=st.tuples(st.integers(1, 7), st.integers(1, 7)),
+    pitch=st.tuples(st.sampled_from([0.25, 0.75, 1.5, 3.0]), st.sampled_from([0.25, 1.25, 2.0])),
+    cfa=patterns,
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_bilinear_shifts_share_each_sample_among_four_voxels(cameras, pixels, pitch, cfa, seed) -> None:
+    grid = unit_grid(*cameras, *pixels, pitch)
+    K, L, H, W = grid.shape_KLHW
+    images = np.random.default_rng(seed).integers(0, 50, (K, L, H, W, 1)).astype(np.float32)
+    C = 3 if cfa else 1
+    sums, shares = np.zeros((H + 99, W + 99, C)), np.zeros((H + 99, W + 99, C))
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row, col = i + (k - (K - 1) / 2) * pitch[1], j + (l - (L - 1) / 2) * pitch[0]
+        top, left = int(np.floor(row)), int(np.floor(col))
+        for a, b in np.ndindex(2, 2):
+            share = abs(1 - a - (row - top)) * abs(1 - b - (col - left))
+            voxel = (top + a, left + b, colour_of(i, j, cfa))  # what is beside the section goes to the rest
+            sums[voxel] += share * images[k, l, i, j, 0]
+            shares[voxel] += share
+    for views in (images, Reader(images)):
+        sections = reconstruct(Views(views, grid, cfa), 1.0, shifts="bilinear")
+        np.testing.assert_allclose(sections.counts[0], sums[:H, :W], rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(sections.coverage[0], shares[:H, :W], rtol=1e-12, atol=1e-12)
+    whole = unit_grid(*cameras, *pixels, (2.0, 4.0))  # an even shift, of each camera of an odd or even grid
+    for z in (1.0, 0.5):
+        near, shared = (
+            reconstruct(Views(images, whole, cfa), z, shifts=shifts) for shifts in ("nearest", "bilinear")
+        )
+        np.testing.assert_array_equal(near.counts, shared.counts)
+        np.testing.assert_array_equal(near.coverage, shared.coverage)
+
+
+def test_a_slope_is_exact_with_bilinear_shifts_only() -> None:
+    # The plane's brightness rises evenly: what lies between two pixels is their weighted mean.
+    grid = unit_grid(4, 6, 30, 40, (1.0, 1.3))  # half pixels to the side, which rounding makes whole ones
+    i, j = np.mgrid[:30, :40]
+    views = np.array(
+        [[2.0 * (i + (k - 1.5) * 1.3) + 5.0 * (j + l - 2.5) for l in range(6)] for k in range(4)]
+    )
+    sections = reconstruct(Views(views[..., None], grid), 1.0, shifts="bilinear")
+    inner = (0, slice(5, 25), slice(5, 35), 0)
+    np.testing.assert_allclose(sections.estimate[inner], (2.0 * i + 5.0 * j)[inner[1:3]], rtol=1e-12)
+    nearest = reconstruct(Views(views[..., None], grid), 1.0)
+    assert np.abs(nearest.estimate[inner] - (2.0 * i + 5.0 * j)[inner[1:3]]).max() > 0.1
+
+
+# Even shifts: the paper's order
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    z=st.floats(0.2, 8),
+    cfa=st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG"]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=100, deadline=None)
+def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    K, L, H, W = grid.shape_KLHW
+    dense = np.random.default_rng(seed).poisson(1.0, grid.shape_KLHW)
+    sums, samples = np.zeros((H, W), int), np.zeros((H, W), int)
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row = i + 2 * int(np.floor((k - (K - 1) / 2) / z / 2 + 0.5))
+        col = j + 2 * int(np.floor((l - (L - 1) / 2) / z / 2 + 0.5))
+        if 0 <= row < H and 0 <= col < W:
+            assert colour_of(i, j, cfa) == colour_of(row, col, cfa)
+            sums[row, col] += dense[k, l, i, j]
+            samples[row, col] += 1
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    for data in (bright, sparse, Views(dense[..., None].astype(np.float64), grid, cfa)):
+        sections = reconstruct(data, z, shifts="even")
+        assert sections.cfa == cfa
+        np.testing.assert_array_equal(sections.counts[0, ..., 0], sums)
+        np.testing.assert_array_equal(sections.coverage[0, ..., 0], samples)
+
+
+def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
+    grid = unit_grid(3, 3, 24, 24, (2.0, 2.0))
+    flat = np.broadcast_to([0.8, 0.3, 0.1], (*grid.shape_KLHW, 3))
+    sections = reconstruct(Views(mosaic(flat, "GRBG")[..., None], grid, "GRBG"), 1.0, shifts="even")
+    assert sections.cfa == "GRBG"
+    colours = demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)
+    np.testing.assert_allclose(colours, flat[0, 0], rtol=1e-12)
+
+
+CLASHES = [
+    ({"shifts": "cubic"}, "shifts: use 'nearest', 'bilinear' or 'even'"),
+    ({"shifts": "even", "subpixel": 2}, "shifts: 'even' is for whole pixels"),
+    ({"shifts": "bilinear", "variance": True}, "variance: samples that are shared"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), CLASHES)
+def test_options_that_do_not_go_together_are_refused(options, words) -> None:
     grid = unit_grid(2, 2, 4, 4)
-    with pytest.raises(InputError, match="variance"):
-        reconstruct(Views(np.ones((2, 2, 4, 4, 1)), grid), 1.0, subpixel=2, variance=True)
-    counts = PhotonCounts.from_dense(np.ones((2, 2, 4, 4), dtype=np.int64), grid, cfa=None)
-    with pytest.raises(InputError, match="variance"):
-        reconstruct(counts, 1.0, variance=True)
+    with pytest.raises(InputError, match=words):
+        reconstruct(Views(np.ones((2, 2, 4, 4, 1)), grid, "GRBG"), 1.0, **options)
+
+
+def test_neither_counts_are_interpolated_nor_colourless_data_demosaiced() -> None:
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.ones((2, 2, 4, 4), dtype=np.int64), grid)
+    with pytest.raises(InputError, match="photon counts are never interpolated"):
+        reconstruct(counts, 1.0, shifts="bilinear")
+    with pytest.raises(InputError, match="'even' is for Bayer mosaics"):
+        reconstruct(counts, 1.0, shifts="even")
 
 
 @given(

@@ -27,6 +27,7 @@ grids = st.builds(
     pixel_mm=st.floats(0.01, 0.1),
     height=st.integers(1, 9),
     width=st.integers(1, 9),
+    shear_px=st.tuples(st.sampled_from([0.0, 1.5, -7.25]), st.sampled_from([0.0, 3.0, -0.5])),
 )
 depths = st.floats(200, 5000)
 

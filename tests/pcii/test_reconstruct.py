@@ -312,6 +312,24 @@ def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, disparity):
         assert wrong.mean() > 0.9
 
 
+@pytest.mark.parametrize("cfa", ["RGGB", None])
+@pytest.mark.parametrize("shear", [(3.0, 2.0), (1.0, -2.0), (5.0, 7.0)])
+def test_a_plane_is_exact_in_a_sheared_grid(cfa, shear):
+    # At z = 1 the parallax is (3, 2): the first shear makes the plane stand still, the last turns it round.
+    grid = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0), shear_px=shear)
+    seen, pattern = views_of_a_plane(grid, (3 - int(shear[0]), 2 - int(shear[1])), seed=4)
+    views = Views(seen, grid) if cfa is None else Views(mosaic(seen, cfa)[..., None], grid, cfa)
+    sections = reconstruct(views, [1.0, 0.25])
+    covered = sections.coverage > 0
+    np.testing.assert_array_equal(sections.estimate[0], np.where(covered[0], pattern, 0))
+    assert covered[0].any(axis=-1).mean() > 0.5
+    assert (sections.estimate[1] != pattern)[sections.coverage[1] > 1].mean() > 0.9
+    # The fault: the same views taken for those of a grid that is not sheared.
+    straight = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0))
+    fault = reconstruct(Views(views.radiance, straight, cfa), 1.0)
+    assert (fault.estimate[0] != pattern)[fault.coverage[0] > 1].mean() > 0.5
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("cfa", ["GRBG", "BGGR", None])
 @pytest.mark.parametrize("subpixel", [1, 3])

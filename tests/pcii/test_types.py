@@ -43,6 +43,12 @@ def test_a_bad_pitch_is_refused_by_name(value):
         CameraGrid(**{**GOOD, "pitch_mm": value})
 
 
+@pytest.mark.parametrize("value", [1.0, (1.0,), None, (1.0, float("nan")), (True, 1.0), ("1", 1.0)])
+def test_a_bad_shear_is_refused_by_name(value):
+    with pytest.raises(InputError, match=r"^shear_px: "):
+        CameraGrid(**{**GOOD, "shear_px": value})
+
+
 def test_a_pitch_may_be_a_list_of_whole_numbers():
     assert CameraGrid(**{**GOOD, "pitch_mm": [5, 4]}).pitch_mm == (5.0, 4.0)
 

@@ -9,11 +9,23 @@ from pcii.types import CameraGrid
 
 
 def unit_grid(
-    rows: int, cols: int, height: int, width: int, pitch_mm: tuple[float, float] = (1.0, 1.0)
+    rows: int,
+    cols: int,
+    height: int,
+    width: int,
+    pitch_mm: tuple[float, float] = (1.0, 1.0),
+    shear_px: tuple[float, float] = (0.0, 0.0),
 ) -> CameraGrid:
-    """A grid whose disparity at z = 1 mm is `pitch_mm` read as pixels, exactly: focal and pixel are 1."""
+    """A grid whose parallax at z = 1 mm is `pitch_mm` read as pixels, exactly: focal and pixel are 1."""
     return CameraGrid(
-        rows=rows, cols=cols, pitch_mm=pitch_mm, focal_mm=1.0, pixel_mm=1.0, height=height, width=width
+        rows=rows,
+        cols=cols,
+        pitch_mm=pitch_mm,
+        focal_mm=1.0,
+        pixel_mm=1.0,
+        height=height,
+        width=width,
+        shear_px=shear_px,
     )
 
 
