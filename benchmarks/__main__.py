@@ -2,9 +2,9 @@
 
 import sys
 
-from benchmarks import photons, sections
+from benchmarks import accuracy, photons, sections
 
-TABLES = {"sections": sections.table, "photons": photons.table}
+TABLES = {"sections": sections.table, "accuracy": accuracy.table, "photons": photons.table}
 for name in sys.argv[1:] or TABLES:
     for line in TABLES[name]():
         print(line, flush=True)

@@ -55,7 +55,13 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) ->
 
 @app.command
 def reconstruct(
-    dataset: Path, *, out: Out, z_mm: Depths = (), subpixel: int = 1, budget: Budget = None
+    dataset: Path,
+    *,
+    out: Out,
+    z_mm: Depths = (),
+    subpixel: int = 1,
+    shifts: Literal["nearest", "even"] = "nearest",
+    budget: Budget = None,
 ) -> None:
     """Reconstruct sections from the photon counts, with a picture of each.
 
@@ -71,17 +77,22 @@ def reconstruct(
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     subpixel
         Divide each pixel into this many voxels per axis.
+    shifts
+        `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
+    from pcii.demosaic import demosaic
     from pcii.picture import to_srgb8, white_level, write_png
     from pcii.pipeline import planes_of
     from pcii.reconstruct import reconstruct as make
 
     data = _open(dataset, budget)
-    sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel)
+    sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
     results.claim(out, data)
     say(f"{results.save_sections(out, sections)}")
     for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
         path = out / f"section_{z:g}mm.png"
+        if sections.cfa is not None:
+            estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
         write_png(path, to_srgb8(estimate, white_level(estimate, (slice(None), slice(None)))))
         say(f"{path}")
 

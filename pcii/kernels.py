@@ -65,6 +65,46 @@ def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
         target[row] = rows[kinds[row]]
 
 
+@compiled
+def window_samples(
+    number: np.ndarray,
+    total: np.ndarray,
+    squares: np.ndarray,
+    row: np.ndarray,
+    col: np.ndarray,
+    n: np.ndarray,
+    starts: np.ndarray,
+    window: int,
+    bands: int,
+) -> None:
+    """Number, sum and sum of squares of each window's samples that are not zero, (H, W) int64, from zeros.
+
+    A sample is the sum of one view's photons in a window of `window` x `window` cells about a cell. `row`,
+    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
+    thread owns a band of rows. The cost follows the photons times the cells of a window.
+    """
+    height, width = number.shape
+    above = (window - 1) // 2  # of an even window the larger half lies above and left of its cell
+    below = window // 2
+    for band in nb.prange(bands):
+        first, last = height * band // bands, height * (band + 1) // bands
+        sample = np.zeros((last - first, width), np.int64)
+        for view in range(starts.size - 1):
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        sample[i - first, j] += n[e]
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        here = sample[i - first, j]
+                        if here > 0:  # else another photon of the window has been here
+                            number[i, j] += 1
+                            total[i, j] += here
+                            squares[i, j] += here * here
+                            sample[i - first, j] = 0
+
+
 BAND = 16
 """Rows of a section that are summed at a time when all views are at hand: their sums stay in the cache."""
 

@@ -58,7 +58,10 @@ def _read_marker(out: Path) -> dict[str, object] | None:
 def save_sections(out: Path, sections: Sections) -> Path:
     """Write the sums and the coverage; the estimate is one divided by the other."""
     arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
-    write_arrays_safely(out / "sections.zarr", arrays, {"axes": "Z, H, W, C", "unit": "photons"})
+    told = {"axes": "Z, H, W, C", "unit": "photons"}
+    if sections.cfa is not None:
+        told["cfa"] = sections.cfa
+    write_arrays_safely(out / "sections.zarr", arrays, told)
     return out / "sections.zarr"
 
 

@@ -6,7 +6,6 @@ is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -98,30 +97,24 @@ class ViewSamples:
 def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
     """Mean and variance of the non-zero samples of each pooled voxel at depth z (for Eq. 7).
 
+    With cells and windows of 1 these are the samples of single voxels, whatever their colour.
+
     In focus all views see the same piece of surface, so their samples differ by Poisson noise only;
     out of focus they see different pieces, and the variance grows. A window of an even number of
     pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
     """
-    from scipy.ndimage import uniform_filter
+    from pcii import kernels
 
     grid, events = counts.grid, counts.events
     row, col, inside = landing(grid, events, z_mm)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
-    cell = (row[inside] // cell_px) * shape[1] + col[inside] // cell_px
-    photons = events.n[inside].astype(np.float64)
+    number, total, squares = (np.zeros(shape, dtype=np.int64) for _ in range(3))
     # Events are sorted by view, so each view's are one run.
-    view = events.k[inside].astype(np.int64) * grid.cols + events.l[inside]
-    ends = np.searchsorted(view, np.arange(grid.view_count + 1))
-    number = np.zeros(shape, dtype=np.int64)
-    total = np.zeros(shape, dtype=np.int64)
-    squares = np.zeros(shape, dtype=np.int64)
-    for first, last in pairwise(ends):
-        image = np.bincount(cell[first:last], photons[first:last], minlength=shape[0] * shape[1])
-        pooled = uniform_filter(image.reshape(shape), window_cells, mode="constant") * window_cells**2
-        sample = np.rint(pooled).astype(np.int64)
-        number += sample > 0
-        total += sample
-        squares += sample * sample
+    starts = np.append(0, np.cumsum(inside))[counts.view_starts]
+    cells = row[inside] // cell_px, col[inside] // cell_px
+    kernels.window_samples(
+        number, total, squares, *cells, events.n[inside], starts, window_cells, kernels.threads()
+    )
     mean = total / np.maximum(number, 1)
     # n Q - S^2 in integers cannot cancel.
     spread = number * squares - total * total

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from PIL import Image
 
 from pcii import cli as pcii_cli
 from pcii import console
@@ -89,6 +90,20 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     assert by_name[0] == by_name[1]
     assert one["depth"] == other["depth"]
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
+
+
+def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
+    small_dataset: Path, tmp_path: Path
+) -> None:
+    command = ["reconstruct", str(small_dataset), "--z-mm", "580", "--shifts", "even", "-o", str(tmp_path)]
+    assert console.run(pcii_cli.app, command) == 0
+    group = zarr.open_group(tmp_path / "sections.zarr", mode="r")
+    assert group.attrs["cfa"] == "GRBG"
+    counts = np.asarray(group["counts"])
+    assert counts.shape == (1, 256, 256, 1)
+    assert 0.5 * 36 * 4000 < counts.sum() < 36 * 4400  # what does not move out of the picture
+    with Image.open(tmp_path / "section_580mm.png") as picture:
+        assert np.asarray(picture).std(axis=2).max() > 10  # grey would have none
 
 
 def test_bad_input_to_simgen_is_told_in_one_sentence(
