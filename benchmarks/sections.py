@@ -122,7 +122,7 @@ def table() -> Iterator[str]:
 
 
 def _demosaicing() -> Iterator[str]:
-    import colour_demosaicing as peers  # pyright: ignore[reportMissingImports]
+    import colour_demosaicing as peers
 
     raw = np.random.default_rng(0).random((1024, 1024))
     own, _ = timed(lambda _: demosaic(raw, cfa="GRBG"), repeats=15)
