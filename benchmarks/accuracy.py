@@ -149,7 +149,8 @@ def _card() -> Iterator[str]:
     for name, seconds, M, found in _ways(Views(images, grid, CFA), 600.0):
         if M > 1:  # the truth is known per pixel
             fine = found.reshape(SIDE_PX, M, SIDE_PX, M, 3)
-            found = np.nansum(fine, axis=(1, 3)) / np.maximum(np.isfinite(fine).sum(axis=(1, 3)), 1)
+            known = np.isfinite(fine).sum(axis=(1, 3))
+            found = np.where(known > 0, np.nansum(fine, axis=(1, 3)) / np.maximum(known, 1), np.nan)
         error, _ = _error(found, truth, BORDER_PX)
         yield f"| {name} | {1e3 * seconds:.1f} | {100 * error / contrast:.1f} |"
 
