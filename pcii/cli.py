@@ -1,9 +1,10 @@
 """The `pcii` command."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import App, Parameter, Token
 
 from pcii import __version__, console, results
 from pcii.console import Stages, say
@@ -17,6 +18,18 @@ app = App(
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
+
+
+def _whole(_: object, tokens: Sequence[Token]) -> int:
+    """A whole number, and not one that would have to be rounded."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"expected a whole number, got {text!r}") from None
+
+
+Subpixel = Annotated[int, Parameter(converter=_whole)]
 Budget = Annotated[
     float | None,
     Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),
@@ -59,7 +72,7 @@ def reconstruct(
     *,
     out: Out,
     z_mm: Depths = (),
-    subpixel: int = 1,
+    subpixel: Subpixel = 1,
     shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
 ) -> None:

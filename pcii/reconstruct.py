@@ -91,7 +91,7 @@ def _check(
 ) -> None:
     if not isinstance(data, PhotonCounts | Views):
         raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
-    if isinstance(subpixel, bool) or not isinstance(subpixel, int) or subpixel < 1:
+    if isinstance(subpixel, bool) or not isinstance(subpixel, int | np.integer) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
     if normalisation not in ("overlap", "views"):
         raise InputError(f"normalisation: use 'overlap' or 'views', not {normalisation!r}")

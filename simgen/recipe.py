@@ -11,11 +11,21 @@ from pcii.bayer import PATTERNS
 from pcii.errors import InputError
 from pcii.types import CameraGrid
 from simgen.locations import find, recipe_roots
-from simgen.schema import Count, NonNegative, Positive, Strict, read_toml, suggestion, validate
+from simgen.schema import (
+    Count,
+    NonNegative,
+    Positive,
+    Real,
+    Share,
+    Strict,
+    Whole,
+    read_toml,
+    suggestion,
+    validate,
+)
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
-Share = Annotated[float, Field(gt=0, le=1)]
-Share0 = Annotated[float, Field(ge=0, le=1)]
+Efficiency = Annotated[Real, Field(gt=0, le=1)]
 MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
@@ -51,7 +61,7 @@ class FullLight(Strict):
     """Electrons that a pixel holds at most."""
     read_noise_e: NonNegative = 2.0
     """Standard deviation of the noise of reading a pixel, in electrons."""
-    adc_bits: Annotated[int, Field(ge=1, le=24)] = 12
+    adc_bits: Annotated[Whole, Field(ge=1, le=24)] = 12
     """The full well is told in so many steps of equal size: 2^bits - 1."""
 
 
@@ -60,17 +70,17 @@ class Sensor(Strict):
 
     cfa: Cfa = "GRBG"
     """Bayer pattern by its first two rows, or "none" for a monochrome sensor."""
-    quantum_efficiency: tuple[Share, Share, Share] = (1.0, 1.0, 1.0)
+    quantum_efficiency: tuple[Efficiency, Efficiency, Efficiency] = (1.0, 1.0, 1.0)
     """Chance that a photon is counted, by the pixel's colour: R, G, B; a monochrome sensor takes G."""
     dark_counts: NonNegative = 0.0
     """Mean number of counts that each pixel of a view has without any light."""
-    hot_pixel_share: Share0 = 0.0
+    hot_pixel_share: Share = 0.0
     """Share of the pixels that are hot: the same ones in every view, since one sensor takes them all."""
     hot_pixel_counts: NonNegative = 1.0
     """Mean number of counts that a hot pixel has in each view without any light."""
-    dead_pixel_share: Share0 = 0.0
+    dead_pixel_share: Share = 0.0
     """Share of the pixels that never count; the same ones in every view."""
-    counter_bits: Annotated[int, Field(ge=1, le=32)] | None = None
+    counter_bits: Annotated[Whole, Field(ge=1, le=32)] | None = None
     """A pixel stops at 2^bits - 1 counts; 1 makes it tell only whether there was a photon."""
     full_light: FullLight | None = None
     """Makes the full-light images those of a camera instead of exact radiance."""
@@ -79,7 +89,7 @@ class Sensor(Strict):
 class Photons(Strict):
     """How much light there is."""
 
-    budget: Annotated[float, Field(gt=0, le=MOST_PHOTONS)] = 1000.0
+    budget: Annotated[Real, Field(gt=0, le=MOST_PHOTONS)] = 1000.0
     """Expected photons that arrive in each `scope`; not used with scope "exposure"."""
     scope: Literal["view", "channel", "scene", "exposure"] = "view"
     """What `budget` is counted over: every view, each colour of every view, or all views together.
@@ -156,7 +166,7 @@ class Recipe(Strict):
     title: str = ""
     scene: Annotated[str, Field(min_length=1)]
     """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""
-    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
     grid: Grid = Grid()
     sensor: Sensor = Sensor()
     photons: Photons = Photons()

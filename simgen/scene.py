@@ -14,6 +14,7 @@ from simgen.schema import (
     Colour,
     NonNegative,
     Positive,
+    Real,
     Strict,
     Vector,
     read_toml,
@@ -59,7 +60,7 @@ class Plastic(Strict):
     """A coloured body under a clear coat of refractive index 1.49, which gives highlights."""
 
     type: Literal["plastic"] = "plastic"
-    roughness: Annotated[float, Field(ge=0.001, le=1)] = 0.1
+    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
 
@@ -68,7 +69,7 @@ class Metal(Strict):
 
     type: Literal["metal"] = "metal"
     name: Literal["Ag", "Al", "Au", "Cr", "Cu", "W"]
-    roughness: Annotated[float, Field(ge=0.001, le=1)] = 0.1
+    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
 

@@ -133,6 +133,9 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     small_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data, out = str(small_dataset), str(tmp_path / "out")
+    for text in ("1.5", "two"):
+        said = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", text, "-o", out], capsys)
+        assert f"--subpixel: expected a whole number, got '{text}'" in said
     for z in ("0", "-540", "nan", "inf"):
         said = refusal(pcii_cli.app, ["reconstruct", data, f"--z-mm={z}", "-o", out], capsys)
         assert "above 0 mm" in said

@@ -234,6 +234,11 @@ def test_a_subpixel_division_that_cannot_be_is_refused(bad):
         reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), 1.0, subpixel=bad)
 
 
+def test_a_subpixel_division_may_come_from_an_array():
+    counts = photons(np.ones((1, 1, 2, 2), dtype=int), unit_grid(1, 1, 2, 2))
+    assert reconstruct(counts, 1.0, subpixel=np.arange(3)[2]).counts.shape == (1, 4, 4, 1)
+
+
 def test_an_unknown_normalisation_is_refused():
     grid, other = unit_grid(1, 1, 2, 2), "sum"
     unknown: Any = other

@@ -49,6 +49,13 @@ def test_overrides_take_toml_values_and_bare_words() -> None:
         ),
         ({"scene": "x", "sensor": {"cfa": "GRGB"}}, "'GRBG', 'RGGB', 'BGGR', 'GBRG' or 'none', got 'GRGB'"),
         ({"scene": "x", "photons": {"budget": float("nan")}}, "'photons.budget'"),
+        ({"scene": "x", "photons": {"budget": True}}, "'photons.budget': input should be a valid number"),
+        ({"scene": "x", "photons": {"budget": "300"}}, "'photons.budget': input should be a valid number"),
+        ({"scene": "x", "grid": {"rows": 2.0}}, "'grid.rows': input should be a valid integer"),
+        (
+            {"scene": "x", "grid": {"pitch_mm": [1, "1"]}},
+            "'grid.pitch_mm[1]': input should be a valid number",
+        ),
     ],
 )
 def test_a_wrong_recipe_is_told_in_one_sentence(values: dict, message: str) -> None:
