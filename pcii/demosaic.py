@@ -7,10 +7,11 @@ interpolation, Malvar et al. 2004 and Menon et al. 2007 come from the package co
 """
 
 from collections.abc import Callable
+from importlib import import_module
 
 import numpy as np
 
-from pcii.bayer import colour_cells
+from pcii.bayer import check_cfa, colour_cells
 from pcii.errors import InputError
 
 
@@ -28,6 +29,7 @@ def demosaic(
     """
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no demosaicing named {method!r}; use {', '.join(METHODS)}")
+    check_cfa(cfa)
     if cfa is None:
         raise InputError("cfa: a monochrome image has nothing to demosaic")
     raw = np.asarray(mosaic_HW, dtype=np.float64)
@@ -51,32 +53,29 @@ def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
 
 def bilinear(raw: np.ndarray, cfa: str) -> np.ndarray:
     """The mean of the nearest sites of each colour."""
-    from colour_demosaicing import demosaicing_CFA_Bayer_bilinear
-
-    return _beyond_the_border(demosaicing_CFA_Bayer_bilinear, raw, cfa)
+    return _by_package("demosaicing_CFA_Bayer_bilinear", raw, cfa)
 
 
 def malvar(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Linear interpolation corrected by gradients: Malvar, He and Cutler 2004."""
-    from colour_demosaicing import demosaicing_CFA_Bayer_Malvar2004
-
-    return _beyond_the_border(demosaicing_CFA_Bayer_Malvar2004, raw, cfa)
+    return _by_package("demosaicing_CFA_Bayer_Malvar2004", raw, cfa)
 
 
 def menon(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Directional filtering with a decision afterwards: Menon, Andriani and Calvagno 2007."""
-    from colour_demosaicing import demosaicing_CFA_Bayer_Menon2007
-
-    return _beyond_the_border(demosaicing_CFA_Bayer_Menon2007, raw, cfa)
+    return _by_package("demosaicing_CFA_Bayer_Menon2007", raw, cfa)
 
 
 BORDER_PX = 8
 """Further than any of these looks; even, so that the Bayer phase stays."""
 
 
-def _beyond_the_border(method: Callable[..., np.ndarray], raw: np.ndarray, cfa: str) -> np.ndarray:
-    """A method of the package on the image continued by reflection: its own borders mix colours."""
-    image = method(np.pad(raw, BORDER_PX, mode="reflect"), cfa)
+def _by_package(name: str, raw: np.ndarray, cfa: str) -> np.ndarray:
+    """A method of colour-demosaicing on the image continued by reflection: its own borders mix colours."""
+    printing = np.get_printoptions()
+    package = import_module("colour_demosaicing")
+    np.set_printoptions(**printing)  # which the package changes for everyone
+    image = getattr(package, name)(np.pad(raw, BORDER_PX, mode="reflect"), cfa)
     return np.ascontiguousarray(image[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX])
 
 

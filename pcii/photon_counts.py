@@ -175,6 +175,7 @@ def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
         raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
     if array.dtype.kind == "b":
         array = array.astype(np.uint8)
+    array = array.astype(array.dtype.newbyteorder("="), copy=False)
     if array.size and array.min() < 0:
         raise InputError(f"{name}: photon counts must not be negative")
     if array.size and array.max() > LARGEST_COUNT:

@@ -135,7 +135,8 @@ def _count_variance(
     (m Q - S^2) / (m (m - 1)) of m samples with the sum S and sum of squares Q: in integers, it cannot cancel.
     """
     n = data.events.n
-    if n.size and int(n.max()) * data.total * data.grid.view_count >= 2**62:
+    # No sum of squares is above the largest count times the largest sum.
+    if n.size and int(n.max()) * int(sums.max()) * int(coverage.max()) >= 2**63:
         raise InputError("variance: the counts are too large for their squares to be added up exactly")
     squares = _scatter(data, n * n, sums.shape, rows, cols)
     samples = coverage.astype(np.int64)

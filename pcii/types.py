@@ -180,6 +180,11 @@ class Sections:
         object.__setattr__(self, "z_mm", read_only(z))
         object.__setattr__(self, "counts", read_only(self.counts))
         object.__setattr__(self, "coverage", read_only(self.coverage))
+        check_cfa(self.cfa)
+        if self.variance is not None:
+            if self.variance.shape != self.counts.shape:
+                raise InputError("variance: must have the shape of counts")
+            object.__setattr__(self, "variance", read_only(self.variance))
 
     @cached_property
     def estimate(self) -> np.ndarray:

@@ -67,6 +67,16 @@ class Pool(Protocol):
     majorant: Majorant
     mass: np.ndarray
 
+    @property
+    def paths_each(self) -> int:
+        """Light paths of a candidate that is followed."""
+        ...
+
+    @property
+    def patience(self) -> int:
+        """Where so many candidates find no light there is none."""
+        ...
+
     def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Found:
         """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
 

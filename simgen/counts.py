@@ -56,13 +56,12 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
     grid = recipe.grid.camera_grid()
     pixels = grid.height * grid.width
     seen = probe(built, grid, recipe.cfa, recipe.seed)
-    gain = _photons_per_radiance(recipe, seen)
+    per_view, gain = _photons(recipe, seen)
     scope_pixels = _scope_pixels(recipe)
     samples = seen.samples_for(gain, scope_pixels)
     if recipe.products.radiance != "none":
         samples = max(samples, recipe.render.samples_per_pixel)
     samples = min(samples, (MOST_PATHS - 1) // pixels)
-    per_view = gain * seen.mean * pixels
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
@@ -75,7 +74,8 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
     return Plan(
-        thins=few and (cheaper or noise > NOISE_SHARE),
+        # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
+        thins=few and seen.mean > 0 and (cheaper or noise > NOISE_SHARE),
         samples=samples,
         photons_per_view=per_view,
         noise=noise,
@@ -177,15 +177,19 @@ def absolute_gain(recipe: Recipe) -> float | None:
     return photons_per_radiance(recipe.exposure, recipe.grid.pixel_mm)
 
 
-def _photons_per_radiance(recipe: Recipe, seen: Probe) -> float:
-    """The same, estimated for a budget from what the virtual centre sees."""
+def _photons(recipe: Recipe, seen: Probe) -> tuple[float, float]:
+    """Photons that a view is expected to have, and those of a pixel and a unit of radiance.
+
+    For a budget the second is estimated from what the virtual centre sees, for an exposure the first.
+    """
+    grid = recipe.grid.camera_grid()
+    pixels = grid.height * grid.width
     gain = absolute_gain(recipe)
     if gain is not None:
-        return gain
-    grid = recipe.grid.camera_grid()
+        return gain * seen.mean * pixels, gain
     scopes = {"view": 1.0, "channel": float(channel_count(recipe.cfa)), "scene": 1 / grid.view_count}
     per_view = recipe.photons.budget * scopes[recipe.photons.scope]
-    return per_view / (grid.height * grid.width * seen.mean) if seen.mean > 0 else 0.0
+    return per_view, per_view / (pixels * seen.mean) if seen.mean > 0 else 0.0
 
 
 def _scope_pixels(recipe: Recipe) -> int | None:

@@ -267,7 +267,7 @@ def _skipped(recipe: Recipe, made: Plan | None, photons: dict[str, Any] | None) 
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
     skipped = []
-    if made is not None and photons is not None and made.thins:
+    if photons is not None and photons.get("paths", 0) < photons.get("dense_paths_instead", 0):
         skipped.append(
             f"rendering for the photon counts: {photons['paths']} light paths instead of "
             f"{photons['dense_paths_instead']}"

@@ -39,6 +39,8 @@ class LanePool:
     than the bound, and if it survives that, by its path's radiance compared with that product.
     """
 
+    paths_each, patience = 1, 1 << 20
+
     def __init__(
         self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
     ) -> None:

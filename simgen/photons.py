@@ -52,8 +52,6 @@ KINDS = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int32) | {
     "z_mm": np.float32,
 }
 """How the columns of a list of photons are kept."""
-DARK_CANDIDATES = 1 << 20
-"""A scope in which so many candidates in a row find no light has none."""
 
 
 @dataclass(frozen=True)
@@ -85,15 +83,16 @@ class _Scopes:
         self.got = np.zeros(self.view.size, dtype=np.int64)
         self.tried = np.zeros(self.view.size, dtype=np.int64)
 
-    def open(self) -> np.ndarray:
-        """Numbers of those that still want photons and are not known to be dark."""
-        dark = (self.got == 0) & (self.tried >= DARK_CANDIDATES)
+    def open(self, patience: int) -> np.ndarray:
+        """Numbers of those that still want photons and are not dark: `patience` candidates found nothing."""
+        dark = (self.got == 0) & (self.tried >= patience)
         return np.flatnonzero((self.got < self.wanted) & ~dark)
 
 
 @dataclass
 class _Tally:
     candidates: int = 0
+    paths: int = 0
     followed: int = 0
     kept: int = 0
     overshoot: int = 0
@@ -140,7 +139,7 @@ class _Drawing:
             self.scopes.start()
             self.tally = _Tally()
             drawn = list(self._exposed(attempt) if self.gain is not None else self._budgeted(attempt))
-            paths += self.tally.candidates
+            paths += self.tally.paths
             attempt += 1
             if self.tally.overshoot <= OVERSHOOT_SHARE * self.tally.kept or attempt == ATTEMPTS:
                 break
@@ -182,22 +181,24 @@ class _Drawing:
         return _Scopes(view, group, wanted)
 
     def _warm_up(self) -> int:
-        """Draw candidates for nothing but to lift the majorant where it is exceeded; how many.
+        """Draw candidates for nothing but to lift the majorant where it is exceeded; how many paths it took.
 
         What is learned here costs no photon its independence.
         """
         aim = WARM_UP_SHARE * self._expected(self.pilot.mean) / LIKELY_SHARE
         number = int(np.clip(aim, *WARM_UP_CANDIDATES))
-        majorant = self._majorant()
+        majorant, paths = self._majorant(), 0
         for done in range(WARM_UP_ROUNDS):
             group = np.arange(number) % len(self.groups)
             path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
-            found = self._pool().try_candidates(group, None, path_seed)
+            pool = self._pool()
+            found = pool.try_candidates(group, None, path_seed)
+            paths += _paths(pool, number, found.ratio.size)
             factor = _factor(found.ratio)
             self.share = max(found.copies.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
             majorant.lift(found.over)
-        return number * WARM_UP_ROUNDS
+        return paths
 
     def _majorant(self) -> Majorant:
         assert self.pilot.majorant is not None
@@ -208,9 +209,10 @@ class _Drawing:
 
     def _budgeted(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
         """Rounds of candidates until every scope has its photons, or is dark."""
+        patience = self._pool().patience
         for number, block in enumerate(_blocks(self.scopes.wanted)):
             round_number = 0
-            while (wanting := np.intersect1d(self.scopes.open(), block)).size:
+            while (wanting := np.intersect1d(self.scopes.open(patience), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = _candidates_needed(missing, round_number, self.share)
                 part = attempt << 16 | round_number
@@ -248,12 +250,18 @@ class _Drawing:
         self.scopes.tried[scopes] += candidates
         self.tally.candidates += owner.size
         self.tally.followed += found.ratio.size
+        self.tally.paths += _paths(pool, owner.size, found.ratio.size)
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
         self.share = max(found.copies.sum() / max(owner.size, 1), LEAST_SHARE)
         own = {field.name: getattr(found, field.name) for field in fields(PhotonPaths)}
         columns = {name: column[path] for name, column in own.items()} | {"scope": scope, "rank": rank}
         return {name: column.astype(KINDS[name]) for name, column in columns.items()}
+
+
+def _paths(pool: Pool, candidates: int, followed: int) -> int:
+    """Light paths of so many candidates, of which some are followed beyond their first hit."""
+    return candidates + (pool.paths_each - 1) * followed
 
 
 def _factor(ratio: np.ndarray) -> float:

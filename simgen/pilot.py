@@ -19,8 +19,6 @@ from simgen.majorant import (
 from simgen.pools import pool_for, surroundings
 
 EVEN_PATHS = 1 << 15
-MOST_EVEN_PATHS = 1 << 20
-"""Where so many paths all over the films find no light there is none."""
 AIMED_LOOKS = (1 << 14, 1 << 18)
 """Looks of the second set, at least and at most; within that, as many as photons are wanted."""
 FOLLOWED_SHARE = 0.5
@@ -64,10 +62,11 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     pool = pool_for(setup, coarse, [np.arange(4)], ambient)
     seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
     looks = int(np.clip(expected(mean), *AIMED_LOOKS))
-    aimed = pool.look_around(looks, int(FOLLOWED_SHARE * looks), seed_of_part)
+    followed = int(FOLLOWED_SHARE * looks)
+    aimed = pool.look_around(looks, followed, seed_of_part)
     known = even.join(aimed)
     majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)
-    return Pilot(majorant, mean, ambient, paths + looks)
+    return Pilot(majorant, mean, ambient, paths + looks + (pool.paths_each - 1) * followed)
 
 
 def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
@@ -78,7 +77,7 @@ def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples,
     while True:
         number = seeds.integer(seed, view=1, stage="pilot", part=part)
         even = pool.look_around(paths, paths, number)
-        spent += paths
-        if even.light.any() or paths >= MOST_EVEN_PATHS:
+        spent += paths * pool.paths_each
+        if even.light.any() or paths >= pool.patience:
             return even, spent
         part, paths = part + 1, paths * 4

@@ -1,6 +1,6 @@
 """Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call of the renderer each.
 
-A call takes about a microsecond, so there is no first guess: who is not rejected by chance is followed.
+A call takes about a microsecond, less than a first guess would: every candidate on its own tile is followed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,6 +42,8 @@ class _Rays:
 
 class SinglePool:
     """The `Pool` of scalar mode."""
+
+    paths_each, patience = PATHS, 1 << 17
 
     def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
         self.setup, self.majorant = setup, majorant

@@ -236,6 +236,16 @@ def test_bilinear_is_the_mean_of_the_neighbours_by_hand():
 
 
 @pytest.mark.parametrize("method", COMPARED)
+def test_no_method_changes_how_numbers_are_printed_or_takes_a_bad_pattern(method):
+    before = np.get_printoptions()
+    demosaic(np.ones((4, 4)), method=method)
+    assert np.get_printoptions() == before
+    for bad in ("grbg", "XXXX"):
+        with pytest.raises(InputError, match=r"^cfa: "):
+            demosaic(np.ones((4, 4)), cfa=bad, method=method)
+
+
+@pytest.mark.parametrize("method", COMPARED)
 @pytest.mark.parametrize("shape", [(2, 2), (2, 7), (3, 3), (5, 2)])
 def test_small_images_have_an_answer_by_every_method(method, shape):
     image = demosaic(np.arange(np.prod(shape), dtype=float).reshape(shape), method=method)

@@ -160,6 +160,12 @@ def test_variance_of_counts_survives_a_mean_of_a_million_deviations() -> None:
     assert sections.variance is not None
     exact = dense.reshape(100, 4, 4).astype(np.longdouble).var(axis=0, ddof=1)
     np.testing.assert_allclose(sections.variance[0, ..., 0], exact.astype(float), rtol=1e-12)
+    bright = np.random.default_rng(0).poisson(3e6, (10, 10, 8, 8))
+    found = reconstruct(PhotonCounts.from_dense(bright, unit_grid(10, 10, 8, 8)), 1e9, variance=True)
+    assert found.variance is not None
+    assert not found.variance.flags.writeable
+    expected = bright.reshape(100, 8, 8).var(axis=0, ddof=1)
+    np.testing.assert_allclose(found.variance[0, ..., 0], expected, rtol=1e-9)
     with pytest.raises(InputError, match="variance: the counts are too large"):
         reconstruct(PhotonCounts.from_dense(dense * 2**18, grid), 1e6, variance=True)
 

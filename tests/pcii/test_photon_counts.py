@@ -6,6 +6,7 @@ from twins import unit_grid
 
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
+from pcii.reconstruct import reconstruct
 
 
 def events_of(counts: PhotonCounts) -> list[tuple[int, ...]]:
@@ -87,6 +88,12 @@ def test_whole_numbers_of_any_dtype_are_counts(dtype):
     counts = PhotonCounts.from_dense(np.ones((1, 1, 2, 2), dtype=dtype), unit_grid(1, 1, 2, 2))
     assert counts.total == 4
     assert counts.events.n.dtype == np.int64
+
+
+def test_counts_of_the_other_byte_order_are_counts():
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 7, dtype=">u2"), grid)
+    assert reconstruct(counts, 1e9).counts[0, 0, 0, 0] == 28
 
 
 def test_a_narrow_dtype_does_not_wrap_in_the_total():
