@@ -6,6 +6,9 @@ from pcii.types import CameraGrid
 from simgen.build import Built
 from simgen.cameras import camera_x_mm, camera_y_mm, sensor_plugin
 
+SEED_STEP = 0x9E3779B9
+"""Far from every other view's seed: parts of one view need seeds of their own."""
+
 
 def render_view(
     built: Built,
@@ -22,8 +25,13 @@ def render_view(
     seed on the same backend. Views need different seeds: with one seed their noise is the same.
     """
     mi = built.mi
-    sampler = {"type": "independent", "sample_count": samples_per_pixel}
+    sampler = {"type": "independent"}
     x_mm, y_mm = camera_x_mm(grid)[l], camera_y_mm(grid)[k]
     sensor = mi.load_dict(sensor_plugin(mi, grid, float(x_mm), float(y_mm), sampler))
-    image = mi.render(built.scene, sensor=sensor, spp=samples_per_pixel, seed=seed)
-    return np.array(image, dtype=np.float32)
+    total = np.zeros((grid.height, grid.width, 3))
+    # By powers of two: other numbers of samples the renderer adds in an order that is left to chance.
+    parts = [1 << bit for bit in range(samples_per_pixel.bit_length()) if samples_per_pixel >> bit & 1]
+    for number, samples in enumerate(reversed(parts)):
+        own_seed = (seed + number * SEED_STEP) % 2**32
+        total += samples * np.array(mi.render(built.scene, sensor=sensor, spp=samples, seed=own_seed))
+    return (total / samples_per_pixel).astype(np.float32)
