@@ -5,10 +5,12 @@ demosaiced at full light and from few photons.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from benchmarks.photons import setup_of
 from benchmarks.timing import timed
 from pcii.bayer import mosaic
 from pcii.demosaic import METHODS, demosaic
@@ -156,26 +158,15 @@ def _card() -> Iterator[str]:
 
 
 def _centre_view(built: Built, grid: CameraGrid, samples: int) -> np.ndarray:
-    centre = CameraGrid(
-        rows=1,
-        cols=1,
-        pitch_mm=grid.pitch_mm,
-        focal_mm=grid.focal_mm,
-        pixel_mm=grid.pixel_mm,
-        height=grid.height,
-        width=grid.width,
-    )
+    centre = replace(grid, rows=1, cols=1)
     return render_view(built, centre, 0, 0, samples_per_pixel=samples, seed=7).astype(np.float64)
 
 
 def _demosaicing() -> Iterator[str]:
     recipe, _ = load_recipe("paper")
-    scene, folder = load_scene(recipe.scene)
-    built = build(backend.load(), scene, folder, recipe.render.max_depth)
-    grid = CameraGrid(
-        rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=512, width=512
-    )
-    rendered = _centre_view(built, grid, 512)
+    setup = setup_of(recipe)
+    grid = replace(setup.grid, height=SIDE_PX, width=SIDE_PX)
+    rendered = _centre_view(setup.built, grid, 512)
     pixels = np.arange(SIDE_PX)
     pictures = {
         "textured plane": Texture().seen_at(pixels, pixels),

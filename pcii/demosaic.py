@@ -42,12 +42,12 @@ def demosaic(
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
-    from pcii import kernels
+    from pcii import demosaic_kernels
 
     cells = colour_cells(cfa).astype(np.int64)
     green, image = np.empty(raw.shape), np.empty((*raw.shape, 3))
-    kernels.interpolate_green(green, raw, cells)
-    kernels.interpolate_chroma(image, green, raw, cells)
+    demosaic_kernels.interpolate_green(green, raw, cells)
+    demosaic_kernels.interpolate_chroma(image, green, raw, cells)
     return image
 
 

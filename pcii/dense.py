@@ -67,7 +67,7 @@ def sum_fine(
 
     `coverage` has the same shape. A view is read once, however many planes.
     """
-    from pcii import kernels
+    from pcii import dense_kernels
 
     grid, cells = data.grid, np.zeros((0, 2), np.int64) if data.cfa is None else colour_cells(data.cfa)
     targets = [target_indices(grid, depth, subpixel) for depth in z]
@@ -77,7 +77,7 @@ def sum_fine(
     for k, l in np.ndindex(grid.rows, grid.cols):
         image = data.view(k, l).astype(np.float64)
         for plane, (rows, cols) in enumerate(targets):
-            kernels.add_fine(total[plane], squares[plane], first[plane], image, rows[k], cols[l], cells)
+            dense_kernels.add_fine(total[plane], squares[plane], first[plane], image, rows[k], cols[l], cells)
     if not variance:
         return total, None
     spread = np.maximum(squares - total**2 / np.maximum(coverage, 1), 0)
@@ -96,8 +96,8 @@ class _Plane:
     def __init__(
         self, data: Views | PhotonCounts, z_mm: float, shifts: Shifts, dtype: Any, spread: bool
     ) -> None:
-        grid, cfa = data.grid, data.cfa if shifts != "even" else None
-        C = data.channel_count if shifts != "even" else 1
+        grid = data.grid
+        cfa, C = colours_apart(data, shifts)
         self.row_moves, self.col_moves = moves(grid, z_mm, shifts)
         self.columns, self.spread = grid.cols, spread
         self.channels, self.groups = (1, 4) if cfa is not None else (C, 1)
@@ -113,10 +113,10 @@ class _Plane:
 
     def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Make the section of images (V, H, N) of all views; whether it and the images are finite."""
-        from pcii import kernels
+        from pcii import dense_kernels
 
         result = self.sums, self.variance
-        return kernels.sum_views(*result, images, *self._moves(views), *self.merging)
+        return dense_kernels.sum_views(*result, images, *self._moves(views), *self.merging)
 
     def start(self) -> None:
         """Begin a section of views that come some at a time."""
@@ -128,16 +128,16 @@ class _Plane:
 
     def add(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Add images (V, H, N) of these views; whether what falls beside the section is finite."""
-        from pcii import kernels
+        from pcii import dense_kernels
 
-        return kernels.add_views(self.total, self.squares, self.first, images, *self._moves(views))
+        return dense_kernels.add_views(self.total, self.squares, self.first, images, *self._moves(views))
 
     def finish(self) -> bool:
         """Bring the running sums to the result; whether it is finite."""
-        from pcii import kernels
+        from pcii import dense_kernels
 
         state = self.total, self.squares, self.first
-        return kernels.merge_groups(self.sums, self.variance, *state, *self.merging)
+        return dense_kernels.merge_groups(self.sums, self.variance, *state, *self.merging)
 
     def _moves(self, views: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Of each move of these views: image, shifts and weight, by group; and where each group ends."""
@@ -158,6 +158,16 @@ class _Plane:
         return source, down[order], right[order] * self.channels, weight, ends
 
 
+def colours_apart(data: Views | PhotonCounts, shifts: Shifts) -> tuple[str | None, int]:
+    """The pattern by which samples are told apart, and into how many colours: with even shifts by none."""
+    return (None, 1) if shifts == "even" else (data.cfa, data.channel_count)
+
+
+def step_px(shifts: Shifts) -> int:
+    """Of what number of pixels whole shifts are multiples."""
+    return 2 if shifts == "even" else 1
+
+
 @dataclass(frozen=True)
 class Moves:
     """Whole pixels by which each row (or column) of cameras is moved, int64, and with what weight."""
@@ -169,7 +179,7 @@ class Moves:
 def moves(grid: CameraGrid, z_mm: float, shifts: Shifts) -> tuple[list[Moves], list[Moves]]:
     """Moves of the rows (K,) and of the columns (L,) of cameras; they add up to each camera's shift."""
     if shifts != "bilinear":
-        whole = nearest_shifts_px(grid, z_mm, 2 if shifts == "even" else 1)
+        whole = nearest_shifts_px(grid, z_mm, step_px(shifts))
         rows, cols = ([Moves(px, np.ones(px.size))] for px in whole)
         return rows, cols
     axes = []

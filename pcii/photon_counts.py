@@ -82,7 +82,7 @@ class PhotonCounts:
         photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*where.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
-        return cls(grid, cfa, _events=_canonical_events(**where, n=photons, grid=grid))
+        return cls(grid, cfa, _events=_canonical_events(tuple(where.values()), photons, grid))
 
     @property
     def is_sparse(self) -> bool:
@@ -183,16 +183,9 @@ def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     return array
 
 
-def _canonical_events(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    n: np.ndarray,
-    grid: CameraGrid,
-) -> PhotonEvents:
+def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
     """Sort by (k, l, i, j), add up repeats, drop zeros: one form per content."""
-    flat = np.ravel_multi_index((k, l, i, j), grid.shape_KLHW)
+    flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
     where, inverse = np.unique(flat, return_inverse=True)
     photons = np.zeros(where.size, dtype=np.int64)
     np.add.at(photons, inverse, n)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pcii.bayer import colour_cells
-from pcii.dense import Moves, moves, sum_counts, sum_fine, sum_views
+from pcii.dense import Moves, colours_apart, moves, step_px, sum_counts, sum_fine, sum_views
 from pcii.errors import InputError
 from pcii.geometry import target_indices
 from pcii.photon_counts import PhotonCounts
@@ -57,10 +57,9 @@ def reconstruct(
     z = check_z_mm(z_mm)
     _check(data, subpixel, normalisation, shifts, variance)
     grid, spread = data.grid, None
-    cfa = None if shifts == "even" else data.cfa
-    shape = (z.size, grid.height * subpixel, grid.width * subpixel)
-    shape = (*shape, 1 if shifts == "even" else data.channel_count)
-    rows, cols = _targets(grid, z, subpixel, 2 if shifts == "even" else 1)
+    cfa, channels = colours_apart(data, shifts)
+    shape = (z.size, grid.height * subpixel, grid.width * subpixel, channels)
+    rows, cols = _targets(grid, z, subpixel, step_px(shifts))
     if shifts == "bilinear":
         coverage = _shared_coverage(grid, cfa, shape, z)
     else:
@@ -162,17 +161,22 @@ def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, s
 def _shared_coverage(grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], z: np.ndarray) -> np.ndarray:
     """The sum of the shares that samples have in each voxel (Z, H, W, C), float64: it separates too."""
     coverage = np.zeros(shape)
-    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
     for plane, depth in zip(coverage, z, strict=True):
         by_row, by_col = (
             np.sum([_shares(move, size) for move in axis], axis=0)
             for axis, size in zip(moves(grid, depth, "bilinear"), shape[1:3], strict=True)
         )
-        for (a, b), colour in np.ndenumerate(cells):
-            plane[..., colour] += by_row[a][:, None] * by_col[b]
-        if cfa is None:
-            plane[..., 1:] = plane[..., :1]  # all pixels see all colours
+        _add_product(plane, by_row, by_col, cfa)
     return coverage
+
+
+def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, cfa: str | None) -> None:
+    """Add what rows (2, H) and columns (2, W) of each parity bring to a plane (H, W, C), by colour."""
+    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
+    for (a, b), colour in np.ndenumerate(cells):
+        coverage[..., colour] += (by_row[a][:, None] * by_col[b]).astype(coverage.dtype, copy=False)
+    if cfa is None:
+        coverage[..., 1:] = coverage[..., :1]  # all pixels see all colours
 
 
 def _shares(move: Moves, size: int) -> np.ndarray:
@@ -195,7 +199,6 @@ def _coverage(
 
     planes, H, W, C = shape
     coverage = np.empty(shape, np.uint16 if grid.view_count < 1 << 16 else np.uint32)
-    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
     for plane in range(planes):
         by_row, by_col = (
             np.array([_landings(targets[plane, :, parity::2], size) for parity in (0, 1)])
@@ -204,10 +207,7 @@ def _coverage(
         # There are but a few kinds of rows: away from the borders the pattern repeats.
         _, first, kinds = np.unique(by_row[0] << 32 | by_row[1], return_index=True, return_inverse=True)
         some = np.zeros((first.size, W, C), dtype=coverage.dtype)
-        for (a, b), colour in np.ndenumerate(cells):
-            some[..., colour] += (by_row[a, first, None] * by_col[b]).astype(coverage.dtype)
-        if cfa is None:
-            some[..., 1:] = some[..., :1]  # all pixels see all colours
+        _add_product(some, by_row[:, first], by_col, cfa)
         kernels.copy_rows(coverage[plane].reshape(H, W * C), kinds, some.reshape(-1, W * C))
     return coverage
 

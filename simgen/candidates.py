@@ -94,6 +94,11 @@ class Pool(Protocol):
         ...
 
 
+def paths_of(pool: Pool, candidates: int, followed: int) -> int:
+    """Light paths of so many candidates, of which some are followed beyond their first hit."""
+    return candidates + (pool.paths_each - 1) * followed
+
+
 @dataclass(frozen=True)
 class Chances:
     """Where the candidates of a group of Bayer cells fall: entry of the majorant and cell (2 a + b).

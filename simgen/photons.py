@@ -26,7 +26,7 @@ import numpy as np
 from pcii.bayer import colour_cells
 from pcii.console import Report, silent
 from simgen import seeds
-from simgen.candidates import PhotonPaths, Pool, Setup
+from simgen.candidates import PhotonPaths, Pool, Setup, paths_of
 from simgen.majorant import Majorant
 from simgen.pilot import explore
 from simgen.pools import pool_for
@@ -193,7 +193,7 @@ class _Drawing:
             path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
             pool = self._pool()
             found = pool.try_candidates(group, None, path_seed)
-            paths += _paths(pool, number, found.ratio.size)
+            paths += paths_of(pool, number, found.ratio.size)
             factor = _factor(found.ratio)
             self.share = max(found.copies.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
@@ -209,10 +209,9 @@ class _Drawing:
 
     def _budgeted(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
         """Rounds of candidates until every scope has its photons, or is dark."""
-        patience = self._pool().patience
         for number, block in enumerate(_blocks(self.scopes.wanted)):
             round_number = 0
-            while (wanting := np.intersect1d(self.scopes.open(patience), block)).size:
+            while (wanting := np.intersect1d(self.scopes.open(self.pilot.patience), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = _candidates_needed(missing, round_number, self.share)
                 part = attempt << 16 | round_number
@@ -250,18 +249,13 @@ class _Drawing:
         self.scopes.tried[scopes] += candidates
         self.tally.candidates += owner.size
         self.tally.followed += found.ratio.size
-        self.tally.paths += _paths(pool, owner.size, found.ratio.size)
+        self.tally.paths += paths_of(pool, owner.size, found.ratio.size)
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
         self.share = max(found.copies.sum() / max(owner.size, 1), LEAST_SHARE)
         own = {field.name: getattr(found, field.name) for field in fields(PhotonPaths)}
         columns = {name: column[path] for name, column in own.items()} | {"scope": scope, "rank": rank}
         return {name: column.astype(KINDS[name]) for name, column in columns.items()}
-
-
-def _paths(pool: Pool, candidates: int, followed: int) -> int:
-    """Light paths of so many candidates, of which some are followed beyond their first hit."""
-    return candidates + (pool.paths_each - 1) * followed
 
 
 def _factor(ratio: np.ndarray) -> float:

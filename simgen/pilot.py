@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from simgen import seeds
-from simgen.candidates import Setup
+from simgen.candidates import Setup, paths_of
 from simgen.majorant import (
     COARSE_TILES,
     DIM_SHARE,
@@ -37,6 +37,8 @@ class Pilot:
     mean: np.ndarray
     ambient: np.ndarray
     paths: int
+    patience: int
+    """Where so many candidates of a scope find no light it has none."""
 
 
 def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) -> Pilot:
@@ -52,7 +54,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     even, paths = _look_evenly(setup, seed, ambient)
     mean = even.light.mean(axis=0)
     if not even.light.any():
-        return Pilot(None, mean, ambient, paths)
+        return Pilot(None, mean, ambient, paths, patience=0)
     ambient = ambient + AMBIENT_SHARE * mean.mean()
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
@@ -66,7 +68,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     aimed = pool.look_around(looks, followed, seed_of_part)
     known = even.join(aimed)
     majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)
-    return Pilot(majorant, mean, ambient, paths + looks + (pool.paths_each - 1) * followed)
+    return Pilot(majorant, mean, ambient, paths + paths_of(pool, looks, followed), pool.patience)
 
 
 def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
@@ -77,7 +79,7 @@ def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples,
     while True:
         number = seeds.integer(seed, view=1, stage="pilot", part=part)
         even = pool.look_around(paths, paths, number)
-        spent += paths * pool.paths_each
+        spent += paths_of(pool, paths, paths)
         if even.light.any() or paths >= pool.patience:
             return even, spent
         part, paths = part + 1, paths * 4

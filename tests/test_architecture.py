@@ -25,7 +25,7 @@ SHARED = {
 PCII_LEVELS = [
     {"errors"},
     {"bayer", "store", "console", "kernels"},
-    {"types"},
+    {"types", "dense_kernels", "demosaic_kernels"},
     {"photon_counts"},
     {"geometry", "dataset", "demosaic", "picture"},
     {"dense"},

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lit_scenes import DEPTH, EVENLY, ball, lit, two_balls
+from lit_scenes import DEPTH, EVENLY, LAMP, ball, lit, two_balls
 from scipy import stats
 
 from pcii.bayer import colour_index, mosaic
@@ -235,14 +235,7 @@ def hit_by(scene: Built, origin: np.ndarray, direction: np.ndarray) -> tuple[np.
 
 
 def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
-    lamp = {
-        "type": "area",
-        "position_mm": (-200, -300, 200),
-        "target_mm": (0, 0, 600),
-        "width_mm": 20,
-        "height_mm": 20,
-        "luminance_cd_m2": 2e5,
-    }
+    lamp = LAMP | {"width_mm": 20, "height_mm": 20, "luminance_cd_m2": 2e5}
     plastic, gold = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1)), ball("gold", 150.0, 700.0, (0, 0, 0))
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
