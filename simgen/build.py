@@ -9,11 +9,12 @@ import numpy as np
 
 from pcii.errors import InputError
 from simgen.backend import shape_numbers
-from simgen.light import light_plugin
-from simgen.scene import Card, Matt, Mesh, Metal, Plastic, Scene, SceneObject, Sphere, asset
+from simgen.build_light import light_plugin
+from simgen.build_shape import card_pose, pose_of, shape_plugin
+from simgen.build_surface import evenly, matt, surface_plugin, two_sided
+from simgen.scene import Scene, SceneObject
 
 BACKDROP = "backdrop"
-LARGEST_TEXTURE_PIXELS = 1 << 26
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
         plugins[BACKDROP] = {
             "type": "rectangle",
-            "to_world": facing @ _card_pose(mi, 2 * half, 2 * half),
-            "bsdf": _two_sided(_matt(_evenly(wall.reflectance))),
+            "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
+            "bsdf": two_sided(matt(evenly(wall.reflectance))),
         }
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light)
@@ -68,107 +69,8 @@ def _object_id(shape_id: str) -> int:
 
 
 def _object(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
-    T = mi.ScalarTransform4f
-    pose = T().translate(list(thing.position_mm))
-    for axis, degrees in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True):
-        pose = pose @ T().rotate(list(axis), degrees)
-    return {**_shape(mi, thing.shape, pose, folder), "bsdf": _two_sided(_surface(mi, thing, folder))}
-
-
-def _shape(mi: Any, shape: Sphere | Card | Mesh, pose: Any, folder: Path) -> dict[str, Any]:
-    T = mi.ScalarTransform4f
-    match shape:
-        case Sphere():
-            return {"type": "sphere", "to_world": pose @ T().scale(shape.radius_mm)}
-        case Card():
-            to_world = pose @ _card_pose(mi, shape.width_mm, shape.height_mm)
-            return {"type": "rectangle", "to_world": to_world}
-        case Mesh():
-            path = asset(folder, shape.file, "shape.file")
-            if path.suffix.lower() != ".ply":
-                raise InputError(f"{path}: a mesh must be a .ply file")
-            return {"type": "ply", "filename": str(path), "to_world": pose @ T().scale(shape.scale)}
-
-
-def _card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
-    """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces the cameras (-Z).
-
-    Turning about X by 180 degrees brings the normal to -Z and the texture upright: its top row
-    lies at -Y, which is up.
-    """
-    T = mi.ScalarTransform4f
-    return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
-
-
-def _two_sided(surface: dict[str, Any]) -> dict[str, Any]:
-    """The same from behind, so that a card or an open mesh is no black hole there."""
-    return {"type": "twosided", "bsdf": surface}
-
-
-def _matt(reflectance: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "diffuse", "reflectance": reflectance}
-
-
-def _evenly(srgb: tuple[float, float, float]) -> dict[str, Any]:
-    """One colour all over."""
-    return {"type": "rgb", "value": srgb_to_linear(np.array(srgb)).tolist()}
-
-
-def _surface(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
-    match thing.material.finish:
-        case Matt():
-            return _matt(_reflectance(mi, thing, folder))
-        case Plastic(roughness=alpha):
-            return {
-                "type": "roughplastic",
-                "distribution": "ggx",
-                "alpha": alpha,
-                "diffuse_reflectance": _reflectance(mi, thing, folder),
-            }
-        case Metal(name=name, roughness=alpha):
-            return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
-
-
-def _reflectance(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
-    material = thing.material
-    if material.texture is None:
-        assert material.reflectance is not None
-        return _evenly(material.reflectance)
-    path = asset(folder, material.texture, "material.texture")
-    pixels = _read_image(path)
-    if isinstance(thing.shape, Card):
-        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
-    return {
-        "type": "bitmap",
-        "bitmap": mi.Bitmap(pixels),
-        "raw": True,  # linear already, so Mitsuba must not convert it
-        "filter_type": "bilinear",
-        # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
-        "wrap_mode": "repeat" if isinstance(thing.shape, Sphere) else "clamp",
-    }
-
-
-def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
-    """IEC 61966-2-1 sRGB in [0, 1] to linear."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
-def _read_image(path: Path) -> np.ndarray:
-    """An image file as linear RGB, (H, W, 3) float32; size checked before it is decoded."""
-    from PIL import Image
-
-    try:
-        with Image.open(path, formats=("PNG", "JPEG", "TIFF")) as image:
-            if image.width * image.height > LARGEST_TEXTURE_PIXELS:
-                raise InputError(
-                    f"{path}: {image.width} x {image.height} pixels is more than a texture may "
-                    f"have ({LARGEST_TEXTURE_PIXELS})"
-                )
-            pixels = np.asarray(image.convert("RGB"))
-    except (OSError, SyntaxError, Image.DecompressionBombError) as fault:
-        raise InputError(f"{path}: cannot be read as an image ({fault})") from None
-    table = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
-    return table[pixels]
+    surface = surface_plugin(mi, thing.material, thing.shape, folder)
+    return {**shape_plugin(mi, thing.shape, pose_of(mi, thing), folder), "bsdf": two_sided(surface)}
 
 
 def _last_line(fault: BaseException) -> str:

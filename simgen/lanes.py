@@ -8,8 +8,8 @@ import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen.backend import load_drjit
+from simgen.build_light import LUMINANCE
 from simgen.candidates import Found, Setup, chances, nothing
-from simgen.light import LUMINANCE
 from simgen.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.paths import FirstHits, film_rays, hit_first, radiance_along
 

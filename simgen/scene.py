@@ -4,96 +4,17 @@ World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking a
 """
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from pcii.errors import InputError
+from simgen.assets import asset
+from simgen.lights import Light
 from simgen.locations import find, scene_roots
-from simgen.schema import (
-    Colour,
-    NonNegative,
-    Positive,
-    Real,
-    Strict,
-    Vector,
-    read_toml,
-    suggestion,
-    validate,
-)
-
-
-class Sphere(Strict):
-    """A sphere about the object's position."""
-
-    type: Literal["sphere"] = "sphere"
-    radius_mm: Positive
-
-
-class Card(Strict):
-    """A flat rectangle about the object's position; unrotated it faces the cameras."""
-
-    type: Literal["card"] = "card"
-    width_mm: Positive
-    height_mm: Positive
-
-
-class Mesh(Strict):
-    """A PLY mesh in the scene's folder, in millimetres about the object's position."""
-
-    type: Literal["mesh"] = "mesh"
-    file: str
-    """File name, inside the scene's folder."""
-    scale: Positive = 1.0
-
-
-Shape = Annotated[Sphere | Card | Mesh, Field(discriminator="type")]
-
-
-class Matt(Strict):
-    """Scatters light evenly (Lambert)."""
-
-    type: Literal["matt"] = "matt"
-
-
-class Plastic(Strict):
-    """A coloured body under a clear coat of refractive index 1.49, which gives highlights."""
-
-    type: Literal["plastic"] = "plastic"
-    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
-    """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
-
-
-class Metal(Strict):
-    """A bare metal by its chemical symbol, with the measured refractive index of that metal."""
-
-    type: Literal["metal"] = "metal"
-    name: Literal["Ag", "Al", "Au", "Cr", "Cu", "W"]
-    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
-    """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
-
-
-Finish = Matt | Plastic | Metal
-
-
-class Material(Strict):
-    """What a surface does with light: its colour, by a reflectance or a texture, and its finish."""
-
-    reflectance: Colour | None = None
-    """sRGB reflectance, three numbers from 0 to 1."""
-    texture: str | None = None
-    """An sRGB image file inside the scene's folder, laid out by the shape's texture coordinates."""
-    finish: Finish = Field(default=Matt(), discriminator="type")
-    """Matt unless told otherwise; { type = "plastic", roughness = 0.1 } adds highlights."""
-
-    @model_validator(mode="after")
-    def _one_of_two(self) -> Self:
-        coloured = not isinstance(self.finish, Metal)
-        if coloured and (self.reflectance is None) == (self.texture is None):
-            raise ValueError("give either 'reflectance' or 'texture'")
-        if not coloured and (self.reflectance is not None or self.texture is not None):
-            raise ValueError("a metal's colour is its own; give no 'reflectance' and no 'texture'")
-        return self
+from simgen.materials import Material
+from simgen.schema import Colour, NonNegative, Positive, Strict, Vector, read_toml, suggestion, validate
+from simgen.shapes import Mesh, Shape
 
 
 class SceneObject(Strict):
@@ -106,31 +27,6 @@ class SceneObject(Strict):
     """Turns about the X, Y and Z axes, applied in this order, in degrees."""
     shape: Shape
     material: Material
-
-
-class AreaLight(Strict):
-    """A flat rectangular lamp that shines from its position towards a target."""
-
-    type: Literal["area"] = "area"
-    position_mm: Vector
-    target_mm: Vector
-    width_mm: Positive
-    height_mm: Positive
-    luminance_cd_m2: Positive
-    illuminant: str = "D65"
-    """Colour of the light: a CIE illuminant by name, such as D65, A or FL2."""
-
-
-class UniformLight(Strict):
-    """The same luminance from everywhere, seen by the cameras where nothing is hit."""
-
-    type: Literal["uniform"] = "uniform"
-    luminance_cd_m2: Positive
-    illuminant: str = "D65"
-    """Colour of the light: a CIE illuminant by name, such as D65, A or FL2."""
-
-
-Light = Annotated[AreaLight | UniformLight, Field(discriminator="type")]
 
 
 class Backdrop(Strict):
@@ -194,14 +90,3 @@ def find_scene(name_or_path: str, near: Path | None = None) -> Path:
 def scene_names() -> list[str]:
     """Names of the scenes that ship or stand in the working directory."""
     return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})
-
-
-def asset(folder: Path, name: str, where: str) -> Path:
-    """A file of a scene, which must lie inside the scene's folder."""
-    root = folder.resolve()
-    path = (root / name).resolve()
-    if not path.is_relative_to(root):
-        raise InputError(f"{where}: {name!r} lies outside the scene's folder")
-    if not path.is_file():
-        raise InputError(f"{where}: there is no file {name!r} in {folder}")
-    return path

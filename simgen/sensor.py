@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.bayer import channel_count, colour_index, mosaic
 from pcii.errors import InputError
-from simgen.light import LUMINANCE
+from simgen.build_light import LUMINANCE
 from simgen.recipe import Photons
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen.backend import shape_numbers
+from simgen.build_light import LUMINANCE
 from simgen.cameras import camera_x_mm, camera_y_mm
 from simgen.candidates import Found, Setup, chances
-from simgen.light import LUMINANCE
 from simgen.majorant import Majorant, Samples
 
 PATHS = 4

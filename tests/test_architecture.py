@@ -42,9 +42,10 @@ PCII_LEVELS = [
 ]
 SIMGEN_LEVELS = [
     {"locations", "seeds"},
-    {"backend", "schema"},
+    {"backend", "schema", "assets"},
+    {"shapes", "materials", "lights"},
     {"recipe", "scene"},
-    {"cameras", "light"},
+    {"cameras", "build_shape", "build_surface", "build_light"},
     {"build", "detector", "exposure", "sensor"},
     {"majorant", "paths", "render", "truth"},
     {"candidates"},

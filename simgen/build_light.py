@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
-from simgen.scene import AreaLight, UniformLight
+from simgen.lights import AreaLight, UniformLight
 from simgen.schema import suggestion
 
 # IEC 61966-2-1: luminance of the sRGB primaries, and XYZ to linear sRGB.

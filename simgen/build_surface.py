@@ -1,0 +1,59 @@
+"""Materials as Mitsuba's surfaces."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simgen.assets import asset, read_image, srgb_to_linear
+from simgen.materials import Material, Matt, Metal, Plastic
+from simgen.shapes import Card, Shape, Sphere
+
+
+def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
+    """The same from behind, so that a card or an open mesh is no black hole there."""
+    return {"type": "twosided", "bsdf": surface}
+
+
+def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
+    """Scatters light evenly (Lambert)."""
+    return {"type": "diffuse", "reflectance": reflectance}
+
+
+def evenly(srgb: tuple[float, float, float]) -> dict[str, Any]:
+    """One colour all over."""
+    return {"type": "rgb", "value": srgb_to_linear(np.array(srgb)).tolist()}
+
+
+def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
+    """The surface of an object of this shape, from the front."""
+    match material.finish:
+        case Matt():
+            return matt(_reflectance(mi, material, shape, folder))
+        case Plastic(roughness=alpha):
+            return {
+                "type": "roughplastic",
+                "distribution": "ggx",
+                "alpha": alpha,
+                "diffuse_reflectance": _reflectance(mi, material, shape, folder),
+            }
+        case Metal(name=name, roughness=alpha):
+            return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+
+
+def _reflectance(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
+    if material.texture is None:
+        assert material.reflectance is not None
+        return evenly(material.reflectance)
+    path = asset(folder, material.texture, "material.texture")
+    pixels = read_image(path)
+    if isinstance(shape, Card):
+        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
+    return {
+        "type": "bitmap",
+        "bitmap": mi.Bitmap(pixels),
+        "raw": True,  # linear already, so Mitsuba must not convert it
+        "filter_type": "bilinear",
+        # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
+        "wrap_mode": "repeat" if isinstance(shape, Sphere) else "clamp",
+    }
