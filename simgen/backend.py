@@ -73,6 +73,10 @@ class Backend:
     library: str | None
     reason: str
 
+    def variant_for(self, spectral: bool) -> str:
+        """Mitsuba's name of this backend's variant for colours or for spectra."""
+        return self.variant.replace("rgb", "spectral") if spectral else self.variant
+
     def line(self) -> str:
         """One line for logs and manifests."""
         return f"{self.variant}: {self.reason}"
@@ -111,29 +115,37 @@ def advice() -> str | None:
     )
 
 
-@cache
-def load() -> Any:
-    """The `mitsuba` module with the chosen variant set: one variant per process, chosen once."""
-    backend = choose()
-    if "mitsuba" in sys.modules:  # someone else's choice: the library cannot be changed any more
-        mi = sys.modules["mitsuba"]
-    else:
-        if backend.kind == "llvm" and backend.library:
-            # Read once, when Dr.Jit first needs LLVM; a later setting does nothing.
-            os.environ["DRJIT_LIBLLVM_PATH"] = backend.library
-        import mitsuba as mi
-    if mi.variant() != backend.variant:
-        mi.set_variant(backend.variant)
+def load(*, spectral: bool = False) -> Any:
+    """The `mitsuba` module with the chosen variant set, that for spectra if asked for.
+
+    A scene lives as long as its variant is set: a process makes one dataset, in one variant.
+    """
+    mi, variant = _mitsuba(), choose().variant_for(spectral)
+    if mi.variant() != variant:
+        mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     return mi
 
 
 def load_drjit() -> Any:
     """The `drjit` module, once the backend is chosen; it computes nothing in scalar mode."""
-    load()
+    _mitsuba()
     import drjit as dr
 
     return dr
+
+
+@cache
+def _mitsuba() -> Any:
+    backend = choose()
+    if "mitsuba" in sys.modules:  # someone else's choice: the library cannot be changed any more
+        return sys.modules["mitsuba"]
+    if backend.kind == "llvm" and backend.library:
+        # Read once, when Dr.Jit first needs LLVM; a later setting does nothing.
+        os.environ["DRJIT_LIBLLVM_PATH"] = backend.library
+    import mitsuba as mi
+
+    return mi
 
 
 def shape_numbers(scene: Any) -> list[int]:
@@ -142,10 +154,10 @@ def shape_numbers(scene: Any) -> list[int]:
     Scalar mode counts from 1. Compiled modes use a registry that is filled in parallel and goes on
     counting from scene to scene, so that the numbers follow no order. A miss is 0 in both.
     """
-    if load().variant().startswith("scalar"):
+    mi = _mitsuba()
+    if mi.variant().startswith("scalar"):
         return list(range(1, len(scene.shapes()) + 1))
-    dr = load_drjit()
-    numbers: Any = dr.reinterpret_array(load().UInt32, scene.shapes_dr())
+    numbers: Any = load_drjit().reinterpret_array(mi.UInt32, scene.shapes_dr())
     return [int(number) for number in numbers]
 
 
@@ -247,6 +259,8 @@ def _cached(key: str, probe: Callable[[], tuple[bool, str]]) -> tuple[bool, str]
     return works, detail
 
 
-def describe() -> dict[str, Any]:
+def describe(*, spectral: bool = False) -> dict[str, Any]:
     """The choice as plain values for a manifest, with the versions that it rests on."""
-    return asdict(choose()) | {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
+    chosen = choose()
+    versions = {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
+    return asdict(chosen) | {"variant": chosen.variant_for(spectral)} | versions

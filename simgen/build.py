@@ -9,9 +9,11 @@ import numpy as np
 
 from pcii.errors import InputError
 from simgen.backend import shape_numbers
-from simgen.build_light import light_plugin
+from simgen.build_colour import reflectance_plugin
+from simgen.build_light import gain_for, light_plugin, main_spectrum
 from simgen.build_shape import card_pose, pose_of, shape_plugin
-from simgen.build_surface import evenly, matt, surface_plugin, two_sided
+from simgen.build_surface import matt, surface_plugin, two_sided
+from simgen.filters import Filters, filters_for
 from simgen.scene import Scene, SceneObject
 
 BACKDROP = "backdrop"
@@ -27,10 +29,16 @@ class Built:
     """Object id by Mitsuba's shape number, int16; 0 for a miss, the backdrop and lamps."""
     names: Mapping[int, str]
     """Names by object id, from 1."""
+    filters: Filters | None
+    """What the camera's pixels see of spectra; None where light is linear sRGB."""
 
 
-def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
-    """Load a scene into Mitsuba. Raises `InputError` for a mesh or texture that cannot be used."""
+def build(mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarray | None = None) -> Built:
+    """Load a scene into Mitsuba, in the variant that is set.
+
+    `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
+    `InputError` for a mesh or texture that cannot be used.
+    """
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
     plugins: dict[str, Any] = {
         "type": "scene",
@@ -44,16 +52,19 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int) -> Built:
         plugins[BACKDROP] = {
             "type": "rectangle",
             "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
-            "bsdf": two_sided(matt(evenly(wall.reflectance))),
+            "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
         }
+    surroundings = None  # until read_environment
+    gain = gain_for(scene.level, scene.lights, surroundings)
     for number, light in enumerate(scene.lights, start=1):
-        plugins[f"light{number}"] = light_plugin(mi, light)
+        plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
     try:
         # Without optimisation: it merges shapes, and merged shapes lose their names.
         loaded = mi.load_dict(plugins, optimize=False)
     except RuntimeError as fault:
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
-    return Built(mi, loaded, _object_of_shape(loaded), names)
+    filters = None if curves is None else filters_for(curves, main_spectrum(scene.lights))
+    return Built(mi, loaded, _object_of_shape(loaded), names, filters)
 
 
 def _object_of_shape(loaded: Any) -> np.ndarray:

@@ -1,56 +1,128 @@
-"""Lamps: position, size, luminance in cd/m^2 and the colour of a CIE illuminant.
+"""Lights as Mitsuba's emitters, and how bright they make a plane.
 
 In RGB mode radiance is linear sRGB scaled such that its luminance, 0.2126 R + 0.7152 G + 0.0722 B,
-is in cd/m^2.
+is in cd/m^2; in spectral mode see `spectra`.
 """
 
-from functools import cache
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pcii.errors import InputError
-from simgen.lights import AreaLight, UniformLight
-from simgen.schema import suggestion
+from simgen.build_colour import radiance_plugin
+from simgen.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight
+from simgen.spectra import LUMINANCE, illuminant
 
-# IEC 61966-2-1: luminance of the sRGB primaries, and XYZ to linear sRGB.
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+NODES = 32
+"""Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
 
 
-def light_plugin(mi: Any, light: AreaLight | UniformLight) -> dict[str, Any]:
-    """The Mitsuba emitter of a lamp."""
-    radiance = {"type": "rgb", "value": (light.luminance_cd_m2 * _tint(light.illuminant)).tolist()}
+def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | None) -> dict[str, Any]:
+    """The Mitsuba emitter of a light that is `gain` times as bright as it says.
+
+    `surroundings` (H, W, 3) are the pixels of an environment light's image.
+    """
     match light:
         case UniformLight():
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
             return {"type": "constant", "radiance": radiance}
+        case PointLight():
+            # In cd = cd/m^2 m^2, with lengths in mm.
+            intensity = radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant)
+            return {"type": "point", "position": list(light.position_mm), "intensity": intensity}
+        case EnvironmentLight():
+            assert surroundings is not None
+            return _environment(mi, light, gain, surroundings)
         case AreaLight():
-            towards = np.subtract(light.target_mm, light.position_mm)
-            if not np.any(towards):
-                raise InputError("lights: an area light's target_mm must differ from its position_mm")
-            up = [0.0, -1.0, 0.0] if abs(towards[1]) < 0.99 * np.linalg.norm(towards) else [0, 0, 1]
-            pose = mi.ScalarTransform4f().look_at(
-                origin=list(light.position_mm), target=list(light.target_mm), up=up
-            )
-            size = mi.ScalarTransform4f().scale([light.width_mm / 2, light.height_mm / 2, 1])
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
             return {
                 "type": "rectangle",
-                "to_world": pose @ size,
+                "to_world": mi.ScalarTransform4f(_pose(light)),
                 "emitter": {"type": "area", "radiance": radiance},
                 "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
             }
 
 
-@cache
-def _tint(illuminant: str) -> np.ndarray:
-    """Linear sRGB of a CIE illuminant at luminance 1; channels outside the gamut are cut to 0."""
-    if illuminant == "D65":  # the white of sRGB; also spares the second that colour takes to load
-        return np.ones(3)
-    import colour
+def _pose(light: AreaLight) -> np.ndarray:
+    """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
+    towards = np.subtract(light.target_mm, light.position_mm)
+    towards = towards / np.linalg.norm(towards)
+    up = np.array([0.0, -1.0, 0.0]) if abs(towards[1]) < 0.99 else np.array([0.0, 0.0, 1.0])
+    left = np.cross(up, towards)
+    left /= np.linalg.norm(left)
+    pose = np.eye(4)
+    pose[:3, 0] = left * (light.width_mm / 2)
+    pose[:3, 1] = np.cross(towards, left) * (light.height_mm / 2)
+    pose[:3, 2], pose[:3, 3] = towards, light.position_mm
+    return pose
 
-    table = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]
-    if illuminant not in table:
-        raise InputError(f"lights: no illuminant {illuminant!r}{suggestion(illuminant, list(table))}")
-    x, y = table[illuminant]
-    rgb = np.clip(_XYZ_TO_SRGB @ [x / y, 1.0, (1 - x - y) / y], 0, None)
-    return rgb / (LUMINANCE @ rgb)
+
+def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarray) -> dict[str, Any]:
+    bitmap = mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))
+    bitmap.set_srgb_gamma(False)
+    T = mi.ScalarTransform4f
+    # Mitsuba's map has +Y on top and -Z in its middle; half a turn about X brings up to -Y and ahead to +Z.
+    to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([1, 0, 0], 180)
+    return {
+        "type": "envmap",
+        "bitmap": bitmap,
+        "scale": gain * light.luminance_cd_m2,
+        "to_world": to_world,
+    }
+
+
+def main_spectrum(lights: Sequence[Light]) -> np.ndarray:
+    """The mean spectrum (N,) of the lights, each at luminance 1."""
+    names = [getattr(light, "illuminant", "D65") for light in lights]
+    return np.mean([illuminant(name) for name in names], axis=0)
+
+
+def gain_for(level: Level | None, lights: Sequence[Light], surroundings: np.ndarray | None) -> float:
+    """By how much to make lights brighter for a plane to get its level; `InputError` if it gets no light."""
+    if level is None:
+        return 1.0
+    lux = sum(illuminance_lux(light, level.z_mm, surroundings) for light in lights)
+    if not lux > 0:
+        raise InputError(
+            f"level: none of the lights shines on a surface at z_mm = {level.z_mm:g} that faces the cameras"
+        )
+    return level.illuminance_lux / lux
+
+
+def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) -> float:
+    """Illuminance, in lux, that a light gives a surface at (0, 0, z) that faces the cameras.
+
+    That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at the
+    lamp; nothing stands in the way.
+    """
+    point = np.array([0.0, 0.0, z_mm])
+    match light:
+        case UniformLight():
+            return float(np.pi * light.luminance_cd_m2)
+        case PointLight():
+            towards = np.subtract(light.position_mm, point)
+            distance = np.linalg.norm(towards)
+            return float(light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
+        case EnvironmentLight():
+            assert surroundings is not None
+            return light.luminance_cd_m2 * _from_around(light, surroundings)
+        case AreaLight():
+            pose, (node, weight) = _pose(light), np.polynomial.legendre.leggauss(NODES)
+            x, y = np.meshgrid(node, node)
+            places = pose[:3, :3] @ np.stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + pose[:3, 3:]
+            towards = places - point[:, None]
+            squared = (towards**2).sum(axis=0)
+            at_surface, at_lamp = np.maximum(-towards[2], 0), np.maximum(-pose[:3, 2] @ towards, 0)
+            shares = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
+            return float(light.luminance_cd_m2 * (shares * at_surface * at_lamp / squared**2).sum())
+
+
+def _from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
+    """The integral of the image's luminance times the cosine over the half space behind the cameras."""
+    height, width = pixels.shape[:2]
+    polar = (np.arange(height) + 0.5) * (np.pi / height)
+    longitude = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
+    behind = np.sin(polar)[:, None] * np.maximum(-np.cos(longitude), 0)
+    solid_angle = np.sin(polar)[:, None] * (np.pi / height) * (2 * np.pi / width)
+    return float(((pixels @ LUMINANCE) * behind * solid_angle).sum())

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from simgen.assets import asset, read_image, srgb_to_linear
+from simgen.assets import asset, read_image
+from simgen.build_colour import is_spectral, reflectance_plugin
 from simgen.materials import Material, Matt, Metal, Plastic
 from simgen.shapes import Card, Shape, Sphere
 
@@ -18,11 +19,6 @@ def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
 def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
     """Scatters light evenly (Lambert)."""
     return {"type": "diffuse", "reflectance": reflectance}
-
-
-def evenly(srgb: tuple[float, float, float]) -> dict[str, Any]:
-    """One colour all over."""
-    return {"type": "rgb", "value": srgb_to_linear(np.array(srgb)).tolist()}
 
 
 def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
@@ -44,16 +40,23 @@ def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> d
 def _reflectance(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
     if material.texture is None:
         assert material.reflectance is not None
-        return evenly(material.reflectance)
+        return reflectance_plugin(mi, material.reflectance)
     path = asset(folder, material.texture, "material.texture")
     pixels = read_image(path)
     if isinstance(shape, Card):
         pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
     return {
         "type": "bitmap",
-        "bitmap": mi.Bitmap(pixels),
-        "raw": True,  # linear already, so Mitsuba must not convert it
+        "bitmap": _bitmap(mi, pixels),
+        # Linear already, so colours are left as they are, but for being made spectra where these are asked.
+        "raw": not is_spectral(mi),
         "filter_type": "bilinear",
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
         "wrap_mode": "repeat" if isinstance(shape, Sphere) else "clamp",
     }
+
+
+def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
+    bitmap = mi.Bitmap(pixels)
+    bitmap.set_srgb_gamma(False)  # linear; otherwise a spectral variant takes them for sRGB
+    return bitmap

@@ -2,7 +2,8 @@
 
 The image of a surface of luminance L through a lens of f-number N, focused far away, has the
 illuminance pi L / (4 N^2) (ISO 12232). In RGB mode radiance is in cd/m^2, and a channel's light is
-counted in photons of 555 nm, of which a lumen second has most meaning: 1 lm is 1/683 W there.
+counted in photons of 555 nm, of which a lumen second has most meaning: 1 lm is 1/683 W there. In spectral
+mode radiance is already in terms of these (see `filters`), and the photons are those that are detected.
 """
 
 import math

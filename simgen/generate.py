@@ -45,9 +45,11 @@ from simgen.exposure import photons_per_radiance
 from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene, load_scene
-from simgen.sensor import sense
+from simgen.sensor import sense, sensitivities
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
+RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
+SPECTRAL_UNIT = "cd/m^2 of light of 555 nm that gives as many photons to a pixel that detects them all"
 MARKER = ".unfinished.json"
 RENDERED = ".rendered"
 """Exact views that are no product in themselves; gone when the dataset is finished."""
@@ -75,14 +77,16 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     else is refused with `InputError`.
     """
     scene, folder = load_scene(recipe.scene, near)
-    identity = _identity(recipe, scene, folder)
+    curves = sensitivities(recipe, near)
+    identity = _identity(recipe, scene, folder, curves)
     finished = _finished(out, identity)
     if finished is not None:
         return finished
-    engine = backend.describe()
+    engine = backend.describe(spectral=recipe.is_spectral)
     clock = _Clock()
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
-        built = build(backend.load(), scene, folder, recipe.render.max_depth)
+        mi = backend.load(spectral=recipe.is_spectral)
+        built = build(mi, scene, folder, recipe.render.max_depth, curves)
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
         products, photons, made = recipe.products, None, None
@@ -128,7 +132,7 @@ def verify(path: Path, report: Report = silent) -> int:
     return len(files)
 
 
-def _identity(recipe: Recipe, scene: Scene, folder: Path) -> str:
+def _identity(recipe: Recipe, scene: Scene, folder: Path, curves: np.ndarray | None) -> str:
     """Hash of all that decides the dataset's content, but for the machine."""
     assets = {thing.material.texture for thing in scene.objects}
     assets |= {getattr(thing.shape, "file", None) for thing in scene.objects}
@@ -136,6 +140,7 @@ def _identity(recipe: Recipe, scene: Scene, folder: Path) -> str:
         "recipe": recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),
         "assets": {name: hash_file(folder / name) for name in sorted(filter(None, assets))},
+        "sensitivities": None if curves is None else curves.tolist(),
         "format_version": FORMAT_VERSION,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
@@ -293,6 +298,7 @@ def _manifest(
     identity: str,
 ) -> dict[str, Any]:
     """What the manifest says of the recipe, the scene and the software."""
+    channels = 3 if built.filters is None else len(built.filters.sensitivity)
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -300,8 +306,8 @@ def _manifest(
         "title": recipe.title or scene.title,
         "grid": asdict(recipe.grid.camera_grid()),
         "cfa": recipe.cfa,
-        "radiance_channels": {"none": None, "mosaic": 1, "rgb": 3}[recipe.products.radiance],
-        "radiance_unit": "linear sRGB whose luminance is in cd/m^2",
+        "radiance_channels": {"none": None, "mosaic": 1, "rgb": channels}[recipe.products.radiance],
+        "radiance_unit": SPECTRAL_UNIT if recipe.is_spectral else RGB_UNIT,
         "objects": {str(number): name for number, name in built.names.items()},
         "analysis": recipe.analysis.model_dump(mode="json"),
         "recipe": recipe.model_dump(mode="json"),

@@ -1,22 +1,24 @@
 """Candidates in the renderer's arrays, one lane each, for compiled backends; what leaves is NumPy."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen.backend import load_drjit
-from simgen.build_light import LUMINANCE
 from simgen.candidates import Found, Setup, chances, nothing
 from simgen.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.paths import FirstHits, film_rays, hit_first, radiance_along
+from simgen.wavelengths import light_of, of_colour
+
+LEAST_GUESS = 1e-30
 
 
 @dataclass(frozen=True)
 class _Lanes:
-    """Candidates as the renderer holds them: camera, pixel, film point, entry, colour."""
+    """Candidates as the renderer holds them: camera, pixel, film point, entry, colour, wavelengths."""
 
     k: Any
     l: Any
@@ -26,6 +28,7 @@ class _Lanes:
     col_px: Any
     entry: Any
     colour: Any
+    hue: Any
     inside: Any
 
 
@@ -33,7 +36,7 @@ Record = TypeVar("Record", _Lanes, FirstHits)
 
 
 class LanePool:
-    """The `Pool` of compiled backends; `ambient` (3,) is a guess of the radiance from all around.
+    """The `Pool` of compiled backends; `ambient` is a guess of the radiance from all around, by colour.
 
     A candidate is rejected in two steps: by its first hit, whose guess times the tile's shade may be less
     than the bound, and if it survives that, by its path's radiance compared with that product.
@@ -45,6 +48,7 @@ class LanePool:
         self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
     ) -> None:
         self.setup, self.majorant = setup, majorant
+        self.light = light_of(setup.built, setup.cfa)
         mi, frame = setup.built.mi, majorant.frame
         of_groups = [chances(setup, majorant, cells) for cells in groups]
         sizes = np.array([own.running.size for own in of_groups])
@@ -65,7 +69,7 @@ class LanePool:
         self.side_px = _signed(mi, majorant.side_px)
         self.bound, self.shade = _floats(mi, majorant.bound), _floats(mi, majorant.shade)
         self.dim = _floats(mi, majorant.dim)
-        self.ambient = mi.Color3f(*(_opaque(mi.Float, part) for part in ambient))
+        self.ambient = [_opaque(mi.Float, part) for part in ambient]
         self.entry_of = _signed(mi, majorant.entry_of)
         self.layer_at = _signed(mi, frame.layer_at)
         self.nearness_mm = _opaque(mi.Float, frame.disparity_mm / frame.step_px)
@@ -84,7 +88,7 @@ class LanePool:
         lanes, first = self._first_seen(sampler, _unsigned(mi, group), view)
         where = lanes.entry * setup.channels + lanes.colour
         bound, shade = dr.gather(mi.Float, self.bound, where), dr.gather(mi.Float, self.shade, where)
-        guess = _of_colour(dr, _sensed(setup, first.guess), lanes.colour)
+        guess = self._seen(first.guess, lanes)
         most = dr.minimum(bound, dr.maximum(shade * guess, dr.gather(mi.Float, self.dim, lanes.colour)))
         promising = lanes.inside & (sampler.next_1d() * bound < most)
         promising &= mi.UInt32(self._owner(lanes, first.z_mm)) == lanes.entry
@@ -94,8 +98,8 @@ class LanePool:
         if len(rest) == 0:
             return nothing(setup.channels)
         lanes, first = _take(dr, lanes, rest), _take(dr, first, rest)
-        light = _follow(setup, lanes, first, seed)
-        ratio = _of_colour(dr, _sensed(setup, light), lanes.colour) / dr.gather(mi.Float, most, rest)
+        light = self._follow(lanes, first, seed)
+        ratio = self._seen(light, lanes) / dr.gather(mi.Float, most, rest)
         copies = mi.UInt32(ratio + dr.gather(mi.Float, chance, rest))
         dr.eval(copies, ratio, light)
         kept, over = dr.compress(copies > 0), dr.compress(ratio > 1)
@@ -113,9 +117,7 @@ class LanePool:
             object_id=setup.built.object_of_shape[np.array(hit.shape)],
             z_mm=np.array(hit.z_mm),
             copies=np.array(copies).astype(np.int64),
-            over=_samples(self, _take(dr, lanes, over), _take(dr, first, over), _at(dr, light, over))
-            if len(over)
-            else nothing(setup.channels).over,
+            over=self._exceeding(lanes, first, light, over) if len(over) else nothing(setup.channels).over,
             ratio=np.array(ratio),
         )
 
@@ -124,19 +126,59 @@ class LanePool:
         setup = self.setup
         mi, dr = setup.built.mi, load_drjit()
         sampler = _sampler(mi, seed, number)
-        lanes, first = self._first_seen(sampler, dr.zeros(mi.UInt32, number), None)
-        dr.eval(vars(lanes), vars(first))
-        inside = dr.compress(lanes.inside)
-        lanes, first = _take(dr, lanes, inside), _take(dr, first, inside)
-        some = dr.arange(mi.UInt32, min(follow, len(inside)))
-        light = _follow(setup, _take(dr, lanes, some), _take(dr, first, some), seed)
-        return _samples(self, lanes, first, light)
+        lanes = self._draw(sampler, dr.zeros(mi.UInt32, number), _views(setup, sampler, None))
+        dr.eval(vars(lanes))
+        lanes = _take(dr, lanes, dr.compress(lanes.inside))
+        some = dr.arange(mi.UInt32, min(follow, len(lanes.k)))
+        guess, light = [0.0] * setup.channels, [0.0] * setup.channels
+        z_mm = None
+        for look, colour in enumerate(self.light.looks(lanes.colour)):
+            own = replace(lanes, colour=colour)
+            first = self._hit_first(own)
+            dr.eval(vars(first))
+            followed = _take(dr, own, some)
+            found = self._follow(followed, _take(dr, first, some), seed + look)
+            seen = self.light.seen(first.guess, colour, lanes.hue)
+            guess = [old + new for old, new in zip(guess, seen, strict=True)]
+            seen = self.light.seen(found, followed.colour, followed.hue)
+            light = [old + new for old, new in zip(light, seen, strict=True)]
+            dr.eval(guess, light)
+            z_mm = first.z_mm
+        return _samples(lanes, z_mm, guess, light)
 
     def _first_seen(self, sampler: Any, group: Any, view: np.ndarray | None) -> tuple[_Lanes, FirstHits]:
         """A candidate for each lane, and what it hits first."""
-        setup = self.setup
-        lanes = self._draw(sampler, group, _views(setup, sampler, view))
-        return lanes, hit_first(setup.built, _rays(setup, lanes), lanes.inside, self.ambient)
+        lanes = self._draw(sampler, group, _views(self.setup, sampler, view))
+        return lanes, self._hit_first(lanes)
+
+    def _hit_first(self, lanes: _Lanes) -> FirstHits:
+        ambient = self.light.spread(self.ambient, lanes.colour, lanes.hue)
+        return hit_first(self.setup.built, self._rays(lanes), lanes.inside, ambient)
+
+    def _rays(self, lanes: _Lanes) -> Any:
+        ray = film_rays(self.setup.built, self.setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
+        return self.light.aim(ray, lanes.colour, lanes.hue)
+
+    def _follow(self, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
+        """Radiance along one path from each first hit, as rays carry it."""
+        # Another sampler than the candidates', whose numbers decided which lanes are here.
+        sampler = _sampler(self.setup.built.mi, seed ^ 0x9E3779B9, len(lanes.k))
+        return radiance_along(
+            self.setup.built, self._rays(lanes), first.record, sampler, self.setup.max_depth
+        )
+
+    def _seen(self, radiance: Any, lanes: _Lanes) -> Any:
+        """What each lane's pixel sees of it."""
+        return of_colour(self.light.seen(radiance, lanes.colour, lanes.hue), lanes.colour)
+
+    def _exceeding(self, lanes: _Lanes, first: FirstHits, light: Any, over: Any) -> Samples:
+        dr = load_drjit()
+        lanes, first = _take(dr, lanes, over), _take(dr, first, over)
+        guess, brought = (
+            self.light.seen(one, lanes.colour, lanes.hue) for one in (first.guess, _at(dr, light, over))
+        )
+        dr.eval(vars(lanes), first.z_mm, guess, brought)
+        return _samples(lanes, first.z_mm, guess, brought)
 
     def _draw(self, sampler: Any, group: Any, view: Any) -> _Lanes:
         """One candidate for each lane's group and view: tile and cell by the bound, the rest evenly."""
@@ -169,7 +211,8 @@ class LanePool:
         row_px = mi.Float(row) + (down - dr.floor(down)) - 0.5
         col_px = mi.Float(col) + (right - dr.floor(right)) - 0.5
         colour = dr.gather(mi.UInt32, self.colour, cell)
-        return _Lanes(k, l, row, col, row_px, col_px, entry, colour, inside)
+        hue = self.light.hues(sampler, len(group))
+        return _Lanes(k, l, row, col, row_px, col_px, entry, colour, hue, inside)
 
     def _owner(self, lanes: _Lanes, z_mm: Any) -> Any:
         """The entry that each lane's path belongs to (see `majorant`)."""
@@ -199,37 +242,12 @@ def _sampler(mi: Any, seed: int, size: int) -> Any:
     return sampler
 
 
-def _rays(setup: Setup, lanes: _Lanes) -> Any:
-    return film_rays(setup.built, setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
-
-
 def _views(setup: Setup, sampler: Any, view: np.ndarray | None) -> Any:
     """The lanes' views, drawn evenly if they are not given."""
     mi, count = setup.built.mi, setup.grid.view_count
     if view is not None:
         return _unsigned(mi, view)
     return load_drjit().minimum(mi.UInt32(sampler.next_1d() * count), count - 1)
-
-
-def _follow(setup: Setup, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
-    """Radiance along one path from each first hit, RGB."""
-    # Another sampler than the candidates', whose numbers decided which lanes are here.
-    sampler = _sampler(setup.built.mi, seed ^ 0x9E3779B9, len(lanes.k))
-    return radiance_along(setup.built, _rays(setup, lanes), first.record, sampler, setup.max_depth)
-
-
-def _sensed(setup: Setup, rgb: Any) -> list[Any]:
-    """RGB as the sensor's colours: R, G, B, or luminance for a monochrome one."""
-    if setup.cfa is not None:
-        return list(rgb)
-    return [sum(float(share) * part for share, part in zip(LUMINANCE, rgb, strict=True))]
-
-
-def _of_colour(dr: Any, values: list[Any], colour: Any) -> Any:
-    """Each lane's value of its own colour."""
-    if len(values) == 1:
-        return values[0]
-    return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))
 
 
 def _at(dr: Any, array: Any, index: Any, active: Any = True) -> Any:
@@ -241,18 +259,16 @@ def _take(dr: Any, lanes: Record, index: Any) -> Record:
     return type(lanes)(**{name: _at(dr, array, index) for name, array in vars(lanes).items()})
 
 
-def _samples(pool: LanePool, lanes: _Lanes, first: FirstHits, light: Any) -> Samples:
+def _samples(lanes: _Lanes, z_mm: Any, guess: list[Any], light: list[Any]) -> Samples:
     """Lanes as NumPy, of which the first were followed and brought `light`."""
-    dr, setup = load_drjit(), pool.setup
-    guess = _sensed(setup, first.guess)
-    brought = _sensed(setup, light)
-    dr.eval(vars(lanes), guess, brought, first.z_mm)
-    seen = np.full((len(lanes.k), setup.channels), np.nan)
-    seen[: len(light[0])] = np.stack([np.array(part) for part in brought], axis=1)
+    # Of other colours than their own wavelengths tell nothing, and 0 / 0 would be no number.
+    guesses = np.maximum([np.array(part) for part in guess], LEAST_GUESS, dtype=np.float64).T
+    seen = np.full((len(lanes.k), len(guess)), np.nan)
+    seen[: len(light[0])] = np.stack([np.array(part) for part in light], axis=1)
     return Samples(
         **{name: np.array(getattr(lanes, name)).astype(np.int64) for name in ("k", "l", "row", "col")},
-        z_mm=np.array(first.z_mm),
-        guess=np.stack([np.array(part) for part in guess], axis=1).astype(np.float64),
+        z_mm=np.array(z_mm),
+        guess=guesses,
         light=seen,
     )
 

@@ -1,10 +1,14 @@
 """Lamps and what shines from all around: where they stand, how bright and of what colour they are."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from simgen.schema import Positive, Strict, Vector
+from simgen.schema import Positive, Real, Strict, Vector
+
+Illuminant = Annotated[
+    str, Field(description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.")
+]
 
 
 class AreaLight(Strict):
@@ -12,12 +16,29 @@ class AreaLight(Strict):
 
     type: Literal["area"] = "area"
     position_mm: Vector
+    """Where the middle of the lamp stands."""
     target_mm: Vector
+    """What the lamp faces; behind itself it is dark."""
     width_mm: Positive
     height_mm: Positive
     luminance_cd_m2: Positive
-    illuminant: str = "D65"
-    """Colour of the light: a CIE illuminant by name, such as D65, A or FL2."""
+    illuminant: Illuminant = "D65"
+
+    @model_validator(mode="after")
+    def _faces_something(self) -> Self:
+        if self.position_mm == self.target_mm:
+            raise ValueError("target_mm: an area light must face something else than its own position_mm")
+        return self
+
+
+class PointLight(Strict):
+    """A lamp without size, which shines evenly in all directions and is seen by no camera."""
+
+    type: Literal["point"] = "point"
+    position_mm: Vector
+    intensity_cd: Positive
+    """Luminous intensity: lux times square metres."""
+    illuminant: Illuminant = "D65"
 
 
 class UniformLight(Strict):
@@ -25,8 +46,31 @@ class UniformLight(Strict):
 
     type: Literal["uniform"] = "uniform"
     luminance_cd_m2: Positive
-    illuminant: str = "D65"
-    """Colour of the light: a CIE illuminant by name, such as D65, A or FL2."""
+    illuminant: Illuminant = "D65"
 
 
-Light = Annotated[AreaLight | UniformLight, Field(discriminator="type")]
+class EnvironmentLight(Strict):
+    """An image of all that shines from far away, seen by the cameras where nothing is hit; in daylight D65.
+
+    Longitude by latitude: the middle of the image lies straight ahead (+Z), its top row above, and what
+    is in its right half is to the right.
+    """
+
+    type: Literal["environment"] = "environment"
+    file: str
+    """An OpenEXR image inside the scene's folder, twice as wide as high, linear sRGB."""
+    luminance_cd_m2: Positive
+    """Luminance of white, pixels of (1, 1, 1)."""
+    turn_deg: Real = 0.0
+    """By how much the surroundings are turned to the right about the vertical axis."""
+
+
+Light = Annotated[AreaLight | PointLight | UniformLight | EnvironmentLight, Field(discriminator="type")]
+
+
+class Level(Strict):
+    """How bright it is: all lights are made brighter or dimmer together until a plane gets so many lux."""
+
+    illuminance_lux: Positive
+    """Direct light, with nothing in the way, on a surface at (0, 0, z_mm) that faces the cameras."""
+    z_mm: Positive

@@ -1,10 +1,11 @@
 """What surfaces do with light: a colour, by a reflectance or a texture, and a finish."""
 
-from typing import Annotated, Literal, Self
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from simgen.schema import Colour, Real, Strict
+from simgen.schema import Colour, Positive, Real, Share, Strict
 
 
 class Matt(Strict):
@@ -33,11 +34,45 @@ class Metal(Strict):
 Finish = Matt | Plastic | Metal
 
 
+class Spectrum(Strict):
+    """Reflectance by wavelength, linear in between and the same beyond the ends."""
+
+    wavelength_nm: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=2000)]
+    """Growing wavelengths, in nm; from 380 to 780 nm they matter."""
+    value: tuple[Share, ...]
+    """Reflectance at each of them, from 0 to 1."""
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Self:
+        if len(self.value) != len(self.wavelength_nm):
+            raise ValueError("give as many values as wavelengths")
+        if any(here >= there for here, there in pairwise(self.wavelength_nm)):
+            raise ValueError("wavelength_nm: wavelengths must grow")
+        return self
+
+
+def _kind_of_reflectance(value: Any) -> str:
+    if isinstance(value, str):
+        return "<patch>"
+    return "<spectrum>" if isinstance(value, dict | Spectrum) else "<colour>"
+
+
+PatchName = Annotated[str, Field(description="one of the 24 ColorChecker patches, such as 'dark skin'")]
+Reflectance = Annotated[
+    Annotated[Colour, Tag("<colour>")]
+    | Annotated[PatchName, Tag("<patch>")]
+    | Annotated[Spectrum, Tag("<spectrum>")],
+    Discriminator(_kind_of_reflectance),
+]
+"""As sRGB, as the name of a ColorChecker patch, or as a spectrum."""
+
+
 class Material(Strict):
     """What a surface does with light: its colour, by a reflectance or a texture, and its finish."""
 
-    reflectance: Colour | None = None
-    """sRGB reflectance, three numbers from 0 to 1."""
+    reflectance: Reflectance | None = None
+    """sRGB, three numbers from 0 to 1; or the name of a ColorChecker patch; or a spectrum, such as
+    { wavelength_nm = [400, 700], value = [0.2, 0.8] }."""
     texture: str | None = None
     """An sRGB image file inside the scene's folder, laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")

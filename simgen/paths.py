@@ -16,6 +16,7 @@ from pcii.types import CameraGrid
 from simgen.backend import load_drjit
 from simgen.build import Built
 from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.wavelengths import Light
 
 STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
@@ -25,6 +26,8 @@ LEAST_REFLECTANCE = 0.001
 """A surface is never guessed to be less reflective than this: it may shine."""
 LEAST_RADIANCE = 1e-9
 """What is guessed of nothing, so that it can be divided by."""
+GOLDEN = (5**0.5 - 1) / 2
+"""Its multiples, less their whole parts, are evenly spread."""
 
 
 @dataclass(frozen=True)
@@ -72,19 +75,24 @@ def hit_first(built: Built, ray: Any, active: Any, ambient: Any) -> FirstHits:
     return FirstHits(record, shape, z_mm, guess)
 
 
-def surrounding_radiance(built: Built) -> np.ndarray:
-    """Mean radiance (3,) of what shines from all around; float64."""
+def surrounding_radiance(built: Built, light: Light) -> np.ndarray:
+    """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
     mi, dr = built.mi, load_drjit()
     around = built.scene.environment()
-    if around is None:
-        return np.zeros(3)
-    away = dr.zeros(mi.SurfaceInteraction3f, 256)
-    # Evenly spread directions (a Fibonacci lattice).
     number = dr.arange(mi.Float, 256) + 0.5
+    # Evenly spread directions (a Fibonacci lattice).
     up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
     across = dr.sqrt(1 - up * up)
+    away = dr.zeros(mi.SurfaceInteraction3f, 256)
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
-    return np.array(around.eval(away)).mean(axis=1, dtype=np.float64)
+    found: Any = 0.0
+    for colour in light.looks(dr.zeros(mi.UInt32, 256)):
+        # The directions are in no order of colour, so that any will do for wavelengths.
+        hue = number * GOLDEN - dr.floor(number * GOLDEN)
+        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, 256), colour, hue).wavelengths
+        seen = mi.Spectrum(0) if around is None else around.eval(away)
+        found += np.array(light.seen(seen, colour, hue)).mean(axis=1, dtype=np.float64)
+    return found
 
 
 def _lamps(scene: Any) -> list[Any]:

@@ -9,18 +9,21 @@ from simgen.lanes import LanePool
 from simgen.majorant import Majorant
 from simgen.paths import surrounding_radiance
 from simgen.singles import SinglePool
+from simgen.wavelengths import light_of
 
 
 def pool_for(setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray) -> Pool:
-    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (3,) all around."""
+    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
     if _is_scalar(setup):
         return SinglePool(setup, majorant, groups)
     return LanePool(setup, majorant, groups, ambient)
 
 
 def surroundings(setup: Setup) -> np.ndarray:
-    """Mean radiance (3,) that shines from all around, where candidates are guessed at; else zeros."""
-    return np.zeros(3) if _is_scalar(setup) else surrounding_radiance(setup.built)
+    """What pixels see of what shines from all around (C,), where candidates are guessed at; else zeros."""
+    if _is_scalar(setup):
+        return np.zeros(setup.channels)
+    return surrounding_radiance(setup.built, light_of(setup.built, setup.cfa))
 
 
 def _is_scalar(setup: Setup) -> bool:

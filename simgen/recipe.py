@@ -70,8 +70,12 @@ class Sensor(Strict):
 
     cfa: Cfa = "GRBG"
     """Bayer pattern by its first two rows, or "none" for a monochrome sensor."""
+    camera: str | None = None
+    """A camera's spectral sensitivities: by a name that colour-science has, such as "Nikon 5100 (NPL)", or a
+    CSV file beside the recipe. Light is then traced as spectra; without, as linear sRGB, which is faster."""
     quantum_efficiency: tuple[Efficiency, Efficiency, Efficiency] = (1.0, 1.0, 1.0)
-    """Chance that a photon is counted, by the pixel's colour: R, G, B; a monochrome sensor takes G."""
+    """Chance that a photon is counted, by the pixel's colour: R, G, B; a monochrome sensor takes G. With a
+    camera, of photons of the wavelength that it sees best."""
     dark_counts: NonNegative = 0.0
     """Mean number of counts that each pixel of a view has without any light."""
     hot_pixel_share: Share = 0.0
@@ -195,6 +199,11 @@ class Recipe(Strict):
                 "sensor.full_light: a camera's images need the table [exposure] with f_number and time_s"
             )
         return self
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether light is traced as spectra."""
+        return self.sensor.camera is not None
 
     @property
     def cfa(self) -> str | None:

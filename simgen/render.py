@@ -1,10 +1,14 @@
 """Dense radiance of one view: every pixel, by path tracing."""
 
+from typing import Any
+
 import numpy as np
 
 from pcii.types import CameraGrid
 from simgen.build import Built
+from simgen.build_colour import spectrum_plugin
 from simgen.cameras import camera_x_mm, camera_y_mm, sensor_plugin
+from simgen.filters import Filters
 
 SEED_STEP = 0x9E3779B9
 """Far from every other view's seed: parts of one view need seeds of their own."""
@@ -19,7 +23,9 @@ def render_view(
     samples_per_pixel: int,
     seed: int,
 ) -> np.ndarray:
-    """Linear radiance (H, W, 3), float32, of camera (k, l); luminance in cd/m^2.
+    """Linear radiance (H, W, C), float32, of camera (k, l): sRGB whose luminance is in cd/m^2.
+
+    In spectral mode: what pixels of each of the camera's colours see, in the unit of `filters`.
 
     The mean of `samples_per_pixel` paths through each pixel's square; the same bytes for the same
     seed on the same backend. Views need different seeds: with one seed their noise is the same.
@@ -27,11 +33,22 @@ def render_view(
     mi = built.mi
     sampler = {"type": "independent"}
     x_mm, y_mm = camera_x_mm(grid)[l], camera_y_mm(grid)[k]
-    sensor = mi.load_dict(sensor_plugin(mi, grid, float(x_mm), float(y_mm), sampler))
-    total = np.zeros((grid.height, grid.width, 3))
+    plugin = sensor_plugin(mi, grid, float(x_mm), float(y_mm), sampler)
+    if built.filters is not None:
+        plugin["film"] = _film(plugin["film"], built.filters)
+    sensor = mi.load_dict(plugin)
+    channels = 3 if built.filters is None else len(built.filters.sensitivity)
+    total = np.zeros((grid.height, grid.width, channels))
     # By powers of two: other numbers of samples the renderer adds in an order that is left to chance.
     parts = [1 << bit for bit in range(samples_per_pixel.bit_length()) if samples_per_pixel >> bit & 1]
     for number, samples in enumerate(reversed(parts)):
         own_seed = (seed + number * SEED_STEP) % 2**32
         total += samples * np.array(mi.render(built.scene, sensor=sensor, spp=samples, seed=own_seed))
     return (total / samples_per_pixel).astype(np.float32)
+
+
+def _film(film: dict[str, Any], filters: Filters) -> dict[str, Any]:
+    """The same film with a channel for each colour's sensitivity, instead of R, G, B."""
+    same = {name: value for name, value in film.items() if name not in ("type", "pixel_format")}
+    bands = {f"band{number}": spectrum_plugin(curve) for number, curve in enumerate(filters.sensitivity)}
+    return {"type": "specfilm", **same, **bands}

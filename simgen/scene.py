@@ -10,10 +10,10 @@ from pydantic import Field, field_validator
 
 from pcii.errors import InputError
 from simgen.assets import asset
-from simgen.lights import Light
+from simgen.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.locations import find, scene_roots
-from simgen.materials import Material
-from simgen.schema import Colour, NonNegative, Positive, Strict, Vector, read_toml, suggestion, validate
+from simgen.materials import Material, Reflectance
+from simgen.schema import NonNegative, Positive, Strict, Vector, read_toml, suggestion, validate
 from simgen.shapes import Mesh, Shape
 
 
@@ -33,8 +33,8 @@ class Backdrop(Strict):
     """A flat wall parallel to the camera plane, endless for the cameras."""
 
     z_mm: Positive
-    reflectance: Colour = (0.0, 0.0, 0.0)
-    """sRGB reflectance, three numbers from 0 to 1."""
+    reflectance: Reflectance = (0.0, 0.0, 0.0)
+    """sRGB, the name of a ColorChecker patch, or a spectrum; as of a material."""
     half_width_mm: NonNegative = 5000.0
 
 
@@ -45,7 +45,16 @@ class Scene(Strict):
     description: str = ""
     objects: tuple[SceneObject, ...] = ()
     lights: Annotated[tuple[Light, ...], Field(min_length=1)]
+    level: Level | None = None
+    """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
+
+    @field_validator("lights")
+    @classmethod
+    def _one_from_all_around(cls, lights: tuple[Light, ...]) -> tuple[Light, ...]:
+        if sum(isinstance(light, UniformLight | EnvironmentLight) for light in lights) > 1:
+            raise ValueError("only one light can be 'uniform' or 'environment'")
+        return lights
 
     @field_validator("objects")
     @classmethod

@@ -99,6 +99,8 @@ def _follow(
     path: list[int | str] = []
     last: set[str] = set()
     for part in location:
+        if isinstance(part, str) and part.startswith("<"):  # a kind of value, which no key can be
+            continue
         keys = {key for candidate in candidates for key in candidate.model_fields}
         tagged = [one for one in candidates if part == _tag(one)]
         if tagged and part not in keys:

@@ -5,22 +5,45 @@ budget n; each pixel's count is Poisson with that mean. Eq. 1 normalises each co
 budget is counted is the recipe's `scope`.
 """
 
+from pathlib import Path
+
 import numpy as np
 
 from pcii.bayer import channel_count, colour_index, mosaic
 from pcii.errors import InputError
-from simgen.build_light import LUMINANCE
-from simgen.recipe import Photons
+from simgen.recipe import Photons, Recipe
+from simgen.spectra import LUMINANCE, sensitivity
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
-    """What the sensor's pixels see of linear RGB radiance (H, W, 3): (H, W), same units.
+    """What the sensor's pixels see of radiance (H, W, C): (H, W), same units.
 
-    A Bayer pixel keeps its own colour; a monochrome one the luminance.
+    A Bayer pixel keeps its own colour; a monochrome one the luminance of linear sRGB, or the one channel that
+    its camera has.
     """
-    if cfa is None:
-        return (radiance @ LUMINANCE).astype(radiance.dtype)
-    return mosaic(radiance, cfa)
+    if cfa is not None:
+        return mosaic(radiance, cfa)
+    if radiance.shape[2] == 1:
+        return radiance[..., 0]
+    return (radiance @ LUMINANCE).astype(radiance.dtype)
+
+
+def sensitivities(recipe: Recipe, near: Path) -> np.ndarray | None:
+    """Relative sensitivities (C, N) of the recipe's camera by wavelength, None in RGB mode.
+
+    `near` is the recipe's folder. A monochrome sensor takes G, or the one curve that there is.
+    """
+    if recipe.sensor.camera is None:
+        return None
+    curves = sensitivity(recipe.sensor.camera, near)
+    if recipe.cfa is None:
+        return curves[len(curves) // 2 :][:1]
+    if len(curves) == 1:
+        raise InputError(
+            f"sensor.camera: {recipe.sensor.camera!r} has one curve, and a Bayer sensor needs three; "
+            "set sensor.cfa to 'none'"
+        )
+    return curves
 
 
 def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:

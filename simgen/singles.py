@@ -4,17 +4,17 @@ A call takes about a microsecond, less than a first guess would: every candidate
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen.backend import shape_numbers
-from simgen.build_light import LUMINANCE
 from simgen.cameras import camera_x_mm, camera_y_mm
 from simgen.candidates import Found, Setup, chances
 from simgen.majorant import Majorant, Samples
+from simgen.spectra import LUMINANCE
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""
@@ -60,7 +60,7 @@ class SinglePool:
         own = self.majorant.owner_of(self._samples(rays, z_mm)) == rays.entry
         rays, candidate, chance = rays.take(own), candidate[own], chance[own]
         object_id, z_mm = object_id[own], z_mm[own]
-        light = self._follow(rays, seed)
+        light = self._follow(rays, rng, seed)
         at = np.arange(light.shape[0]), rays.colour
         ratio = light[at] / self.majorant.bound[rays.entry, rays.colour]
         copies = (ratio + chance).astype(np.int64)
@@ -86,7 +86,17 @@ class SinglePool:
         rng = np.random.default_rng(seed)
         rays = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)
         rays = rays.take(self._inside(rays))
-        return self._samples(rays, self._first_hits(rays)[1], self._follow(rays, seed))
+        looks = enumerate(self._looks(rays))
+        light = np.sum([self._follow(own, rng, seed + look) for look, own in looks], axis=0)
+        return self._samples(rays, self._first_hits(rays)[1], light)
+
+    def _looks(self, rays: _Rays) -> Iterator[_Rays]:
+        """The rays as often as they must be followed to tell of all colours."""
+        if self.setup.built.filters is None:
+            yield rays
+            return
+        for colour in range(self.setup.channels):
+            yield replace(rays, colour=np.full_like(rays.colour, colour))
 
     def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> _Rays:
         """Tile and cell by the bound, the rest evenly."""
@@ -128,17 +138,25 @@ class SinglePool:
                 object_id[number], z_mm[number] = ids[hit.shape.id()], hit.p.z
         return object_id, z_mm
 
-    def _follow(self, rays: _Rays, seed: int) -> np.ndarray:
-        """Radiance (N, C) of each, the mean of `PATHS` paths."""
+    def _follow(self, rays: _Rays, rng: np.random.Generator, seed: int) -> np.ndarray:
+        """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0."""
         built = self.setup.built
         sampler = built.mi.load_dict({"type": "independent"})
         sampler.seed(seed, 1)
         sample, scene = built.scene.integrator().sample, built.scene
-        rgb = np.empty((rays.k.size, 3))
+        if built.filters is None:
+            rgb = np.empty((rays.k.size, 3))
+            for number, ray in enumerate(self._traced(rays)):
+                rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
+            rgb /= PATHS
+            return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
+        chosen_nm, weight = built.filters.draw(rays.colour, rng.random(rays.k.size))
+        seen = np.zeros((rays.k.size, self.setup.channels))
         for number, ray in enumerate(self._traced(rays)):
-            rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
-        rgb /= PATHS
-        return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
+            ray.wavelengths = chosen_nm[number].tolist()
+            radiance = np.array(sum(sample(scene, sampler, ray)[0] for _ in range(PATHS)))
+            seen[number, rays.colour[number]] = weight[number] @ radiance / PATHS
+        return seen
 
     def _traced(self, rays: _Rays) -> Iterator[Any]:
         """The renderer's rays: to the right is +X, downwards +Y, straight ahead +Z."""

@@ -1,0 +1,147 @@
+"""Spectra of lights, surfaces and cameras, and the wavelengths that are drawn: no renderer needed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pcii.errors import InputError
+from simgen.filters import CELLS, Filters, filters_for
+from simgen.schema import validate
+from simgen.spectra import (
+    WAVELENGTH_NM,
+    illuminant,
+    integral,
+    linear_srgb,
+    observer,
+    patch,
+    patch_names,
+    sensitivity,
+    tint,
+)
+
+CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
+
+
+@pytest.mark.parametrize("name", ["D65", "A", "FL2", "E"])
+def test_illuminants_have_luminance_1_and_their_own_chromaticity(name: str) -> None:
+    import colour
+
+    xyz = integral(observer() * illuminant(name)) / integral(observer()[1])
+    assert xyz[1] == pytest.approx(1, rel=1e-12)
+    expected = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
+    # The published chromaticities have four or five digits, and spectra are cut at 380 and 780 nm.
+    np.testing.assert_allclose(xyz[:2] / xyz.sum(), expected, atol=2e-4)
+    assert (np.array([0.2126, 0.7152, 0.0722]) @ tint(name)) == pytest.approx(1)
+
+
+def test_grey_patches_are_grey_and_red_is_red() -> None:
+    grey = linear_srgb(patch("neutral 5"))
+    np.testing.assert_allclose(grey, 10**-0.7, atol=0.01)  # its density is 0.70
+    red = linear_srgb(patch("red"))
+    assert red[0] > 4 * red[1] > 0
+    assert len(patch_names()) == 24
+    assert patch_names()[0] == "dark skin"
+    # A surface that reflects everything is white.
+    np.testing.assert_allclose(linear_srgb(np.ones(WAVELENGTH_NM.size)), 1, atol=2e-3)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("lamp", ["D65", "A", "FL2"])
+def test_drawn_wavelengths_tell_what_a_pixel_sees(camera: str, lamp: str) -> None:
+    filters = filters_for(sensitivity(camera, Path()), illuminant(lamp))
+    light = illuminant(lamp) * patch("cyan")
+    rng = np.random.default_rng(4)
+    fine_nm = np.linspace(380, 780, 8001)
+    for colour, curve in enumerate(filters.sensitivity):
+        chosen_nm, weight = filters.draw(np.full(20_000, colour), rng.random(20_000))
+        assert chosen_nm.min() >= 380
+        assert chosen_nm.max() <= 780
+        seen = (np.interp(chosen_nm, WAVELENGTH_NM, light) * weight).sum(axis=1)
+        product = np.interp(fine_nm, WAVELENGTH_NM, light) * np.interp(fine_nm, WAVELENGTH_NM, curve)
+        exact = np.trapezoid(product, fine_nm)
+        # Four standard errors; the fault, weights that forget how wide a cell is, is off by far more.
+        assert abs(seen.mean() - exact) < 4 * seen.std() / np.sqrt(seen.size)
+        assert seen.std() < 0.35 * seen.mean()  # what it is for: evenly drawn wavelengths give 0.5 to 2
+
+
+def test_of_light_that_follows_the_lamp_every_draw_tells_nearly_all() -> None:
+    filters = filters_for(sensitivity(CAMERAS[0], Path()), illuminant("FL2"))
+    chosen_nm, weight = filters.draw(np.ones(1000, dtype=np.int64), np.random.default_rng(1).random(1000))
+    seen = (np.interp(chosen_nm, WAVELENGTH_NM, filters.light) * weight).sum(axis=1)
+    assert seen.std() < 0.05 * filters.white[1]  # the floor of even draws, and lines within cells
+
+
+def test_a_perfect_detector_of_555_nm_counts_lumens() -> None:
+    curve = np.exp(-(((WAVELENGTH_NM - 555) / 4) ** 2))
+    filters = filters_for(curve[None], illuminant("E"))
+    # It detects each photon of 555 nm: of a narrow line there a pixel sees the luminance, whose
+    # integral with the luminosity function is 1 per nm there.
+    line = np.where(WAVELENGTH_NM == 555, 1.0, 0.0)
+    luminance = integral(observer()[1] * line) / integral(observer()[1])
+    assert integral(filters.sensitivity[0] * line) == pytest.approx(luminance, rel=2e-3)
+
+
+def test_cells_of_wavelengths_grow_and_cover_where_a_pixel_sees() -> None:
+    curve = np.where((WAVELENGTH_NM >= 500) & (WAVELENGTH_NM <= 600), 1.0, 0.0)
+    filters = Filters(curve[None], illuminant("D65"))
+    bounds = filters.wavelength_nm[0]
+    assert bounds.shape == (CELLS + 1,)
+    assert (np.diff(bounds) > 0).all()
+    assert bounds[0] == pytest.approx(499, abs=0.5)  # the curve rises from 0 at 499 nm
+    assert bounds[-1] == pytest.approx(601, abs=0.5)
+
+
+def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
+    lines = ["wavelength_nm,R,G,B"] + [f"{nm},{nm - 400},{50},{700 - nm}" for nm in range(400, 701, 10)]
+    (tmp_path / "mine.csv").write_text("\n".join(lines))
+    curves = sensitivity("mine.csv", tmp_path)
+    assert curves.shape == (3, WAVELENGTH_NM.size)
+    at = WAVELENGTH_NM.tolist().index
+    np.testing.assert_allclose(curves[:, at(550)], [0.5, 50 / 300, 0.5])
+    assert (curves[:, at(399)] == 0).all()  # beyond its ends a camera sees nothing
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "cannot be read"),
+        ("wavelength_nm,R,G,B\n400,1,2\n", "columns"),
+        ("wavelength_nm,R,G,B\n400,1,nan,2\n500,1,1,1\n", "finite"),
+        ("wavelength_nm,R,G,B\n500,1,1,2\n400,1,1,1\n", "grow"),
+        ("wavelength_nm,R,G,B\n400,1,-1,2\n500,1,1,1\n", "not negative"),
+        ("wavelength_nm,R,G,B\n900,1,1,2\n950,1,1,1\n", "sees no light"),
+        ("wavelength_nm,R,G,B\n400,a,1,2\n500,1,1,1\n", "cannot be read"),
+    ],
+)
+def test_bad_csv_files_are_told(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InputError, match=says):
+        sensitivity("bad.csv", tmp_path)
+
+
+def test_unknown_names_get_a_suggestion() -> None:
+    with pytest.raises(InputError, match="did you mean 'Nikon 5100"):
+        sensitivity("Nikon 5100", Path())
+    with pytest.raises(InputError, match="did you mean 'D65'"):
+        illuminant("D655")
+    with pytest.raises(InputError, match="did you mean 'dark skin'"):
+        patch("darkskin")
+
+
+@pytest.mark.parametrize(
+    ("reflectance", "says"),
+    [
+        ({"wavelength_nm": [400, 500], "value": [0.1]}, "as many values"),
+        ({"wavelength_nm": [500, 400], "value": [0.1, 0.2]}, "must grow"),
+        ({"wavelength_nm": [400, 500], "value": [0.1, 1.2]}, r"reflectance\.value\[1\]"),
+        ({"wavelength_nm": [400, 500], "values": [0.1, 0.2]}, r"reflectance\.values'; did you mean 'value'"),
+        ([0.1, 0.2], r"reflectance\[2\]' is missing"),
+        ([0.1, 0.2, 3], r"reflectance\[2\]"),
+    ],
+)
+def test_bad_reflectances_are_told_by_field(reflectance: object, says: str) -> None:
+    from simgen.materials import Material
+
+    with pytest.raises(InputError, match=says):
+        validate(Material, {"reflectance": reflectance}, "scene.toml")

@@ -1,0 +1,217 @@
+"""Spectral mode against integration by colour-science: rendered views, thinned photons, exposures."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lit_scenes import LAMP, ball
+
+from pcii.bayer import colour_index
+from simgen import backend
+from simgen.build import Built, build
+from simgen.candidates import Setup
+from simgen.counts import absolute_gain
+from simgen.exposure import PHOTONS_PER_LUMEN_SECOND
+from simgen.photons import draw_photons
+from simgen.recipe import Recipe
+from simgen.render import render_view
+from simgen.scene import Scene
+from simgen.sensor import sensitivities
+from simgen.spectra import patch_names
+
+pytestmark = [
+    pytest.mark.renders,
+    # colour-science says that it interpolates.
+    pytest.mark.filterwarnings("ignore:Aligning"),
+]
+CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
+LUX, PIXEL_MM, F_NUMBER = 500.0, 0.25, 4.0
+ACROSS, DOWN = 6, 4
+SIDE_PX = 12
+
+
+@pytest.fixture(autouse=True, scope="module")
+def variant_is_put_back() -> Iterator[None]:
+    yield
+    backend.load()
+
+
+def recipe(camera: str | None, **changes: Any) -> Recipe:
+    values = {
+        "scene": "chart",
+        "grid": {
+            "rows": 1,
+            "cols": 1,
+            "height": DOWN * SIDE_PX,
+            "width": ACROSS * SIDE_PX,
+            "pixel_mm": PIXEL_MM,
+        },
+        "sensor": {"camera": camera},
+        "photons": {"scope": "exposure"},
+        "exposure": {"f_number": F_NUMBER, "time_s": 2e-7},
+    }
+    return Recipe.model_validate(values | changes)
+
+
+def chart(lamp: str, camera: str | None) -> tuple[Built, Recipe]:
+    """A ColorChecker that fills the view, each patch `SIDE_PX` pixels wide, evenly lit by `LUX`."""
+    side_mm = SIDE_PX * PIXEL_MM * 500 / 50
+    cards = [
+        {
+            "name": f"patch{number}",
+            "position_mm": (
+                (number % ACROSS - (ACROSS - 1) / 2) * side_mm,
+                (number // ACROSS - (DOWN - 1) / 2) * side_mm,
+                500,
+            ),
+            "shape": {"type": "card", "width_mm": side_mm, "height_mm": side_mm},
+            "material": {"reflectance": name},
+        }
+        for number, name in enumerate(patch_names())
+    ]
+    values = {
+        "title": "chart",
+        "objects": cards,
+        "lights": [{"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}],
+        "level": {"illuminance_lux": LUX, "z_mm": 500},
+    }
+    made = recipe(camera)
+    mi = backend.load(spectral=made.is_spectral)
+    return build(mi, Scene.model_validate(values), Path(), 2, sensitivities(made, Path())), made
+
+
+def by_patch(image: np.ndarray) -> np.ndarray:
+    """Means (24, C) over the inner pixels of the patches of (H, W, C)."""
+    blocks = image.reshape(DOWN, SIDE_PX, ACROSS, SIDE_PX, -1)[:, 2:-2, :, 2:-2]
+    return blocks.mean(axis=(1, 3)).reshape(24, -1)
+
+
+def integrated(camera: str, lamp: str) -> np.ndarray:
+    """Raw channels (24, 3) of the patches, up to one factor: colour-science's own integration."""
+    import colour
+
+    curves = colour.MSDS_CAMERA_SENSITIVITIES[camera]
+    shape = colour.SpectralShape(380, 780, 1)
+    curves = curves.copy().align(shape, extrapolator_kwargs={"method": "Constant", "left": 0, "right": 0})
+    chart = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"].values()
+    light = colour.SDS_ILLUMINANTS[lamp].copy().align(shape)
+    return np.array(
+        [colour.sd_to_XYZ(one, cmfs=curves, illuminant=light, method="Integration") for one in chart]
+    )
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("lamp", ["D65", "A"])
+def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera: str, lamp: str) -> None:
+    built, made = chart(lamp, camera)
+    grid, samples = made.grid.camera_grid(), 1024
+    view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=5).astype(np.float64)
+    found, expected = by_patch(view), integrated(camera, lamp)
+    # Ratios to the green of the white patch, so that exposure does not matter. 65 000 paths a patch and
+    # channel leave 0.1 to 0.2 % of noise.
+    found, expected = found / found[18, 1], expected / expected[18, 1]
+    np.testing.assert_allclose(found, expected, rtol=5e-3)
+    # The fault: the other lamp's light.
+    other = integrated(camera, {"D65": "A", "A": "D65"}[lamp])
+    assert (abs(found / (other / other[18, 1]) - 1) > 5e-3).mean() > 0.9
+
+
+@pytest.mark.parametrize("lamp", ["D65", "FL2"])
+def test_thinned_photons_of_the_chart_are_those_of_spectral_integration(lamp: str) -> None:
+    built, made = chart(lamp, CAMERAS[0])
+    made = made.model_copy(
+        update={"exposure": made.exposure.model_copy(update={"time_s": photon_time_s()})}  # type: ignore
+    )
+    grid = made.grid.camera_grid()
+    setup = Setup(built, grid, made.cfa, 2)
+    photons = draw_photons(setup, made.photons, seed=2, photons_per_radiance=absolute_gain(made))
+    counts = np.zeros((grid.height, grid.width))
+    np.add.at(counts, (photons.i, photons.j), 1)
+    colours = colour_index(grid.height, grid.width, made.cfa)
+    own = np.stack([by_patch((counts * (colours == colour))[..., None])[:, 0] for colour in range(3)], axis=1)
+    inner = (SIDE_PX - 4) ** 2
+    found, expected = own * inner, integrated(CAMERAS[0], lamp) * np.array([0.25, 0.5, 0.25])
+    expected *= found.sum() / expected.sum()
+    # Chi-square of 72 Poisson numbers, one of them given away for the sum; 5 deviations of it.
+    surprise = ((found - expected) ** 2 / expected).sum()
+    assert abs(surprise - 71) < 5 * np.sqrt(2 * 71)
+    # The fault: light of another spectrum is seen at once.
+    other = integrated(CAMERAS[0], {"D65": "FL2", "FL2": "D65"}[lamp]) * np.array([0.25, 0.5, 0.25])
+    other *= found.sum() / other.sum()
+    assert ((found - other) ** 2 / other).sum() > 71 + 10 * np.sqrt(2 * 71)
+
+
+def photon_time_s() -> float:
+    """Of an exposure that gives a few hundred photons a patch one by one, or many where that is cheap."""
+    return 1e-8 if backend.choose().kind == "scalar" else 3e-7
+
+
+@pytest.mark.parametrize("camera", [None, *CAMERAS])
+def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
+    """At 500 lux: E rho / pi cd/m^2, pi / (4 N^2) of it on the sensor, times area, time and photons."""
+    built, made = chart("D65", camera)
+    grid, exposure = made.grid.camera_grid(), made.exposure
+    assert exposure is not None
+    gain = absolute_gain(made)
+    assert gain is not None
+    view = render_view(built, grid, 0, 0, samples_per_pixel=1024, seed=6).astype(np.float64)
+    seen = by_patch(view)[21] * gain  # neutral 5
+    per_lux = np.pi / (4 * F_NUMBER**2) * (PIXEL_MM * 1e-3) ** 2 * exposure.time_s / np.pi
+    np.testing.assert_allclose(seen, photons_of_grey(camera) * per_lux * LUX, rtol=5e-3)
+
+
+def photons_of_grey(camera: str | None) -> np.ndarray:
+    """Photons (3,) that a lumen second of D65, reflected by neutral 5, gives pixels: by spectra, by hand."""
+    import colour
+
+    shape = colour.SpectralShape(380, 780, 1)
+    wavelength_nm = np.arange(380, 781.0)
+    light = colour.SDS_ILLUMINANTS["D65"].copy().align(shape).values
+    grey = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"]["neutral 5 (.70 D)"].copy().align(shape).values
+    luminosity = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape).values[:, 1]
+    if camera is None:  # photons of 555 nm, whatever the colour
+        reflected = (light * grey * luminosity).sum() / (light * luminosity).sum()
+        return np.full(3, reflected * PHOTONS_PER_LUMEN_SECOND)
+    watts_per_lumen_nm = light / (683.002 * (light * luminosity).sum())
+    photons_per_watt_second = wavelength_nm * 1e-9 / (6.62607015e-34 * 299792458)
+    curves = colour.MSDS_CAMERA_SENSITIVITIES[camera].copy()
+    curves = curves.align(shape, extrapolator_kwargs={"method": "Constant", "left": 0, "right": 0}).values
+    efficiency = (curves.T / wavelength_nm) / (curves.T / wavelength_nm).max()
+    return (efficiency * watts_per_lumen_nm * grey * photons_per_watt_second).sum(axis=1)
+
+
+def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> None:
+    """Interreflection, shadow, textures made spectra, metals: photons and views must agree everywhere."""
+    plastic = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1))
+    plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.3}
+    gold = ball("gold", 150.0, 700.0, (0, 0, 0))
+    gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.3}}
+    values = {
+        "title": "test",
+        "objects": [plastic, gold],
+        "lights": [LAMP | {"illuminant": "A"}, {"type": "uniform", "luminance_cd_m2": 50.0}],
+        "backdrop": {"z_mm": 1500.0, "reflectance": "blue sky"},
+    }
+    made = recipe(CAMERAS[0], photons={"scope": "exposure"})
+    grid = made.grid.camera_grid()
+    mi = backend.load(spectral=True)
+    built = build(mi, Scene.model_validate(values), Path(), 3, sensitivities(made, Path()))
+    view = render_view(built, grid, 0, 0, samples_per_pixel=1024, seed=6).astype(np.float64)
+    scalar = backend.choose().kind == "scalar"
+    wanted = 2e4 if scalar else 2e5
+    colours = colour_index(grid.height, grid.width, made.cfa)
+    seen = np.take_along_axis(view, colours[..., None], axis=2)[..., 0]
+    gain = wanted / seen.sum()
+    setup = Setup(built, grid, made.cfa, 3)
+    photons = draw_photons(setup, made.photons, seed=3, photons_per_radiance=gain)
+    blocks = (photons.i // 6 * 12 + photons.j // 6) * 3 + colours[photons.i, photons.j]
+    rows, cols = np.indices(seen.shape)
+    number = ((rows // 6 * 12 + cols // 6) * 3 + colours).ravel()
+    found = np.bincount(blocks, minlength=288)
+    expected = gain * np.bincount(number, seen.ravel(), minlength=288)
+    score = (found - expected) / np.sqrt(expected)
+    assert abs((score**2).sum() - 288) < 5 * np.sqrt(2 * 288)
+    assert abs(score).max() < 5
+    assert photons.log["overshoot_photons"] <= max(1e-4 * photons.k.size, 3)
