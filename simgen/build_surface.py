@@ -8,7 +8,9 @@ import numpy as np
 from simgen.assets import asset, read_image
 from simgen.build_colour import is_spectral, reflectance_plugin
 from simgen.materials import Material, Matt, Metal, Plastic
+from simgen.paint import paint
 from simgen.shapes import Card, Shape, Sphere
+from simgen.textures import Texture
 
 
 def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
@@ -41,13 +43,9 @@ def _reflectance(mi: Any, material: Material, shape: Shape, folder: Path) -> dic
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
-    path = asset(folder, material.texture, "material.texture")
-    pixels = read_image(path)
-    if isinstance(shape, Card):
-        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
     return {
         "type": "bitmap",
-        "bitmap": _bitmap(mi, pixels),
+        "bitmap": _bitmap(mi, _pixels(material.texture, shape, folder)),
         # Linear already, so colours are left as they are, but for being made spectra where these are asked.
         "raw": not is_spectral(mi),
         "filter_type": "bilinear",
@@ -60,3 +58,23 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
     bitmap = mi.Bitmap(pixels)
     bitmap.set_srgb_gamma(False)  # linear; otherwise a spectral variant takes them for sRGB
     return bitmap
+def _pixels(texture: str | Texture, shape: Shape, folder: Path) -> np.ndarray:
+    """Linear reflectance (H, W, 3), float32, in the order that the renderer takes it for this shape."""
+    if isinstance(texture, str):
+        pixels = read_image(asset(folder, texture, "material.texture"))
+    else:
+        pixels = paint(texture, aspect_of(shape))
+    if isinstance(shape, Card):
+        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
+    return pixels
+
+
+def aspect_of(shape: Shape) -> float:
+    """Width over height of what a shape's texture is laid on: a sphere's chart is twice as wide as high."""
+    match shape:
+        case Card():
+            return shape.width_mm / shape.height_mm
+        case Sphere():
+            return 2.0
+        case _:
+            return 1.0

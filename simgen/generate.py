@@ -134,12 +134,13 @@ def verify(path: Path, report: Report = silent) -> int:
 
 def _identity(recipe: Recipe, scene: Scene, folder: Path, curves: np.ndarray | None) -> str:
     """Hash of all that decides the dataset's content, but for the machine."""
-    assets = {thing.material.texture for thing in scene.objects}
-    assets |= {getattr(thing.shape, "file", None) for thing in scene.objects}
+    used = [thing.material.texture for thing in scene.objects]
+    used += [getattr(thing.shape, "file", None) for thing in scene.objects]
+    assets = {name for name in used if isinstance(name, str)}
     content = {
         "recipe": recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),
-        "assets": {name: hash_file(folder / name) for name in sorted(filter(None, assets))},
+        "assets": {name: hash_file(folder / name) for name in sorted(assets)},
         "sensitivities": None if curves is None else curves.tolist(),
         "format_version": FORMAT_VERSION,
     }

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from simgen.schema import Colour, Positive, Real, Share, Strict
+from simgen.textures import Texture
 
 
 class Matt(Strict):
@@ -53,18 +54,35 @@ class Spectrum(Strict):
 
 def _kind_of_reflectance(value: Any) -> str:
     if isinstance(value, str):
-        return "<patch>"
-    return "<spectrum>" if isinstance(value, dict | Spectrum) else "<colour>"
+        return "patch"
+    return "spectrum" if isinstance(value, dict | Spectrum) else "colour"
 
 
 PatchName = Annotated[str, Field(description="one of the 24 ColorChecker patches, such as 'dark skin'")]
 Reflectance = Annotated[
-    Annotated[Colour, Tag("<colour>")]
-    | Annotated[PatchName, Tag("<patch>")]
-    | Annotated[Spectrum, Tag("<spectrum>")],
+    Annotated[Colour, Tag("colour")]
+    | Annotated[PatchName, Tag("patch")]
+    | Annotated[Spectrum, Tag("spectrum")],
     Discriminator(_kind_of_reflectance),
 ]
 """As sRGB, as the name of a ColorChecker patch, or as a spectrum."""
+
+
+def _file_or_pattern(given: Any) -> str | None:
+    """Which of the two a texture is, so that an error tells of that one alone."""
+    if isinstance(given, str):
+        return "file"
+    return "pattern" if isinstance(given, dict | Strict) else None
+
+
+FileOrPattern = Annotated[
+    Annotated[str, Tag("file")] | Annotated[Texture, Tag("pattern")],
+    Discriminator(
+        _file_or_pattern,
+        custom_error_type="texture",
+        custom_error_message='give the name of an image file or a table such as { type = "star" }',
+    ),
+]
 
 
 class Material(Strict):
@@ -73,8 +91,9 @@ class Material(Strict):
     reflectance: Reflectance | None = None
     """sRGB, three numbers from 0 to 1; or the name of a ColorChecker patch; or a spectrum, such as
     { wavelength_nm = [400, 700], value = [0.2, 0.8] }."""
-    texture: str | None = None
-    """An sRGB image file inside the scene's folder, laid out by the shape's texture coordinates."""
+    texture: FileOrPattern | None = None
+    """An sRGB image file inside the scene's folder, or a pattern such as { type = "star", spokes = 36 };
+    laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")
     """Matt unless told otherwise; { type = "plastic", roughness = 0.1 } adds highlights."""
 

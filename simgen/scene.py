@@ -77,7 +77,7 @@ def load_scene(name_or_path: str, near: Path | None = None) -> tuple[Scene, Path
     for thing in scene.objects:
         if isinstance(thing.shape, Mesh):
             asset(file.parent, thing.shape.file, f"{file}: object '{thing.name}', shape.file")
-        if thing.material.texture is not None:
+        if isinstance(thing.material.texture, str):
             where = f"{file}: object '{thing.name}', material.texture"
             asset(file.parent, thing.material.texture, where)
     return scene, file.parent

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationError
 
 from pcii.errors import InputError
 
@@ -55,12 +55,17 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
     errors = fault.errors(include_url=False)
     # An unknown key is most often the cause of the missing one, so it is told first.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
-    location, known = _follow(model, first["loc"])
+    location, known, types = _follow(model, first["loc"])
     where = _dotted(location)
     if first["type"] == "extra_forbidden":
         text = f"unknown key '{where}'{suggestion(str(location[-1]), known)}"
     elif first["type"] == "missing":
         text = f"'{where}' is missing"
+    elif first["type"] == "union_tag_invalid":
+        given = first.get("ctx", {})["tag"]
+        text = f"'{where}.type': there is no {given!r}{suggestion(given, types)}"
+    elif first["type"] == "union_tag_not_found":
+        text = f"'{where}.type' is missing{suggestion('', types)}"
     elif first["type"] == "value_error":
         text = f"'{where}': " if where else ""
         text += str(first.get("ctx", {}).get("error"))
@@ -93,25 +98,26 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 def _follow(
     model: type[BaseModel], location: tuple[int | str, ...]
-) -> tuple[tuple[int | str, ...], set[str]]:
-    """Pydantic's location without the tags of unions, and the keys that are known at its last part."""
+) -> tuple[tuple[int | str, ...], set[str], set[str]]:
+    """Pydantic's location without the tags of unions, the keys known at its last part, the types there."""
     candidates: list[type[BaseModel]] = [model]
     path: list[int | str] = []
     last: set[str] = set()
+    tags: set[str] = set()
     for part in location:
-        if isinstance(part, str) and part.startswith("<"):  # a kind of value, which no key can be
-            continue
-        keys = {key for candidate in candidates for key in candidate.model_fields}
-        tagged = [one for one in candidates if part == _tag(one)]
-        if tagged and part not in keys:
-            candidates = tagged
+        if part in tags:
+            tagged = [one for one in candidates if part == _tag(one)]
+            # Once the model is known what follows are its fields, even one that is named like a tag.
+            candidates, tags = (tagged, set()) if tagged else (candidates, tags - {str(part)})
             continue
         path.append(part)
         if isinstance(part, str):
-            last = keys
+            last = {key for candidate in candidates for key in candidate.model_fields}
             fields = [one.model_fields[part] for one in candidates if part in one.model_fields]
             candidates = [inner for field in fields for inner in _models_in(field.annotation)]
-    return tuple(path), last
+            tags = {tag for field in fields for tag in _tags_in(field.annotation)}
+            tags |= {tag for one in candidates if (tag := _tag(one)) is not None}
+    return tuple(path), last, {tag for one in candidates if (tag := _tag(one)) is not None}
 
 
 def _tag(model: type[BaseModel]) -> str | None:
@@ -124,3 +130,10 @@ def _models_in(annotation: Any) -> list[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     return [model for part in get_args(annotation) for model in _models_in(part)]
+
+
+def _tags_in(annotation: Any) -> list[str]:
+    """Names that a union gives to its parts."""
+    if isinstance(annotation, Tag):
+        return [annotation.tag]
+    return [tag for part in get_args(annotation) for tag in _tags_in(part)]

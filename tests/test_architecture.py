@@ -43,7 +43,8 @@ PCII_LEVELS = [
 SIMGEN_LEVELS = [
     {"locations", "seeds"},
     {"backend", "schema", "assets"},
-    {"shapes", "materials", "lights", "spectra"},
+    {"textures", "coverage"},
+    {"shapes", "materials", "lights", "spectra", "paint"},
     {"recipe", "scene", "filters"},
     {"cameras", "build_shape", "build_colour"},
     {"build_surface", "build_light"},
