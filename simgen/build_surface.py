@@ -58,6 +58,8 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
     bitmap = mi.Bitmap(pixels)
     bitmap.set_srgb_gamma(False)  # linear; otherwise a spectral variant takes them for sRGB
     return bitmap
+
+
 def _pixels(texture: str | Texture, shape: Shape, folder: Path) -> np.ndarray:
     """Linear reflectance (H, W, 3), float32, in the order that the renderer takes it for this shape."""
     if isinstance(texture, str):

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from simgen.assets import srgb_to_linear
-from simgen.schema import Colour, NonNegative, Positive, Real, Share, Strict, Whole
+from simgen.schema import Colour, NonNegative, Real, Share, Strict, Whole
 
 CLIPPED_SHARE = 0.01
 """No more than this share of a noise's values may lie outside what a surface can reflect."""
@@ -39,7 +39,7 @@ class Stripes(_InTwoColours):
     """Even stripes, upright unless turned; the first begins at the left with the first colour."""
 
     type: Literal["stripes"] = "stripes"
-    periods: Annotated[Positive, Field(le=1024)]
+    periods: Annotated[Real, Field(ge=1, le=1024)]
     """Pairs of stripes across the width; turned stripes keep this spacing."""
     angle_deg: Annotated[Real, Field(ge=-180, le=180)] = 0.0
     """Turns the stripes clockwise about the centre."""

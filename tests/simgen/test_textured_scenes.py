@@ -1,0 +1,117 @@
+"""Textures in scenes: as cameras see them, in datasets, and told in one sentence if they are wrong."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pcii.errors import InputError
+from simgen import backend
+from simgen.build import build
+from simgen.generate import generate
+from simgen.paint import paint
+from simgen.recipe import Grid, Recipe
+from simgen.render import render_view
+from simgen.scene import Scene, load_scene
+from simgen.schema import validate
+from simgen.textures import Checks, Edge, Noise, Star, Stripes, Text
+
+
+def scene_of(texture: Any) -> dict[str, Any]:
+    """A card that fills the view of one camera exactly, in even light, so that it shows its texture."""
+    card = {
+        "name": "card",
+        "position_mm": (0.0, 0.0, 500.0),
+        "shape": {"type": "card", "width_mm": 48.0, "height_mm": 32.0},
+        "material": {"texture": texture},
+    }
+    return {"title": "t", "lights": [{"type": "uniform", "luminance_cd_m2": 1.0}], "objects": [card]}
+
+
+@pytest.mark.renders
+def test_a_camera_sees_a_cards_texture_as_it_was_painted() -> None:
+    texture = {"type": "text", "text": "LF", "pixels": 192, "colours": [[0.9, 0.2, 0.2], [0.3, 0.3, 0.9]]}
+    scene = validate(Scene, scene_of(texture), "t")
+    built = build(backend.load(), scene, Path(), max_depth=2)
+    # 48 x 32 pixels of 0.1 mm at 50 mm see 48 x 32 mm at 500 mm: four texels to a pixel.
+    grid = Grid(rows=1, cols=1, focal_mm=50.0, pixel_mm=0.1, height=32, width=48).camera_grid()
+    seen = render_view(built, grid, 0, 0, samples_per_pixel=256, seed=1)
+    chosen = scene.objects[0].material.texture
+    assert isinstance(chosen, Text)
+    painted = paint(chosen, 1.5).reshape(32, 4, 48, 4, 3).mean((1, 3))
+    # In even light of 1 cd/m^2 radiance is reflectance; a pixel on a border is known to 0.5 / sqrt(256)
+    # of the colours' difference, 0.03, and 4.5 deviations of that hold for all of them.
+    np.testing.assert_allclose(seen, painted, atol=0.14)
+    assert np.abs(seen - painted).mean() < 0.01
+    assert np.abs(seen - painted[:, ::-1]).mean() > 0.05
+    assert np.abs(seen - painted[::-1]).mean() > 0.05
+
+
+@pytest.mark.renders
+def test_a_dataset_of_a_painted_scene_is_finished_and_known_again(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    lines = (
+        'title = "t"\n[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 1.0\n'
+        '[[objects]]\nname = "a"\nposition_mm = [0, 0, 500]\n'
+        'shape = { type = "card", width_mm = 60, height_mm = 60 }\n'
+        'material = { texture = { type = "noise", pixels = 32, seed = %d } }\n'
+    )
+    (folder / "scene.toml").write_text(lines % 1)
+    assert isinstance(load_scene(str(folder))[0].objects[0].material.texture, Noise)
+    grid = {"rows": 1, "cols": 2, "pixel_mm": 1.0, "height": 8, "width": 8}
+    values = {"scene": str(folder), "grid": grid, "photons": {"budget": 20}, "products": {"radiance": "none"}}
+    recipe = validate(Recipe, values, "r")
+    made = generate(recipe, tmp_path, tmp_path / "out")
+    assert generate(recipe, tmp_path, tmp_path / "out")["identity"] == made["identity"]
+    (folder / "scene.toml").write_text(lines % 2)
+    with pytest.raises(InputError, match="another recipe or scene"):
+        generate(recipe, tmp_path, tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("texture", "message"),
+    [
+        (
+            {"type": "checks", "rows": 2, "columns": 2, "colums": 3},
+            "unknown key 'objects[0].material.texture.colums'; did you mean 'columns'?",
+        ),
+        (
+            {"type": "cheks"},
+            "'objects[0].material.texture.type': there is no 'cheks'; did you mean 'checks'?",
+        ),
+        (
+            {"type": "zebra"},
+            "material.texture.type': there is no 'zebra'; known are checks, edge, noise, star, stripes, text",
+        ),
+        (
+            {"spokes": 3},
+            "'objects[0].material.texture.type' is missing; known are checks, edge, noise, star, stripes",
+        ),
+        (7, "'objects[0].material.texture': give the name of an image file or a table such as {"),
+        ({"type": "text"}, "'objects[0].material.texture.text' is missing"),
+        ({"type": "text", "text": 3}, "'objects[0].material.texture.text': input should be a valid string"),
+        ({"type": "text", "text": "a\nb"}, "text: '\\n' cannot be drawn; use printable Latin-1 characters"),
+        ({"type": "text", "text": "Ω"}, "text: 'Ω' cannot be drawn"),
+        ({"type": "text", "text": "  "}, "text: give at least one character that is no space"),
+        ({"type": "star", "pixels": 5000}, "'objects[0].material.texture.pixels'"),
+        ({"type": "edge", "colours": [[0, 0, 0]]}, "'objects[0].material.texture.colours[1]' is missing"),
+        ({"type": "edge", "colours": [[0, 0, 0], [0, 2, 0]]}, "'objects[0].material.texture.colours[1][1]'"),
+        ({"type": "noise", "contrast": 2}, "contrast: 2 puts more than 1% of the values outside 0 to 1; use"),
+    ],
+)
+def test_a_wrong_texture_is_told_in_one_sentence(texture: Any, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        validate(Scene, scene_of(texture), "s.toml")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_schema_describes_every_field_of_every_texture() -> None:
+    schema = Scene.model_json_schema()
+    for texture in (Checks, Stripes, Star, Edge, Text, Noise):
+        told = schema["$defs"][texture.__name__]
+        assert told["description"]
+        for name, entry in told["properties"].items():
+            assert name == "type" or entry["description"], f"{texture.__name__}.{name}"
