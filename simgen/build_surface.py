@@ -7,14 +7,16 @@ import numpy as np
 
 from simgen.assets import asset, read_image
 from simgen.build_colour import is_spectral, reflectance_plugin
-from simgen.materials import Material, Matt, Metal, Plastic
+from simgen.materials import Glass, Material, Matt, Metal, Plastic
 from simgen.paint import paint
 from simgen.shapes import Card, Shape, Sphere
 from simgen.textures import Texture
 
 
 def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
-    """The same from behind, so that a card or an open mesh is no black hole there."""
+    """The same from behind, so that a card or an open mesh is no black hole there; glass has two sides."""
+    if surface["type"] in ("dielectric", "thindielectric"):
+        return surface
     return {"type": "twosided", "bsdf": surface}
 
 
@@ -37,6 +39,9 @@ def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> d
             }
         case Metal(name=name, roughness=alpha):
             return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+        case Glass(refractive_index=index):
+            pane = isinstance(shape, Card)
+            return {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
 
 
 def _reflectance(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:

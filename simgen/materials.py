@@ -32,7 +32,15 @@ class Metal(Strict):
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
 
-Finish = Matt | Plastic | Metal
+class Glass(Strict):
+    """Clear and smooth; a card of it is a thin pane. Light passes it in as many segments as it has surfaces,
+    so recipes with glass need a larger `render.max_depth`: 6 for a ball before a lit thing."""
+
+    type: Literal["glass"] = "glass"
+    refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+
+
+Finish = Matt | Plastic | Metal | Glass
 
 
 class Spectrum(Strict):
@@ -99,9 +107,10 @@ class Material(Strict):
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
-        coloured = not isinstance(self.finish, Metal)
+        coloured = not isinstance(self.finish, Metal | Glass)
         if coloured and (self.reflectance is None) == (self.texture is None):
             raise ValueError("give either 'reflectance' or 'texture'")
         if not coloured and (self.reflectance is not None or self.texture is not None):
-            raise ValueError("a metal's colour is its own; give no 'reflectance' and no 'texture'")
+            kind = self.finish.type
+            raise ValueError(f"the colour of {kind} is its own; give no 'reflectance' and no 'texture'")
         return self
