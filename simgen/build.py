@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
+from simgen.assets import Assets, read_assets
 from simgen.backend import shape_numbers
 from simgen.build_colour import reflectance_plugin
 from simgen.build_light import gain_for, light_plugin, main_spectrum
-from simgen.build_shape import card_pose, pose_of, shape_plugin
+from simgen.build_shape import card_pose, placed_shape, pose_of
 from simgen.build_surface import matt, surface_plugin, two_sided
 from simgen.filters import Filters, filters_for
+from simgen.lights import EnvironmentLight
 from simgen.scene import Scene, SceneObject
 
 BACKDROP = "backdrop"
@@ -39,13 +41,14 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarra
     `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
     `InputError` for a mesh or texture that cannot be used.
     """
+    assets = read_assets(scene, folder)
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
     plugins: dict[str, Any] = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": max_depth},
     }
     for number, thing in enumerate(scene.objects, start=1):
-        plugins[f"object{number}"] = _object(mi, thing, folder)
+        plugins[f"object{number}"] = _object(mi, thing, assets)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
@@ -54,7 +57,8 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarra
             "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
             "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
         }
-    surroundings = None  # until read_environment
+    around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
+    surroundings = None if around is None else assets.environment(around.file)
     gain = gain_for(scene.level, scene.lights, surroundings)
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
@@ -79,9 +83,9 @@ def _object_id(shape_id: str) -> int:
     return int(shape_id.removeprefix("object")) if shape_id.startswith("object") else 0
 
 
-def _object(mi: Any, thing: SceneObject, folder: Path) -> dict[str, Any]:
-    surface = surface_plugin(mi, thing.material, thing.shape, folder)
-    return {**shape_plugin(mi, thing.shape, pose_of(mi, thing), folder), "bsdf": two_sided(surface)}
+def _object(mi: Any, thing: SceneObject, assets: Assets) -> Any:
+    surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets))
+    return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
 
 
 def _last_line(fault: BaseException) -> str:

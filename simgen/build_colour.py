@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from simgen.assets import srgb_to_linear
 from simgen.materials import Reflectance, Spectrum
 from simgen.spectra import WAVELENGTH_NM, illuminant, linear_srgb, patch, resampled, tint
+from simgen.srgb import srgb_to_linear
 
 
 def is_spectral(mi: Any) -> bool:

@@ -12,7 +12,8 @@ import numpy as np
 from pcii.errors import InputError
 from simgen.build_colour import radiance_plugin
 from simgen.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight
-from simgen.spectra import LUMINANCE, illuminant
+from simgen.spectra import illuminant
+from simgen.srgb import LUMINANCE
 
 NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""

@@ -1,12 +1,18 @@
-"""Shapes as Mitsuba's plugins."""
+"""Shapes as Mitsuba's: its own sphere and rectangle, and meshes built in memory, never from a file."""
 
-from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pcii.errors import InputError
-from simgen.assets import asset
+from simgen.assets import Assets
 from simgen.scene import SceneObject
-from simgen.shapes import Card, Mesh, Shape, Sphere
+from simgen.schema import LARGEST_MM
+from simgen.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
+from simgen.solids import box, cylinder
+from simgen.triangles import Triangles
+
+SMALLEST_MM = 1e-3
 
 
 def pose_of(mi: Any, thing: SceneObject) -> Any:
@@ -18,20 +24,25 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose
 
 
-def shape_plugin(mi: Any, shape: Shape, pose: Any, folder: Path) -> dict[str, Any]:
-    """The Mitsuba shape of an object that stands in this pose."""
+def placed_shape(mi: Any, shape: Shape, pose: Any, assets: Assets, surface: dict[str, Any]) -> Any:
+    """The Mitsuba shape (or the plugin that makes it) of an object in this pose with this surface."""
     T = mi.ScalarTransform4f
     match shape:
         case Sphere():
-            return {"type": "sphere", "to_world": pose @ T().scale(shape.radius_mm)}
+            to_world = pose @ globe_pose(mi) @ T().scale(shape.radius_mm)
+            return {"type": "sphere", "to_world": to_world, "bsdf": surface}
         case Card():
             to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
-            return {"type": "rectangle", "to_world": to_world}
+            return {"type": "rectangle", "to_world": to_world, "bsdf": surface}
+        case Box():
+            triangles = box(shape.width_mm, shape.height_mm, shape.depth_mm)
+            return _mesh(mi, triangles, 1.0, pose, surface)
+        case Cylinder():
+            return _mesh(mi, cylinder(shape.radius_mm, shape.length_mm), 1.0, pose, surface)
         case Mesh():
-            path = asset(folder, shape.file, "shape.file")
-            if path.suffix.lower() != ".ply":
-                raise InputError(f"{path}: a mesh must be a .ply file")
-            return {"type": "ply", "filename": str(path), "to_world": pose @ T().scale(shape.scale)}
+            triangles = assets.mesh(shape.file)
+            _check_size(shape, triangles)
+            return _mesh(mi, triangles, shape.scale, pose, surface)
 
 
 def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
@@ -42,3 +53,45 @@ def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     """
     T = mi.ScalarTransform4f
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
+
+
+def globe_pose(mi: Any) -> Any:
+    """Mitsuba's sphere (first row of a texture about +Z, its middle column at -X) as a globe.
+
+    The first row comes to -Y, which is up, and the middle to -Z, towards the cameras.
+    """
+    return mi.ScalarTransform4f([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+
+
+def _check_size(shape: Mesh, triangles: Triangles) -> None:
+    reach = float(np.abs(triangles.positions).max()) * shape.scale
+    extent = float(np.ptp(triangles.positions, axis=0).max()) * shape.scale
+    if not (extent >= SMALLEST_MM and reach <= LARGEST_MM):
+        raise InputError(
+            f"shape.scale: with {shape.scale:g} the mesh {shape.file!r} is {extent:g} mm large and reaches "
+            f"{reach:g} mm from its origin; {SMALLEST_MM:g} to {LARGEST_MM:g} mm are allowed"
+        )
+
+
+def _mesh(mi: Any, triangles: Triangles, scale: float, pose: Any, surface: dict[str, Any]) -> Any:
+    matrix = np.array(pose.matrix, dtype=np.float64)
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(surface)
+    mesh = mi.Mesh(
+        "mesh",
+        len(triangles.positions),
+        len(triangles.faces),
+        props=properties,
+        has_vertex_normals=triangles.normals is not None,
+        has_vertex_texcoords=triangles.texcoords is not None,
+    )
+    values = mi.traverse(mesh)
+    positions = scale * triangles.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    values["vertex_positions"] = positions.astype(np.float32).ravel()
+    values["faces"] = triangles.faces.astype(np.uint32).ravel()
+    if triangles.normals is not None:
+        values["vertex_normals"] = (triangles.normals @ matrix[:3, :3].T).astype(np.float32).ravel()
+    if triangles.texcoords is not None:  # Mitsuba's v runs down a picture
+        values["vertex_texcoords"] = (triangles.texcoords * [1, -1] + [0, 1]).astype(np.float32).ravel()
+    values.update()
+    return mesh

@@ -1,15 +1,16 @@
 """Materials as Mitsuba's surfaces."""
 
-from pathlib import Path
+import math
 from typing import Any
 
 import numpy as np
 
-from simgen.assets import asset, read_image
+from pcii.errors import InputError
+from simgen.assets import Assets
 from simgen.build_colour import is_spectral, reflectance_plugin
 from simgen.materials import Glass, Material, Matt, Metal, Plastic
 from simgen.paint import paint
-from simgen.shapes import Card, Shape, Sphere
+from simgen.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
 from simgen.textures import Texture
 
 
@@ -25,17 +26,17 @@ def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": reflectance}
 
 
-def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
+def surface_plugin(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
     """The surface of an object of this shape, from the front."""
     match material.finish:
         case Matt():
-            return matt(_reflectance(mi, material, shape, folder))
+            return matt(_reflectance(mi, material, shape, assets))
         case Plastic(roughness=alpha):
             return {
                 "type": "roughplastic",
                 "distribution": "ggx",
                 "alpha": alpha,
-                "diffuse_reflectance": _reflectance(mi, material, shape, folder),
+                "diffuse_reflectance": _reflectance(mi, material, shape, assets),
             }
         case Metal(name=name, roughness=alpha):
             return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
@@ -44,13 +45,17 @@ def surface_plugin(mi: Any, material: Material, shape: Shape, folder: Path) -> d
             return {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
 
 
-def _reflectance(mi: Any, material: Material, shape: Shape, folder: Path) -> dict[str, Any]:
+def _reflectance(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
+    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
+        raise InputError(
+            f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates"
+        )
     return {
         "type": "bitmap",
-        "bitmap": _bitmap(mi, _pixels(material.texture, shape, folder)),
+        "bitmap": _bitmap(mi, _pixels(material.texture, shape, assets)),
         # Linear already, so colours are left as they are, but for being made spectra where these are asked.
         "raw": not is_spectral(mi),
         "filter_type": "bilinear",
@@ -65,10 +70,10 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
     return bitmap
 
 
-def _pixels(texture: str | Texture, shape: Shape, folder: Path) -> np.ndarray:
+def _pixels(texture: str | Texture, shape: Shape, assets: Assets) -> np.ndarray:
     """Linear reflectance (H, W, 3), float32, in the order that the renderer takes it for this shape."""
     if isinstance(texture, str):
-        pixels = read_image(asset(folder, texture, "material.texture"))
+        pixels = assets.image(texture)
     else:
         pixels = paint(texture, aspect_of(shape))
     if isinstance(shape, Card):
@@ -77,11 +82,15 @@ def _pixels(texture: str | Texture, shape: Shape, folder: Path) -> np.ndarray:
 
 
 def aspect_of(shape: Shape) -> float:
-    """Width over height of what a shape's texture is laid on: a sphere's chart is twice as wide as high."""
+    """Width over height of what a shape's texture is laid on: a sphere's and a cylinder's go once round."""
     match shape:
         case Card():
             return shape.width_mm / shape.height_mm
         case Sphere():
             return 2.0
+        case Cylinder():
+            return 2 * math.pi * shape.radius_mm / shape.length_mm
+        case Box():
+            return shape.width_mm / shape.height_mm
         case _:
             return 1.0

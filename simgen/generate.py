@@ -38,13 +38,14 @@ from pcii.store import (
     write_json_safely,
 )
 from simgen import backend, seeds
+from simgen.asset_names import asset
 from simgen.build import Built, build
 from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import full_light_image
 from simgen.exposure import photons_per_radiance
 from simgen.recipe import Recipe
 from simgen.render import render_view
-from simgen.scene import Scene, load_scene
+from simgen.scene import Scene, load_scene, scene_files
 from simgen.sensor import sense, sensitivities
 from simgen.truth import first_hits_at_centre, first_hits_of_view
 
@@ -134,13 +135,11 @@ def verify(path: Path, report: Report = silent) -> int:
 
 def _identity(recipe: Recipe, scene: Scene, folder: Path, curves: np.ndarray | None) -> str:
     """Hash of all that decides the dataset's content, but for the machine."""
-    used = [thing.material.texture for thing in scene.objects]
-    used += [getattr(thing.shape, "file", None) for thing in scene.objects]
-    assets = {name for name in used if isinstance(name, str)}
+    assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
     content = {
         "recipe": recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),
-        "assets": {name: hash_file(folder / name) for name in sorted(assets)},
+        "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
         "sensitivities": None if curves is None else curves.tolist(),
         "format_version": FORMAT_VERSION,
     }

@@ -4,7 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from simgen.schema import Positive, Real, Strict, Vector
+from simgen.asset_names import EnvironmentName
+from simgen.schema import Length, Position, Positive, Real, Strict
 
 Illuminant = Annotated[
     str, Field(description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.")
@@ -15,12 +16,12 @@ class AreaLight(Strict):
     """A flat rectangular lamp that shines from its position towards a target."""
 
     type: Literal["area"] = "area"
-    position_mm: Vector
+    position_mm: Position
     """Where the middle of the lamp stands."""
-    target_mm: Vector
+    target_mm: Position
     """What the lamp faces; behind itself it is dark."""
-    width_mm: Positive
-    height_mm: Positive
+    width_mm: Length
+    height_mm: Length
     luminance_cd_m2: Positive
     illuminant: Illuminant = "D65"
 
@@ -35,7 +36,7 @@ class PointLight(Strict):
     """A lamp without size, which shines evenly in all directions and is seen by no camera."""
 
     type: Literal["point"] = "point"
-    position_mm: Vector
+    position_mm: Position
     intensity_cd: Positive
     """Luminous intensity: lux times square metres."""
     illuminant: Illuminant = "D65"
@@ -57,7 +58,7 @@ class EnvironmentLight(Strict):
     """
 
     type: Literal["environment"] = "environment"
-    file: str
+    file: EnvironmentName
     """An OpenEXR image inside the scene's folder, twice as wide as high, linear sRGB."""
     luminance_cd_m2: Positive
     """Luminance of white, pixels of (1, 1, 1)."""
@@ -73,4 +74,4 @@ class Level(Strict):
 
     illuminance_lux: Positive
     """Direct light, with nothing in the way, on a surface at (0, 0, z_mm) that faces the cameras."""
-    z_mm: Positive
+    z_mm: Length

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from simgen.asset_names import ImageName
 from simgen.schema import Colour, Positive, Real, Share, Strict
 from simgen.textures import Texture
 
@@ -84,7 +85,7 @@ def _file_or_pattern(given: Any) -> str | None:
 
 
 FileOrPattern = Annotated[
-    Annotated[str, Tag("file")] | Annotated[Texture, Tag("pattern")],
+    Annotated[ImageName, Tag("file")] | Annotated[Texture, Tag("pattern")],
     Discriminator(
         _file_or_pattern,
         custom_error_type="texture",

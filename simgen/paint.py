@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from simgen.assets import srgb_to_linear
 from simgen.coverage import half_plane, sine_wave, square_wave
+from simgen.srgb import srgb_to_linear
 from simgen.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
 
 BAND_ROWS = 256

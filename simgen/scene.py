@@ -3,25 +3,42 @@
 World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking along +Z.
 """
 
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, field_validator
 
 from pcii.errors import InputError
-from simgen.assets import asset
+from simgen.asset_names import AssetName, asset, named_files
 from simgen.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.locations import find, scene_roots
 from simgen.materials import Material, Reflectance
-from simgen.schema import NonNegative, Positive, Strict, Vector, read_toml, suggestion, validate
-from simgen.shapes import Mesh, Shape
+from simgen.schema import (
+    LARGEST_MM,
+    LONGEST_PART,
+    Length,
+    Position,
+    Real,
+    Strict,
+    Vector,
+    read_toml,
+    shorten,
+    suggestion,
+    validate,
+)
+from simgen.shapes import Shape
+
+MOST_OBJECTS = 1000
+MOST_LIGHTS = 100
 
 
 class SceneObject(Strict):
     """One named thing that truth and scores know."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
-    position_mm: Vector
+    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=64)]
+    position_mm: Position
     """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
     rotation_deg: Vector = (0.0, 0.0, 0.0)
     """Turns about the X, Y and Z axes, applied in this order, in degrees."""
@@ -32,19 +49,20 @@ class SceneObject(Strict):
 class Backdrop(Strict):
     """A flat wall parallel to the camera plane, endless for the cameras."""
 
-    z_mm: Positive
+    z_mm: Length
     reflectance: Reflectance = (0.0, 0.0, 0.0)
     """sRGB, the name of a ColorChecker patch, or a spectrum; as of a material."""
-    half_width_mm: NonNegative = 5000.0
+    half_width_mm: Annotated[Real, Field(ge=0, le=LARGEST_MM)] = 5000.0
 
 
 class Scene(Strict):
     """A world to be looked at: objects, lights, and what stands behind."""
 
-    title: str
-    description: str = ""
-    objects: tuple[SceneObject, ...] = ()
-    lights: Annotated[tuple[Light, ...], Field(min_length=1)]
+    title: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", max_length=200)]
+    """One line."""
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS)] = ()
+    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS)]
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
@@ -59,8 +77,8 @@ class Scene(Strict):
     @field_validator("objects")
     @classmethod
     def _names_differ(cls, objects: tuple[SceneObject, ...]) -> tuple[SceneObject, ...]:
-        names = [thing.name for thing in objects]
-        twice = sorted({name for name in names if names.count(name) > 1})
+        times = Counter(thing.name for thing in objects)
+        twice = sorted(name for name, count in times.items() if count > 1)
         if twice:
             raise ValueError(f"two objects are named '{twice[0]}'; give each its own name")
         return objects
@@ -74,26 +92,34 @@ def load_scene(name_or_path: str, near: Path | None = None) -> tuple[Scene, Path
     """
     file = find_scene(name_or_path, near)
     scene = validate(Scene, read_toml(file), str(file))
-    for thing in scene.objects:
-        if isinstance(thing.shape, Mesh):
-            asset(file.parent, thing.shape.file, f"{file}: object '{thing.name}', shape.file")
-        if isinstance(thing.material.texture, str):
-            where = f"{file}: object '{thing.name}', material.texture"
-            asset(file.parent, thing.material.texture, where)
+    for where, name in scene_files(scene):
+        asset(file.parent, name, f"{file}: {where}")
     return scene, file.parent
+
+
+def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
+    """Every file that a scene names, and the field where: `object 'ball', material.texture`."""
+    for thing in scene.objects:
+        for where, name in named_files(thing):
+            yield f"object '{thing.name}', {where}", name
+    yield from named_files(scene.model_copy(update={"objects": ()}))
 
 
 def find_scene(name_or_path: str, near: Path | None = None) -> Path:
     """The scene.toml that a name or path means; `InputError` with a suggestion if there is none."""
     given = Path(name_or_path)
     beside = [] if near is None else [near / given, near / given / "scene.toml"]
-    for candidate in (*beside, given, given / "scene.toml"):
-        if candidate.is_file():
-            return candidate
-    shipped = find(scene_roots, f"{name_or_path}/scene.toml")
+    try:
+        for candidate in (*beside, given, given / "scene.toml"):
+            if candidate.is_file():
+                return candidate
+        shipped = find(scene_roots, f"{name_or_path}/scene.toml")
+    except OSError:  # a name too long for a file
+        shipped = None
     if shipped is not None:
         return shipped
-    raise InputError(f"scene: there is no scene {name_or_path!r}{suggestion(name_or_path, scene_names())}")
+    told = shorten(repr(name_or_path), LONGEST_PART)
+    raise InputError(f"scene: there is no scene {told}{suggestion(name_or_path, scene_names())}")
 
 
 def scene_names() -> list[str]:

@@ -1,6 +1,7 @@
 """What scene and recipe files share: strict models, TOML, and errors that point at the field."""
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -9,6 +10,16 @@ from typing import Annotated, Any, TypeVar, get_args
 from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationError
 
 from pcii.errors import InputError
+
+LARGEST_TOML_BYTES = 1 << 20
+LONGEST_PART = 80
+LONGEST_SENTENCE = 400
+MOST_KEY_PARTS = 32
+# tomllib's time grows with the square of the parts of one key, so such keys are looked for first.
+_LONG_KEY = re.compile(
+    rb"(?:(?<![A-Za-z0-9_-])(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}"
+    % MOST_KEY_PARTS
+)
 
 
 class Strict(BaseModel):
@@ -26,20 +37,31 @@ NonNegative = Annotated[Real, Field(ge=0)]
 Share = Annotated[Real, Field(ge=0, le=1)]
 Count = Annotated[Whole, Field(ge=1)]
 Vector = tuple[Real, Real, Real]
+LARGEST_MM = 1e6
+Length = Annotated[Real, Field(gt=0, le=LARGEST_MM)]
+Coordinate = Annotated[Real, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
+Position = tuple[Coordinate, Coordinate, Coordinate]
 Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as a dict; `InputError` if it is missing or not TOML."""
+    """A TOML file as a dict; `InputError` if it is missing, too large or not TOML."""
+    if path.is_dir():
+        raise InputError(f"{path}: this is a folder, not a TOML file")
+    if not path.is_file():  # nor a pipe, which would block
+        raise InputError(f"{path}: there is no such file")
+    with path.open("rb") as file:
+        content = file.read(LARGEST_TOML_BYTES + 1)
+    if len(content) > LARGEST_TOML_BYTES:
+        raise InputError(f"{path}: a TOML file here may have {LARGEST_TOML_BYTES} bytes, and this has more")
+    if _LONG_KEY.search(content):
+        raise InputError(f"{path}: not valid TOML: a key of more than {MOST_KEY_PARTS} parts")
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder, not a TOML file") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as fault:
-        raise InputError(f"{path}: not valid TOML: {fault}") from None
+        return tomllib.loads(content.decode())
+    except RecursionError:
+        raise InputError(f"{path}: its arrays or tables are nested too deeply") from None
+    except ValueError as fault:  # of tomllib, of UTF-8, of a number of thousands of digits
+        raise InputError(f"{path}: not valid TOML: {shorten(str(fault))}") from None
 
 
 def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
@@ -47,7 +69,27 @@ def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Mode
     try:
         return model.model_validate(values)
     except ValidationError as fault:
-        raise InputError(f"{source}: {_sentence(model, fault)}") from None
+        raise InputError(f"{source}: {shorten(_sentence(model, fault))}") from None
+    except RecursionError:
+        raise InputError(f"{source}: its arrays or tables are nested too deeply") from None
+
+
+def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
+    """One line fit for a terminal: without control characters, and with its middle left out if long."""
+    if len(text) > longest:
+        text = f"{text[: longest * 3 // 4]}...{text[-longest // 4 :]}"
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _repr(value: Any) -> str:
+    try:
+        # A large array is not written out first.
+        return shorten(
+            repr(value[:20] if isinstance(value, str | list | tuple) and len(value) > 100 else value),
+            LONGEST_PART,
+        )
+    except (RecursionError, ValueError):  # nested deeply; an integer of thousands of digits
+        return f"a {type(value).__name__} that is too long to show"
 
 
 def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
@@ -71,7 +113,7 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
         text += str(first.get("ctx", {}).get("error"))
     else:
         message = first["msg"][0].lower() + first["msg"][1:]
-        text = f"'{where}': {message}, got {first['input']!r}"
+        text = f"'{where}': {message}, got {_repr(first['input'])}"
     more = len(errors) - 1
     return text + (f" (and {more} more)" if more else "")
 
@@ -90,6 +132,8 @@ def _dotted(location: Iterable[int | str]) -> str:
 def suggestion(word: str, known: Iterable[str]) -> str:
     """'; did you mean ...?' for the nearest known word, else the list of what is known."""
     words = sorted(known)
+    if len(word) > LONGEST_PART:
+        return ""
     near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
     if near:
         return f"; did you mean '{near[0]}'?"

@@ -12,7 +12,8 @@ import numpy as np
 from pcii.bayer import channel_count, colour_index, mosaic
 from pcii.errors import InputError
 from simgen.recipe import Photons, Recipe
-from simgen.spectra import LUMINANCE, sensitivity
+from simgen.spectra import sensitivity
+from simgen.srgb import LUMINANCE
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:

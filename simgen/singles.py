@@ -14,7 +14,7 @@ from simgen.backend import shape_numbers
 from simgen.cameras import camera_x_mm, camera_y_mm
 from simgen.candidates import Found, Setup, chances
 from simgen.majorant import Majorant, Samples
-from simgen.spectra import LUMINANCE
+from simgen.srgb import LUMINANCE
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""

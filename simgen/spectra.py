@@ -14,11 +14,9 @@ import numpy as np
 
 from pcii.errors import InputError
 from simgen.schema import suggestion
+from simgen.srgb import FROM_XYZ, LUMINANCE
 
 WAVELENGTH_NM = np.arange(380.0, 781.0)
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-"""Luminance of the primaries of sRGB (IEC 61966-2-1)."""
-_XYZ_TO_SRGB = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 PEAK_NM = 555.0
 """Where a lumen is 1/683 W."""
 PATCHES = "ColorChecker N Ohta"
@@ -50,7 +48,7 @@ def tint(name: str) -> np.ndarray:
     """Linear sRGB (3,) of a CIE illuminant at luminance 1; channels outside the gamut are cut to 0."""
     if name == "D65":  # the white of sRGB; also spares the second that colour takes to load
         return np.ones(3)
-    rgb = np.clip(_XYZ_TO_SRGB @ integral(observer() * illuminant(name)), 0, None)
+    rgb = np.clip(FROM_XYZ @ integral(observer() * illuminant(name)), 0, None)
     return rgb / (LUMINANCE @ rgb)
 
 
@@ -85,7 +83,7 @@ def linear_srgb(reflectance: np.ndarray) -> np.ndarray:
     """Linear sRGB (3,) of a reflectance (N,) in daylight D65; what sRGB cannot show is cut to [0, 1]."""
     white = illuminant("D65")
     xyz = integral(observer() * white * reflectance) / integral(observer()[1] * white)
-    return np.clip(_XYZ_TO_SRGB @ xyz, 0, 1)
+    return np.clip(FROM_XYZ @ xyz, 0, 1)
 
 
 def sensitivity(camera: str, near: Path) -> np.ndarray:

@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from simgen.assets import srgb_to_linear
 from simgen.schema import Colour, NonNegative, Real, Share, Strict, Whole
+from simgen.srgb import srgb_to_linear
 
 CLIPPED_SHARE = 0.01
 """No more than this share of a noise's values may lie outside what a surface can reflect."""

@@ -11,7 +11,8 @@ import numpy as np
 from simgen.backend import load_drjit
 from simgen.build import Built
 from simgen.filters import CELLS, HEROES, Filters
-from simgen.spectra import LUMINANCE, WAVELENGTH_NM
+from simgen.spectra import WAVELENGTH_NM
+from simgen.srgb import LUMINANCE
 
 
 class Light(Protocol):

@@ -41,11 +41,13 @@ PCII_LEVELS = [
     {"cli"},
 ]
 SIMGEN_LEVELS = [
-    {"locations", "seeds"},
-    {"backend", "schema", "assets"},
+    {"locations", "seeds", "srgb"},
+    {"backend", "schema", "asset_names", "triangles"},
     {"textures", "coverage"},
-    {"shapes", "materials", "lights", "spectra", "paint"},
-    {"recipe", "scene", "filters"},
+    {"shapes", "materials", "lights", "spectra", "solids", "read_ply", "read_obj", "read_image"},
+    {"paint"},
+    {"recipe", "scene", "filters", "asset_worker"},
+    {"assets"},
     {"cameras", "build_shape", "build_colour"},
     {"build_surface", "build_light"},
     {"build", "detector", "exposure", "sensor"},

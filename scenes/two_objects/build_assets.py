@@ -148,6 +148,7 @@ def tessellate(part: Part) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     a, b = (g.ravel() for g in np.meshgrid(*[np.linspace(-1, 1, n + 1)] * 2))
     d = octahedral(a, b)
     st = (np.stack([a, b], -1) * (size / 2 - CHART_PAD) + size / 2 + [left, top]) / ATLAS
+    st[:, 1] = 1 - st[:, 1]  # t runs up the picture
     vertices = np.hstack([part.surface(d), part.normals(d), st]).astype(np.float32)
 
     i, j = (g.ravel() for g in np.meshgrid(np.arange(n), np.arange(n)))
@@ -283,8 +284,9 @@ def bird_texture(parts: list[Part], noise: SolidNoise) -> NDArray[np.uint8]:
 def ball_texture(noise: SolidNoise) -> NDArray[np.uint8]:
     """Paint the tricoloured ball for a sphere: u is the azimuth about +Z, v the polar angle.
 
-    The three gores meet at both ends of an axis close to Z, so that the ball shows all of them
-    from the front (-Z) without any rotation and from the back as well.
+    The scene turns the sphere such that the pole of the texture is in front. The three gores meet at
+    both ends of an axis close to Z, so that the ball shows all of them from the front (-Z) and from
+    the back as well.
     """
     width, height = BALL_SIZE
     phi = (np.arange(width) + 0.5) * 2 * np.pi / width

@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from simgen.assets import srgb_to_linear
+from simgen.asset_names import MeshName
 from simgen.build_surface import aspect_of
 from simgen.coverage import half_plane, square_wave
 from simgen.paint import paint
 from simgen.shapes import Card, Mesh, Sphere
+from simgen.srgb import srgb_to_linear
 from simgen.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
 
 RED, GREY = (0.9, 0.1, 0.2), (0.6, 0.6, 0.6)
@@ -239,7 +240,7 @@ def test_long_text_stays_inside() -> None:
 def test_longer_sides_have_the_pixels() -> None:
     assert aspect_of(Card(width_mm=30, height_mm=60)) == 0.5
     assert aspect_of(Sphere(radius_mm=3)) == 2
-    assert aspect_of(Mesh(file="x.ply")) == 1
+    assert aspect_of(Mesh(file=MeshName("x.ply"))) == 1
     assert paint(Star(pixels=100), 0.5).shape == (100, 50, 3)
     assert paint(Star(pixels=100), 2.0).shape == (50, 100, 3)
     assert paint(Star(pixels=16), 1e-4).shape == (16, 1, 3)
