@@ -66,16 +66,17 @@ def named_files(value: Any, where: str = "") -> Iterator[tuple[str, AssetName]]:
 def asset(folder: Path, name: str, where: str) -> Path:
     """The path of a scene's file; `InputError`, beginning with `where`, unless it is a plain file inside
     the scene's folder, links followed, of a size that can be read."""
-    root, path = folder.resolve(), folder
+    root = folder.resolve()
     try:
         path = (root / name).resolve()
-        if Path(name).is_absolute() or not path.is_relative_to(root):
-            raise InputError(f"{where}: {name!r} lies outside the scene's folder")
-        found = path.is_file()  # neither a folder, nor a pipe or device that would block or never end
-        size = path.stat().st_size if found else 0
+        inside = path.is_relative_to(root) and not Path(name).is_absolute()
+        plain = inside and path.is_file()  # not a folder, nor a pipe or device that would never end
+        size = path.stat().st_size if plain else 0
     except (OSError, RuntimeError, ValueError):  # links in a circle, a name too long, a NUL byte
-        found, size = False, 0
-    if not found:
+        path, inside, plain, size = root, True, False, 0
+    if not inside:
+        raise InputError(f"{where}: {name!r} lies outside the scene's folder")
+    if not plain:
         raise InputError(f"{where}: there is no file {name!r} in {folder}")
     if size > LARGEST_FILE_BYTES:
         raise InputError(

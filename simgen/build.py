@@ -84,8 +84,11 @@ def _object_id(shape_id: str) -> int:
 
 
 def _object(mi: Any, thing: SceneObject, assets: Assets) -> Any:
-    surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets))
-    return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
+    try:
+        surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets))
+        return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
+    except InputError as fault:
+        raise InputError(f"object '{thing.name}', {fault}") from None
 
 
 def _last_line(fault: BaseException) -> str:

@@ -8,7 +8,8 @@ from simgen.asset_names import EnvironmentName
 from simgen.schema import Length, Position, Positive, Real, Strict
 
 Illuminant = Annotated[
-    str, Field(description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.")
+    str,
+    Field(max_length=40, description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2."),
 ]
 
 

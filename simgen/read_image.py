@@ -49,8 +49,8 @@ def read_environment(path: Path) -> np.ndarray:
     with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
         if len(file.parts) != 1:
             raise ValueError(f"has {len(file.parts)} parts; give a picture of one")
-        header = file.header()
-    if header["type"] not in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
+        header = dict(file.header())
+    if header.get("type", OpenEXR.scanlineimage) not in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
         raise ValueError("is a deep picture; give a flat one")
     (left, top), (right, bottom) = (corner.astype(np.int64) for corner in header["dataWindow"])
     width, height = int(right - left + 1), int(bottom - top + 1)

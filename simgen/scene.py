@@ -61,8 +61,8 @@ class Scene(Strict):
     title: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", max_length=200)]
     """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS)] = ()
-    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS)]
+    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS, fail_fast=True)] = ()
+    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS, fail_fast=True)]
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None

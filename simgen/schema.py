@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationError
 
 from pcii.errors import InputError
 
-LARGEST_TOML_BYTES = 1 << 20
+LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80
 LONGEST_SENTENCE = 400
 MOST_KEY_PARTS = 32

@@ -1,0 +1,131 @@
+"""Sound files of strangers: the same mesh in every form, pictures at their full depth."""
+
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hostile_files import chunk, ply, scene_toml
+from PIL import Image
+
+from simgen.assets import Assets, read_assets, srgb_to_linear
+from simgen.read_obj import read_obj
+from simgen.read_ply import read_ply
+from simgen.scene import load_scene
+from simgen.triangles import Triangles
+
+# A roof: a square and a triangle that share two corners.
+POINTS = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]], np.float32)
+NORMALS = np.array([[0, 0, -1], [0, 0, -1], [0, 1, 0], [0, 1, 0], [0.6, 0, 0.8]], np.float32)
+TEXCOORDS = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.25]], np.float32)
+POLYGONS = ((0, 1, 2, 3), (2, 3, 4))
+FACES = [[0, 1, 2], [0, 2, 3], [2, 3, 4]]
+
+
+def ply_of(form: str, texcoords: tuple[str, str], list_type: str = "uchar", double: bool = False) -> bytes:
+    """The roof in PLY, after an element that is nobody's business."""
+    names = ("x", "y", "z", "nx", "ny", "nz", *texcoords)
+    real = "double" if double else "float"
+    header = f"ply\nformat {form} 1.0\ncomment a roof\nelement odd 2\nproperty list uchar short bits\n"
+    header += "element vertex 5\n" + "".join(f"property {real} {name}\n" for name in names)
+    header += (
+        f"element face 2\nproperty uchar flags\nproperty list {list_type} uint vertex_index\nend_header\n"
+    )
+    rows = np.hstack([POINTS, NORMALS, TEXCOORDS])
+    if form == "ascii":
+        text = "1 7\n0\n" + "".join(" ".join(map(str, row)) + "\n" for row in rows.tolist())
+        text += "".join(f"9 {len(face)} {' '.join(map(str, face))}\n" for face in POLYGONS)
+        return (header + text).encode()
+    order = "<" if "little" in form else ">"
+    body = struct.pack(f"{order}BhB", 1, 7, 0) + rows.astype(f"{order}{'f8' if double else 'f4'}").tobytes()
+    for face in POLYGONS:
+        code = {"uchar": "B", "int": "i"}[list_type]
+        body += struct.pack(f"{order}B{code}{len(face)}I", 9, len(face), *face)
+    return header.encode() + body
+
+
+def obj_of(*, from_the_end: bool = False) -> bytes:
+    """The roof in OBJ, with materials that nobody looks for."""
+    lines = ["mtllib /etc/passwd", "o roof", "usemtl ../../x", "s 1"]
+    for word, rows in (("v", POINTS), ("vt", TEXCOORDS), ("vn", NORMALS)):
+        lines += [f"{word} {' '.join(map(str, row))}" for row in rows.tolist()]
+    for face in POLYGONS:
+        numbers = [number - 5 if from_the_end else number + 1 for number in face]
+        lines.append("f " + " ".join(f"{n}/{n}/{n}" for n in numbers))
+    return "\r\n".join(lines).encode()
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [
+        read_ply(ply_of("ascii", ("s", "t"))),
+        read_ply(ply_of("ascii", ("u", "v"), double=True)),
+        read_ply(ply_of("binary_little_endian", ("s", "t"), "int")),
+        read_ply(ply_of("binary_little_endian", ("texture_u", "texture_v"))),
+        read_ply(ply_of("binary_big_endian", ("u", "v"))),
+        read_ply(ply_of("binary_big_endian", ("s", "t"), "int", double=True)),
+        read_obj(obj_of()),
+        read_obj(obj_of(from_the_end=True)),
+    ],
+)
+def test_every_form_gives_the_same_triangles(mesh: Triangles) -> None:
+    np.testing.assert_array_equal(mesh.positions, POINTS)
+    np.testing.assert_array_equal(mesh.faces, FACES)
+    assert mesh.normals is not None
+    np.testing.assert_allclose(mesh.normals, NORMALS, atol=1e-7)  # of length 1 once more
+    np.testing.assert_array_equal(mesh.texcoords, TEXCOORDS)
+
+
+def test_a_corner_of_an_obj_is_split_where_its_texture_is() -> None:
+    lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "f 1/1 2/2 3/3", "f 1/3 2/2 3/3"]
+    mesh = read_obj("\n".join(lines).encode())
+    assert len(mesh.positions) == 4
+    assert mesh.texcoords is not None
+    np.testing.assert_array_equal(mesh.positions[mesh.faces[0]], mesh.positions[mesh.faces[1]])
+    np.testing.assert_array_equal(mesh.texcoords[mesh.faces[:, 0]], [[0, 0], [0, 1]])
+
+
+def test_vertices_without_faces_do_not_count() -> None:
+    mesh = read_ply(ply("0 0 0\n1 0 0\nnan nan nan\n0 1 0\n", "3 0 1 3\n", vertex_count=4))
+    np.testing.assert_array_equal(mesh.positions, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    np.testing.assert_array_equal(mesh.faces, [[0, 1, 2]])
+    assert mesh.normals is None
+    assert mesh.texcoords is None
+
+
+def worn(folder: Path, name: str) -> Assets:
+    (folder / "scene.toml").write_text(scene_toml(material=f'texture = "{name}"'))
+    return read_assets(*load_scene(str(folder)))
+
+
+@pytest.mark.parametrize(("kind", "depth"), [(0, 1), (2, 3), (6, 4)])
+def test_16_bits_are_kept(kind: int, depth: int, tmp_path: Path) -> None:
+    pixels = np.random.default_rng(3).integers(0, 1 << 16, (5, 7, depth))
+    if depth == 4:
+        pixels[..., 3] = 0xFFFF
+    rows = np.concatenate([np.zeros((5, 1), np.uint8), pixels.astype(">u2").view(np.uint8).reshape(5, -1)], 1)
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 7, 5, 16, kind, 0, 0, 0))
+    data = chunk(b"IDAT", zlib.compress(rows.tobytes())) + chunk(b"IEND", b"")
+    (tmp_path / "deep.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header + data)
+    expected = srgb_to_linear(np.broadcast_to(pixels[..., :3], (5, 7, 3)) / 65535)
+    # float32; with 8 bits the differences would be 1e-3.
+    np.testing.assert_allclose(worn(tmp_path, "deep.png").image("deep.png"), expected, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA"])
+@pytest.mark.parametrize("name", ["a.png", "a.tif"])
+def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
+    image = Image.new("RGB", (3, 2), "white")
+    image.putpixel((2, 1), (0, 0, 0))
+    image.convert(mode).save(tmp_path / name)
+    pixels = worn(tmp_path, name).image(name)
+    assert pixels.dtype == np.float32
+    np.testing.assert_array_equal(pixels[..., 1], [[1, 1, 1], [1, 1, 0]])
+
+
+def test_a_photograph_stands_as_its_camera_stood(tmp_path: Path) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6  # to be turned clockwise
+    Image.new("RGB", (16, 8)).save(tmp_path / "a.jpg", exif=exif)
+    assert worn(tmp_path, "a.jpg").image("a.jpg").shape == (16, 8, 3)
