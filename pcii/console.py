@@ -21,12 +21,15 @@ LOG_EVERY_S = 10.0
 
 
 def run(app: "App", arguments: Sequence[str] | None = None) -> int:
-    """Run a command line and return its exit code; the only place where errors become messages."""
+    """Run a command line and return its exit code; the only place where errors become messages.
+
+    A command that returns a number leaves with that exit code.
+    """
     from cyclopts import CycloptsError
 
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as fault:
         return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
     except InputError as fault:
@@ -37,7 +40,7 @@ def run(app: "App", arguments: Sequence[str] | None = None) -> int:
         return _fail(1, f"not enough memory: {fault}")
     except Exception as fault:
         return _fail(1, f"{type(fault).__name__}: {' '.join(str(fault).split())}")
-    return 0
+    return code if isinstance(code, int) else 0
 
 
 def _fail(code: int, sentence: str) -> int:

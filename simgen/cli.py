@@ -71,28 +71,73 @@ def schema(what: Literal["scene", "recipe"]) -> None:
 
 
 @app.command
+def check(
+    target: str,
+    *,
+    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+    json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+) -> int:
+    """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
+
+    Disparities, blur between objects, what is hidden or cut, colours that shifts leave out, photons per
+    object and voxel, size, memory and time. Leaves with exit code 0 if nothing is bad, 1 if something
+    is, 2 for a file that is not valid.
+
+    Examples:
+
+        simgen check two_objects
+
+        simgen check paper --set grid.pitch_mm=[2.5,2.5]
+
+    Parameters
+    ----------
+    target
+        A recipe, or a scene, which is looked at with the paper's camera grid; by name or path.
+    set
+        Override one value of the recipe, such as photons.budget=300; may be repeated.
+    json_
+        Print the findings as JSON.
+    """
+    from dataclasses import asdict
+
+    from simgen.check import check as look
+
+    line, findings = look(target, set)
+    bad = sum(finding.verdict == "bad" for finding in findings)
+    if json_:
+        say(json.dumps([asdict(finding) for finding in findings], indent=2))
+    else:
+        warnings = sum(finding.verdict == "warn" for finding in findings)
+        say(line)
+        for finding in findings:
+            say(finding.line())
+        say(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
+    return 1 if bad else 0
+
+
+@app.command
 def preview(
-    scene: str,
+    target: str,
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     samples_per_pixel: int = 32,
 ) -> None:
-    """Draw a scene from the virtual centre, with its depth and its objects, in one PNG.
+    """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
 
     Example:  simgen preview two_objects -o look.png
 
     Parameters
     ----------
-    scene
-        Name of a scene that ships, or path of a scene folder.
+    target
+        A recipe, or a scene, which is looked at with the paper's field of view; by name or path.
     out
-        The picture to write.
+        The picture to write, .png or .jpg, in a folder that exists.
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
     from simgen.preview import write_preview
 
-    write_preview(scene, out, samples_per_pixel)
+    write_preview(target, out, samples_per_pixel)
     say(f"{out}")
 
 
@@ -132,6 +177,25 @@ def generate(
     photons = manifest["photons"]
     caught = f", {photons['total']} photons" if photons else ""
     say(f"{out}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s")
+
+
+@app.command
+def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))]) -> None:
+    """Draw a contact sheet of a finished dataset: truth, photons of all views, full light, facts.
+
+    Example:  simgen sheet out/paper -o paper.png
+
+    Parameters
+    ----------
+    dataset
+        Folder of the dataset.
+    out
+        The picture to write, .png or .jpg, in a folder that exists.
+    """
+    from simgen.sheet import write_sheet
+
+    write_sheet(dataset, out)
+    say(f"{out}")
 
 
 @app.command

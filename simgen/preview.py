@@ -1,5 +1,6 @@
 """A quick look at a scene: the picture, depth and objects that the virtual centre camera sees."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,44 +8,47 @@ import numpy as np
 from pcii.errors import InputError
 from simgen import backend
 from simgen.build import build
-from simgen.recipe import Grid
+from simgen.figures import (
+    check_picture_path,
+    draw_depth,
+    draw_objects,
+    hide_frame,
+    new_figure,
+    save_figure,
+)
+from simgen.probe_scene import coarser
 from simgen.render import render_view
-from simgen.scene import load_scene
+from simgen.targets import load_target
 from simgen.truth import first_hits_at_centre
 
+SIDE_PX = 512
+PANEL_IN = 4.8
+"""Height of a picture's panel."""
 
-def write_preview(scene_name: str, out: Path, samples_per_pixel: int) -> None:
-    """Write the preview PNG. Raises `InputError` for a bad scene or a name that is not a PNG's."""
-    import matplotlib as mpl
 
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
+def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
+    """Write the preview of a scene or of a recipe's, a PNG or JPEG.
 
+    Raises `InputError` for a bad scene or recipe, and for a picture that cannot be written there.
+    """
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
-    if out.suffix.lower() != ".png":
-        raise InputError(f"{out}: name a .png file")
-    scene, folder = load_scene(scene_name, Path.cwd())
-    # The paper's field of view with half its pixels, and one camera: the virtual centre.
-    grid = Grid(rows=1, cols=1, pixel_mm=0.0704, height=512, width=512).camera_grid()
-    built = build(backend.load(), scene, folder, max_depth=3)
+    check_picture_path(out)
+    recipe, scene, folder = load_target(name_or_path)
+    # The recipe's field of view, and one camera: the virtual centre.
+    grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
+    built = build(backend.load(), scene, folder, recipe.render.max_depth)
     picture = render_view(built, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
     hits = first_hits_at_centre(built, grid)
     things = hits.object_id > 0
-    white = np.quantile(picture[things] if things.any() else picture, 0.995)
-    figure, axes = plt.subplots(1, 3, figsize=(15, 5.2), layout="constrained")
+    white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
+    aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
+    figure = new_figure(PANEL_IN * (aspect * 3.9 + 0.5), PANEL_IN + 0.7)
+    axes = figure.subplots(1, 3, width_ratios=(1, 1.15, 1.8))
     axes[0].imshow(np.clip(picture / max(white, 1e-12), 0, 1) ** (1 / 2.2))
-    axes[0].set_title(scene.title)
-    depth = axes[1].imshow(np.where(things, hits.z_mm, np.nan), cmap="viridis")
-    axes[1].set_title("planar depth of the objects")
-    figure.colorbar(depth, ax=axes[1], label="z (mm)", shrink=0.8)
-    axes[2].imshow(np.where(things, hits.object_id, np.nan), cmap="tab10", vmin=0.5, vmax=10.5)
-    axes[2].set_title("objects")
-    for number, name in built.names.items():
-        i, j = np.nonzero(hits.object_id == number)
-        if i.size:
-            axes[2].annotate(name, (j.mean(), i.mean()), color="white", ha="center", va="center")
-    for axis in axes:
-        axis.set_axis_off()
-    figure.savefig(out, dpi=100)
-    plt.close(figure)
+    axes[0].set_title("virtual centre")
+    hide_frame(axes[0])
+    draw_depth(figure, axes[1], hits.z_mm, things)
+    draw_objects(axes[2], hits.object_id, built.names)
+    figure.suptitle(recipe.title or scene.title)
+    save_figure(figure, out)

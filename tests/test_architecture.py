@@ -48,7 +48,7 @@ SIMGEN_LEVELS = [
     {"paint"},
     {"recipe", "scene", "filters", "asset_worker"},
     {"assets"},
-    {"cameras", "build_shape", "build_colour"},
+    {"cameras", "shifts", "figures", "targets", "thumbnails", "build_shape", "build_colour"},
     {"build_surface", "build_light"},
     {"build", "detector", "exposure", "sensor"},
     {"wavelengths"},
@@ -59,7 +59,9 @@ SIMGEN_LEVELS = [
     {"pilot"},
     {"photons", "noise"},
     {"counts"},
-    {"generate", "preview"},
+    {"facts"},
+    {"generate", "probe_scene", "check_sight", "check_depth", "check_photons", "check_cost"},
+    {"check", "preview", "sheet"},
     {"cli"},
 ]
 

@@ -1,0 +1,91 @@
+"""Findings on what the cameras see: objects hidden, cut or never seen, cameras inside things, lamps."""
+
+from simgen.cameras import NEAR_CLIP_MM
+from simgen.facts import Facts, Finding, ObjectFacts, listed
+
+MOST_HIDDEN = 0.5
+
+
+def sight_findings(facts: Facts) -> list[Finding]:
+    """All findings of this file."""
+    found = [finding for thing in facts.objects for finding in _object_findings(facts, thing)]
+    if not facts.objects:
+        found = [Finding("warn", "objects", "there are none", "add [[objects]] to the scene")]
+    elif all(finding.verdict == "ok" for finding in found):
+        names = listed([thing.name for thing in facts.objects])
+        found = [Finding("ok", "objects", f"{names}: seen whole by the centre and the corner cameras")]
+    return found + _wall_findings(facts) + _lamp_findings(facts)
+
+
+def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
+    name, found = thing.name, []
+    if thing.encloses_camera:
+        return [Finding("bad", "objects", f"a camera stands inside {name}", f"move {name} away from Z = 0")]
+    if not thing.z_mm.size and not thing.corners_seen:
+        return [Finding("bad", "objects", f"no camera sees {name}", _why_unseen(facts, thing))]
+    if not thing.z_mm.size:
+        text = (
+            f"{thing.corners_seen} of {facts.corners} corner cameras see {name}, the virtual centre does not"
+        )
+        found.append(Finding("warn", "objects", text, "truth and scores are the centre's: move it into view"))
+    elif thing.corners_seen < facts.corners:
+        text = f"{facts.corners - thing.corners_seen} of {facts.corners} corner cameras do not see {name}"
+        found.append(Finding("warn", "objects", text, "move it to the middle or take a smaller pitch"))
+    if thing.body_z_mm[0] <= 0:
+        text = f"{name} reaches to z = {thing.body_z_mm[0]:.0f} mm, behind the cameras"
+        found.append(Finding("warn", "objects", text, "what lies there is not seen; move it away"))
+    found += _hidden(thing) + _cut(facts, thing)
+    return found or [Finding("ok", "objects", f"{name} is seen whole")]
+
+
+def _hidden(thing: ObjectFacts) -> list[Finding]:
+    if thing.hidden_share == 0 or not thing.z_mm.size:
+        return []
+    text = f"others hide {thing.hidden_share:.0%} of {thing.name} from the virtual centre"
+    much = thing.hidden_share > MOST_HIDDEN
+    return [Finding("warn" if much else "ok", "objects", text, "move one of them aside" if much else "")]
+
+
+def _cut(facts: Facts, thing: ObjectFacts) -> list[Finding]:
+    if not thing.corners_cut:
+        return []
+    if thing.centre_cut:
+        return [Finding("note", "objects", f"{thing.name} runs beyond the film, of the virtual centre too")]
+    text = f"the film's border cuts {thing.name} in {thing.corners_cut} of {facts.corners} corner cameras"
+    return [
+        Finding("warn", "objects", text, "move it to the middle, or take a smaller pitch or a wider film")
+    ]
+
+
+def _why_unseen(facts: Facts, thing: ObjectFacts) -> str:
+    near, far = thing.body_z_mm
+    if far <= 0:
+        return f"it is behind the cameras (z up to {far:.0f} mm): Z runs forward"
+    if facts.backdrop_mm is not None and near >= facts.backdrop_mm:
+        return f"it is behind the backdrop at {facts.backdrop_mm:g} mm"
+    if thing.hidden_share > 0:
+        return "other objects hide it"
+    rows, cols = facts.probe_px
+    return f"it is off the film, or smaller than the probe's {rows} x {cols} pixels show"
+
+
+def _wall_findings(facts: Facts) -> list[Finding]:
+    wall = facts.backdrop_mm
+    if wall is None or wall > NEAR_CLIP_MM:
+        return []
+    text = f"the backdrop stands at {wall:g} mm, in the plane of the cameras"
+    return [Finding("bad", "backdrop", text, "give it a z_mm behind the objects")]
+
+
+def _lamp_findings(facts: Facts) -> list[Finding]:
+    found = []
+    for number in facts.lamps_away:
+        text = f"lamp {number} shines away from every object"
+        found.append(Finding("warn", "lights", text, f"turn lights[{number - 1}].target_mm to the objects"))
+    if facts.luminance <= 0:
+        remedy = "point a lamp at the objects, or add a light of type 'uniform'"
+        found.append(Finding("bad", "lights", "nothing that the cameras see is lit", remedy))
+    elif not found:
+        text = f"the picture's mean radiance is {facts.luminance:.3g} cd/m^2"
+        found.append(Finding("ok", "lights", text))
+    return found

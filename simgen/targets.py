@@ -1,0 +1,52 @@
+"""What `check` and `preview` look at: a scene or a recipe, by name or path."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pcii.errors import InputError
+from simgen.locations import recipe_roots
+from simgen.recipe import Recipe, load_recipe
+from simgen.scene import Scene, find_scene, load_scene, scene_names
+from simgen.schema import read_toml, suggestion
+
+
+def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Scene, Path]:
+    """A recipe, its scene and the scene's folder, from the name or path of either.
+
+    A scene is looked at as by a recipe that says nothing else: with the paper's camera grid. A name of
+    both a scene and a recipe means the scene; with .toml at its end, the recipe. Raises `InputError`
+    for what is missing or not valid.
+    """
+    if _is_scene(name_or_path):
+        if overrides:
+            raise InputError(
+                f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe"
+            )
+        recipe, near = Recipe(scene=name_or_path), None
+    else:
+        _check_name(name_or_path)
+        recipe, near = load_recipe(name_or_path, overrides)
+    scene, folder = load_scene(recipe.scene, near)
+    return recipe, scene, folder
+
+
+def _is_scene(name_or_path: str) -> bool:
+    path = Path(name_or_path)
+    if path.is_file():
+        values = read_toml(path)
+        return "scene" not in values and bool({"lights", "objects"} & set(values))
+    if path.is_dir():
+        return True
+    try:
+        find_scene(name_or_path)
+    except InputError:
+        return False
+    return True
+
+
+def _check_name(name_or_path: str) -> None:
+    path = Path(name_or_path)
+    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
+    if not path.is_file() and not (path.parent == Path() and path.name.removesuffix(".toml") in names):
+        hint = suggestion(path.stem, {*names, *scene_names()})
+        raise InputError(f"there is no scene or recipe {name_or_path!r}{hint}")
