@@ -26,12 +26,14 @@ FOCUS_PX = 1.0
 """A point is in focus where its blur reaches so many px to either side."""
 LEAST_FOCUS_SHARE = 0.05
 LEAST_SEEN_BY_ALL = 0.5
+MOST_PITCH_FACTOR = 3.0
+"""Cameras are not to be moved further apart than this only to tell two objects apart."""
 MOST_LINES = 8
 """So many pairs of objects are told one by one."""
 
 
 def depth_findings(facts: Facts) -> list[Finding]:
-    """All findings of this file; a single camera has no disparity, and gets one line."""
+    """All findings of this file; a single camera has no disparity and gets one line."""
     grid = facts.grid
     if grid.view_count == 1:
         return [Finding("note", "disparity", "one camera has none: depths cannot be told apart")]
@@ -94,10 +96,13 @@ def _separation(facts: Facts, near: ObjectFacts, far: ObjectFacts) -> Finding:
         return Finding("note", "separation", f"{text} of blur, in one plane for these cameras")
     if apart >= LEAST_APART_PX:
         return Finding("ok", "separation", f"{text} of blur apart")
+    ways, factor = [], LEAST_APART_PX / apart
     inverse = 1 / near.middle_mm - LEAST_APART_PX / spread_px_mm(facts.grid)
-    move = f"move {far.name} back to {1 / inverse:.0f} mm, or " if inverse > 0 else ""
-    pitch = " x ".join(f"{p * LEAST_APART_PX / apart:.3g}" for p in facts.grid.pitch_mm)
-    return Finding("warn", "separation", f"{text} of blur apart", f"{move}take a pitch of {pitch} mm")
+    if inverse > 0:
+        ways.append(f"move {far.name} back to {1 / inverse:.0f} mm")
+    if factor <= MOST_PITCH_FACTOR or not ways:
+        ways.append(f"take a pitch of {' x '.join(f'{p * factor:.3g}' for p in facts.grid.pitch_mm)} mm")
+    return Finding("warn", "separation", f"{text} of blur apart", " or ".join(ways))
 
 
 def focus_findings(facts: Facts) -> list[Finding]:
@@ -141,14 +146,16 @@ def _range_findings(facts: Facts) -> list[Finding]:
 
 
 def overlap_findings(facts: Facts) -> list[Finding]:
-    """Share of the section at each plane that every camera sees."""
-    found = []
-    for z in facts.planes_mm:
-        share = share_seen_by_all(facts.grid, z)
-        remedy = "take a smaller pitch, fewer cameras or a wider film" if share < LEAST_SEEN_BY_ALL else ""
-        text = f"all {facts.grid.view_count} views see {share:.0%} of the section at {z:g} mm"
-        found.append(Finding("warn" if remedy else "ok", "overlap", text, remedy))
-    return found
+    """Share of the sections that every camera sees, where it is least and where it is largest."""
+    if not facts.planes_mm:
+        return []
+    views = facts.grid.view_count
+    shares = {z: share_seen_by_all(facts.grid, z) for z in (min(facts.planes_mm), max(facts.planes_mm))}
+    told = " and ".join(f"{share:.0%} of the section at {z:g} mm" for z, share in shares.items())
+    text = f"all {views} views see {told}"
+    if min(shares.values()) >= LEAST_SEEN_BY_ALL:
+        return [Finding("ok", "overlap", text)]
+    return [Finding("warn", "overlap", text, "take a smaller pitch, fewer cameras or a wider film")]
 
 
 def alias_findings(facts: Facts) -> list[Finding]:

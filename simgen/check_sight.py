@@ -8,12 +8,14 @@ MOST_HIDDEN = 0.5
 
 def sight_findings(facts: Facts) -> list[Finding]:
     """All findings of this file."""
-    found = [finding for thing in facts.objects for finding in _object_findings(facts, thing)]
+    told = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
+    found = [finding for own in told.values() for finding in own]
+    whole = [name for name, own in told.items() if not own]
+    if whole:
+        text = f"the virtual centre and the corner cameras see all of {listed(whole)}"
+        found.insert(0, Finding("ok", "objects", text))
     if not facts.objects:
         found = [Finding("warn", "objects", "there are none", "add [[objects]] to the scene")]
-    elif all(finding.verdict == "ok" for finding in found):
-        names = listed([thing.name for thing in facts.objects])
-        found = [Finding("ok", "objects", f"{names}: seen whole by the centre and the corner cameras")]
     return found + _wall_findings(facts) + _lamp_findings(facts)
 
 
@@ -34,8 +36,7 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
     if thing.body_z_mm[0] <= 0:
         text = f"{name} reaches to z = {thing.body_z_mm[0]:.0f} mm, behind the cameras"
         found.append(Finding("warn", "objects", text, "what lies there is not seen; move it away"))
-    found += _hidden(thing) + _cut(facts, thing)
-    return found or [Finding("ok", "objects", f"{name} is seen whole")]
+    return found + _hidden(thing) + _cut(facts, thing)
 
 
 def _hidden(thing: ObjectFacts) -> list[Finding]:

@@ -10,9 +10,13 @@ import numpy as np
 from pcii.types import CameraGrid
 from simgen.counts import Plan
 from simgen.recipe import Recipe
+from simgen.shifts import apart_px
 
 Verdict = Literal["ok", "note", "warn", "bad"]
 Elsewhere = Literal["backdrop", "a lamp in view", "nothing"]
+
+PLANES_APART_PX = 2.0
+"""Where a recipe names no planes, objects within this blur share one."""
 
 
 @dataclass(frozen=True)
@@ -101,10 +105,14 @@ class Facts:
         """The objects that the virtual centre sees."""
         return tuple(thing for thing in self.objects if thing.z_mm.size)
 
-    @property
+    @cached_property
     def planes_mm(self) -> tuple[float, ...]:
-        """Depths to look at: those of the recipe, else those of the objects."""
-        return self.recipe.analysis.z_mm or tuple(sorted({round(thing.middle_mm) for thing in self.seen}))
+        """Depths to look at: those of the recipe, else the objects', each in focus at one of them."""
+        planes: list[float] = []
+        for middle_mm in sorted(thing.middle_mm for thing in self.seen):
+            if not planes or apart_px(self.grid, planes[-1], middle_mm) > PLANES_APART_PX:
+                planes.append(float(round(middle_mm)))
+        return self.recipe.analysis.z_mm or tuple(planes)
 
 
 def listed(names: list[str], most: int = 6) -> str:

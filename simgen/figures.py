@@ -1,4 +1,4 @@
-"""Parts of the pictures of `preview` and `sheet`: depth, objects with their names, and the file itself."""
+"""Parts of the pictures of `preview` and `sheet`: where to look, depth, objects by name, and the file."""
 
 import colorsys
 import io
@@ -29,12 +29,28 @@ def check_picture_path(out: Path) -> None:
         raise InputError(f"{out}: there is no folder {out.parent}; make it first")
 
 
+def part_of_interest(mask: np.ndarray, margin_px: float) -> tuple[slice, slice]:
+    """Rows and columns around what is True in `mask` (H, W), in the film's aspect; all if nothing is."""
+    height, width = mask.shape
+    if not mask.any():
+        return slice(0, height), slice(0, width)
+    lines = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    spans = [(line[0] - margin_px, line[-1] + 1 + margin_px) for line in lines]
+    scale = min(1.0, max((b - a) / size for (a, b), size in zip(spans, mask.shape, strict=True)))
+    box = []
+    for (a, b), size in zip(spans, mask.shape, strict=True):
+        length = max(1, round(scale * size))
+        start = int(np.clip(round((a + b - length) / 2), 0, size - length))
+        box.append(slice(start, start + length))
+    return box[0], box[1]
+
+
 def new_figure(width_in: float, height_in: float) -> Any:
     """An empty Matplotlib figure that needs no display and no global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_in, height_in), layout="constrained", facecolor="white")
+    figure = Figure(figsize=(width_in, height_in), layout="compressed", facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -43,7 +59,7 @@ def save_figure(figure: Any, out: Path, dots_per_inch: int = 110) -> None:
     """Write a figure whole or not at all; `InputError` where writing is not allowed."""
     kind = "png" if out.suffix.lower() == ".png" else "jpeg"
     buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=dots_per_inch)
+    figure.savefig(buffer, format=kind, dpi=dots_per_inch, bbox_inches="tight", pad_inches=0.15)
     try:
         write_bytes_safely(out, buffer.getvalue())
     except PermissionError as fault:
@@ -55,6 +71,13 @@ def hide_frame(axes: Any) -> None:
     axes.set_xticks([])
     axes.set_yticks([])
     axes.spines[:].set_visible(False)
+
+
+def frame_part(axes: Any, box: tuple[slice, slice]) -> None:
+    """A thin frame around the part of a picture that others show enlarged."""
+    rows, cols = box
+    left, right, top, bottom = cols.start - 0.5, cols.stop - 0.5, rows.start - 0.5, rows.stop - 0.5
+    axes.plot([left, right, right, left, left], [top, top, bottom, bottom, top], color="0.6", linewidth=0.8)
 
 
 def draw_depth(figure: Any, axes: Any, z_mm: np.ndarray, shown: np.ndarray) -> None:

@@ -12,8 +12,10 @@ from simgen.figures import (
     check_picture_path,
     draw_depth,
     draw_objects,
+    frame_part,
     hide_frame,
     new_figure,
+    part_of_interest,
     save_figure,
 )
 from simgen.probe_scene import coarser
@@ -22,6 +24,8 @@ from simgen.targets import load_target
 from simgen.truth import first_hits_at_centre
 
 SIDE_PX = 512
+MARGIN = 0.03
+"""Around the objects, as a share of the picture's longer side."""
 PANEL_IN = 4.8
 """Height of a picture's panel."""
 
@@ -42,13 +46,16 @@ def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
     hits = first_hits_at_centre(built, grid)
     things = hits.object_id > 0
     white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
+    box = part_of_interest(things, MARGIN * max(things.shape))
     aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
-    figure = new_figure(PANEL_IN * (aspect * 3.9 + 0.5), PANEL_IN + 0.7)
-    axes = figure.subplots(1, 3, width_ratios=(1, 1.15, 1.8))
+    figure = new_figure(PANEL_IN * (aspect * 3.84 + 0.2) + 0.5, PANEL_IN + 0.7)
+    axes = figure.subplots(1, 3, width_ratios=(1, 1, 1.84))
     axes[0].imshow(np.clip(picture / max(white, 1e-12), 0, 1) ** (1 / 2.2))
     axes[0].set_title("virtual centre")
     hide_frame(axes[0])
-    draw_depth(figure, axes[1], hits.z_mm, things)
-    draw_objects(axes[2], hits.object_id, built.names)
+    if things.any() and box[0].stop - box[0].start < grid.height:
+        frame_part(axes[0], box)
+    draw_depth(figure, axes[1], hits.z_mm[box], things[box])
+    draw_objects(axes[2], hits.object_id[box], built.names)
     figure.suptitle(recipe.title or scene.title)
     save_figure(figure, out)

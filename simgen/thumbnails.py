@@ -1,15 +1,20 @@
 """Small pictures of many views: photons binned so that they can be seen, full-light views averaged."""
 
+import itertools
+
 import numpy as np
 
-from pcii.bayer import channel_count, colour_cells, colour_index
+from pcii.bayer import channel_count, colour_cells
 from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid, Views
 
+Box = tuple[slice, slice]
+"""Rows and columns of a film."""
 GAP_PX = 2
 MOST_TILES = 12
 """So many tiles stand in a row or column at most; of more views some are left out."""
 COUNTS_PER_BIN = 1.5
+LIT_SHARE = 0.25
 BINS = (24, 128)
 """Bins along the longer side of a photon tile, at least and at most."""
 WHITE_SHARE = 0.99
@@ -20,77 +25,86 @@ def evenly_chosen(number: int, most: int) -> np.ndarray:
     return np.unique(np.round(np.linspace(0, number - 1, min(number, most))).astype(np.int64))
 
 
-def count_tiles(counts: PhotonCounts) -> np.ndarray:
+def count_tiles(counts: PhotonCounts, box: Box) -> np.ndarray:
     """Photon counts of the views in bins, (K, L, h, w, 3): mean counts per pixel of each colour.
 
-    A bin is large enough to hold a photon or two where there is light: half of the film, one guesses.
-    Grids of more than `MOST_TILES` cameras to a side are told by some of their views.
+    Of each view the part `box`. A bin is large enough to hold a photon or two where there is light: on a
+    quarter of the pixels, one guesses. Grids of more than `MOST_TILES` cameras to a side are told by some
+    of their views.
     """
     grid, events = counts.grid, counts.events
     chosen = [evenly_chosen(number, MOST_TILES) for number in (grid.rows, grid.cols)]
-    height, width = tile_size(grid, int(events.n.sum()) / grid.view_count)
-    row, col = bins(grid.height, height), bins(grid.width, width)
-    rank = [np.full(number, -1) for number in (grid.rows, grid.cols)]
-    for ranks, own in zip(rank, chosen, strict=True):
+    tile = [np.full(number, -1) for number in (grid.rows, grid.cols)]
+    for ranks, own in zip(tile, chosen, strict=True):
         ranks[own] = np.arange(own.size)
-    k, l = rank[0][events.k], rank[1][events.l]
-    kept = (k >= 0) & (l >= 0)
-    i, j = events.i[kept], events.j[kept]
-    channels = channel_count(counts.cfa)
-    colour = colour_cells(counts.cfa)[i % 2, j % 2]
-    shape = (chosen[0].size, chosen[1].size, height, width, channels)
-    index = np.ravel_multi_index((k[kept], l[kept], row[i], col[j], colour), shape)
-    total = np.bincount(index, events.n[kept], minlength=int(np.prod(shape))).reshape(shape)
-    mean = total / np.maximum(_pixels_of_colour(grid, counts.cfa, row, col, height, width), 1)
-    return np.repeat(mean, 3, axis=-1) if channels == 1 else mean
+    k, l = tile[0][events.k], tile[1][events.l]
+    inside = [
+        (at >= part.start) & (at < part.stop) for at, part in zip((events.i, events.j), box, strict=True)
+    ]
+    kept = (k >= 0) & (l >= 0) & inside[0] & inside[1]
+    n = events.n[kept]
+    binned = _Binned(counts.cfa, box, *_bins_for(counts, box, n.sum() / chosen[0].size / chosen[1].size))
+    shape = (chosen[0].size, chosen[1].size, *binned.shape)
+    place = binned.place_of(events.i[kept], events.j[kept])
+    index = (k[kept] * chosen[1].size + l[kept]) * int(np.prod(binned.shape)) + place
+    total = np.bincount(index, n, minlength=int(np.prod(shape))).reshape(shape)
+    return _as_rgb(total / binned.pixels)
 
 
-def tile_size(grid: CameraGrid, photons_per_view: float) -> tuple[int, int]:
-    """Rows and columns of bins of a view, in its aspect, never more than its pixels."""
-    longer = max(grid.height, grid.width)
-    bright = 0.5 * grid.height * grid.width / longer**2
-    side = int(np.clip(np.sqrt(photons_per_view / (COUNTS_PER_BIN * bright)), *BINS))
-    return tuple(max(1, min(size, round(side * size / longer))) for size in (grid.height, grid.width))  # type: ignore[return-value]
+def _bins_for(counts: PhotonCounts, box: Box, photons_per_view: float) -> tuple[int, int]:
+    sizes = [part.stop - part.start for part in box]
+    lit = LIT_SHARE * sizes[0] * sizes[1] / max(sizes) ** 2
+    side = int(np.clip(np.sqrt(photons_per_view / (COUNTS_PER_BIN * lit)), *BINS))
+    return _bin_numbers(box, side, counts.cfa)
 
 
-def bins(pixels: int, number: int) -> np.ndarray:
-    """The bin (of `number`) of each of so many pixels."""
-    return np.arange(pixels) * number // pixels
+def _bin_numbers(box: Box, longer: int, cfa: str | None) -> tuple[int, int]:
+    """Rows and columns of bins, so many along the longer side; each holds a pixel of every colour."""
+    sizes = [part.stop - part.start for part in box]
+    smallest = 1 if cfa is None else 2
+    rows, cols = (max(1, min(size // smallest, round(longer * size / max(sizes)))) for size in sizes)
+    return rows, cols
 
 
-def _pixels_of_colour(
-    grid: CameraGrid, cfa: str | None, row: np.ndarray, col: np.ndarray, height: int, width: int
-) -> np.ndarray:
-    """Pixels of each colour in each bin, (height, width, C)."""
-    shape = (height, width, channel_count(cfa))
-    colour = colour_index(grid.height, grid.width, cfa).astype(np.int64)
-    index = (row[:, None] * width + col[None, :]) * shape[2] + colour
-    return np.bincount(index.ravel(), minlength=int(np.prod(shape))).reshape(shape)
-
-
-def radiance_tiles(views: Views, most: int, side_px: int) -> np.ndarray:
-    """Full-light views, at most `most` x `most`, averaged to small RGB pictures (k, l, h, w, 3)."""
+def radiance_tiles(views: Views, most: int, side_px: int, box: Box) -> np.ndarray:
+    """The part `box` of at most `most` x `most` full-light views, averaged to small RGB (k, l, h, w, 3)."""
     grid = views.grid
-    scale = max(1.0, max(grid.height, grid.width) / side_px)
-    height, width = max(1, int(grid.height / scale)), max(1, int(grid.width / scale))
+    binned = _Binned(views.cfa, box, *_bin_numbers(box, side_px, views.cfa))
     rows, cols = evenly_chosen(grid.rows, most), evenly_chosen(grid.cols, most)
-    row, col = bins(grid.height, height), bins(grid.width, width)
-    pixels = np.maximum(_pixels_of_colour(grid, views.cfa, row, col, height, width), 1)
-    colour = colour_index(grid.height, grid.width, views.cfa).astype(np.int64)
-    tiles = np.zeros((rows.size, cols.size, height, width, 3))
-    for (a, b), tile in ((ab, tiles[ab]) for ab in np.ndindex(rows.size, cols.size)):
-        image = views.view(int(rows[a]), int(cols[b]))
-        place = row[:, None] * width + col[None, :]
+    i, j = np.mgrid[box]
+    place = binned.place_of(i.ravel(), j.ravel())
+    tiles = []
+    for k, l in itertools.product(rows, cols):
+        image = views.view(int(k), int(l))[box]
         if image.shape[2] == 3:
-            sums = [np.bincount(place.ravel(), image[..., c].ravel(), height * width) for c in range(3)]
-            number = np.bincount(place.ravel(), minlength=height * width)[:, None]
-            tile[:] = (np.stack(sums, axis=-1) / number).reshape(height, width, 3)
+            sums = [np.bincount(place, image[..., c].ravel(), binned.pixels.size) for c in range(3)]
+            mean = np.stack(sums, axis=-1).reshape(*binned.shape[:2], 3) / binned.pixels
         else:
-            channels = pixels.shape[2]
-            index = (place * channels + colour).ravel()
-            total = np.bincount(index, image.ravel(), height * width * channels)
-            tile[:] = total.reshape(pixels.shape) / pixels
-    return tiles
+            mean = np.bincount(place, image.ravel(), binned.pixels.size).reshape(binned.shape) / binned.pixels
+        tiles.append(_as_rgb(mean))
+    return np.array(tiles).reshape(rows.size, cols.size, *binned.shape[:2], 3)
+
+
+class _Binned:
+    """Bins of the part `box` of a film, of each colour: which bin a pixel is in, pixels in each."""
+
+    def __init__(self, cfa: str | None, box: Box, rows: int, cols: int) -> None:
+        self.shape = (rows, cols, channel_count(cfa))
+        self._cells, self._box = colour_cells(cfa), box
+        i, j = np.mgrid[box]
+        number = np.bincount(self.place_of(i.ravel(), j.ravel()), minlength=int(np.prod(self.shape)))
+        self.pixels = np.maximum(number, 1).reshape(self.shape)
+
+    def place_of(self, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+        """Index into the flat bins of pixels (N,) inside the box."""
+        rows, cols, channels = self.shape
+        row = (i - self._box[0].start) * rows // (self._box[0].stop - self._box[0].start)
+        col = (j - self._box[1].start) * cols // (self._box[1].stop - self._box[1].start)
+        return (row * cols + col) * channels + self._cells[i % 2, j % 2]
+
+
+def _as_rgb(mean: np.ndarray) -> np.ndarray:
+    return np.repeat(mean, 3, axis=-1) if mean.shape[-1] == 1 else mean
 
 
 def joined(tiles: np.ndarray) -> np.ndarray:
