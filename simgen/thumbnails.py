@@ -6,7 +6,7 @@ import numpy as np
 
 from pcii.bayer import channel_count, colour_cells
 from pcii.photon_counts import PhotonCounts
-from pcii.types import CameraGrid, Views
+from pcii.types import Views
 
 Box = tuple[slice, slice]
 """Rows and columns of a film."""
