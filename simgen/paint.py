@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from simgen.coverage import half_plane, sine_wave, square_wave
+from simgen.areas import half_plane, sine_wave, square_wave
 from simgen.srgb import srgb_to_linear
 from simgen.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
 

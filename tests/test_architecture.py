@@ -43,7 +43,7 @@ PCII_LEVELS = [
 SIMGEN_LEVELS = [
     {"locations", "seeds", "srgb"},
     {"backend", "schema", "asset_names", "triangles"},
-    {"textures", "coverage"},
+    {"textures", "areas"},
     {"shapes", "materials", "lights", "spectra", "solids", "read_ply", "read_obj", "read_image"},
     {"paint"},
     {"recipe", "scene", "filters", "asset_worker"},

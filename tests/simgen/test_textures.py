@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from simgen.asset_names import MeshName
 from simgen.build_surface import aspect_of
-from simgen.coverage import half_plane, square_wave
+from simgen.areas import half_plane, square_wave
 from simgen.paint import paint
 from simgen.shapes import Card, Mesh, Sphere
 from simgen.srgb import srgb_to_linear
