@@ -25,6 +25,9 @@ from pcii.store import (
 )
 from pcii.types import CameraGrid, PhotonTruth, Truth, Views
 
+MORE_TRUTH = ("normal", "coverage", "visible_views")
+"""Maps of the truth that a dataset may lack: old ones do."""
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
@@ -82,9 +85,10 @@ class Dataset:
         """Depth and object of every pixel of the virtual centre, or None where it is not known."""
         if not self.has(f"{TRUTH}/z_mm"):
             return None
-        arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id"))
+        more = tuple(name for name in MORE_TRUTH if self.has(f"{TRUTH}/{name}"))
+        arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id", *more))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
-        return Truth(arrays["z_mm"], arrays["object_id"], names, self._photon_truth())
+        return Truth(**arrays, names=names, photons=self._photon_truth())
 
     def _photon_truth(self) -> PhotonTruth | None:
         part = nested_name(PHOTON_TRUTH, self.budget)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pcii.boundary import boundary_f, object_share
 from pcii.errors import InputError
 from pcii.geometry import blur_half_extent_px, disparity_spread_px, landing
 from pcii.statistics import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
@@ -15,8 +16,6 @@ from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
 
 FOCUS_TOLERANCE_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
-BOUNDARY_TOLERANCE_PX = 2.0
-"""Outlines agree where they are at most this far apart."""
 
 
 def score(
@@ -31,11 +30,12 @@ def score(
     `planes` has a row per method and plane for each kind of truth. "object": the objects whose
     visible surface is closest to this plane. "pixel": the points whose blur half-extent
     |disparity(z) - disparity(z0)| (N - 1) / 2 is at most 1 px. `boundary_f` is the F-measure of the
-    outlines with a tolerance of 2 px; `entropy_before` and `entropy_after` are Eq. 9 of the section
-    as a whole, before and after removal, in bits. `objects` is Table 1: the entropy of each object,
-    with the blur it has at the other planes, at each plane. `depth` is over the objects' pixels: errors
-    in mm where answered; `bad_1px` and `bad_3px` the share whose error exceeds 1 or 3 px of total
-    disparity spread, a missing answer counting as bad; `coverage` the share answered.
+    outlines with a tolerance of 2 px, located within pixels if the truth has `coverage`;
+    `entropy_before` and `entropy_after` are Eq. 9 of the section as a whole, before and after removal,
+    in bits. `objects` is Table 1: the entropy of each object, with the blur it has at the other planes,
+    at each plane. `depth` is over the objects' pixels: errors in mm where answered; `bad_1px` and
+    `bad_3px` the share whose error exceeds 1 or 3 px of total disparity spread, a missing answer
+    counting as bad; `coverage` the share answered.
 
     What cannot be known is None. Raises `InputError` if shapes differ.
     """
@@ -102,7 +102,7 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> li
                     "method": focus.method,
                     "object": owner or None,
                     "truth": kind,
-                    **mask_agreement(focus.in_focus[plane], None if masks is None else masks[plane]),
+                    **_plane_agreement(focus.in_focus[plane], None if masks is None else masks[plane], truth),
                     **photon_agreement(focus, truth, plane, kind),
                     "entropy_before": before[plane],
                     "entropy_after": after[plane],
@@ -111,10 +111,21 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> li
     return rows
 
 
-def mask_agreement(claimed: np.ndarray, true: np.ndarray | None) -> dict[str, float | None]:
+def _plane_agreement(
+    claimed: np.ndarray, true: np.ndarray | None, truth: Truth | None
+) -> dict[str, float | None]:
+    if true is None or truth is None or truth.coverage is None:
+        return mask_agreement(claimed, true)
+    return mask_agreement(claimed, true, object_share(true, truth.object_id, truth.coverage))
+
+
+def mask_agreement(
+    claimed: np.ndarray, true: np.ndarray | None, true_share: np.ndarray | None = None
+) -> dict[str, float | None]:
     """IoU, precision, recall, F1 and boundary F of two masks (H, W).
 
-    Two empty masks agree fully. Precision is None if nothing is claimed, recall if nothing is true.
+    `true_share` (H, W) is how much of each pixel is true, if that is known more finely. Two empty masks
+    agree fully. Precision is None if nothing is claimed, recall if nothing is true.
     """
     if true is None:
         return dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f"))
@@ -125,7 +136,7 @@ def mask_agreement(claimed: np.ndarray, true: np.ndarray | None) -> dict[str, fl
         "precision": both / claims if claims else None,
         "recall": both / facts if facts else None,
         "f1": 2 * both / (claims + facts) if either else 1.0,
-        "boundary_f": _boundary_f(claimed, true) if either else 1.0,
+        "boundary_f": boundary_f(claimed, true, true_share) if either else 1.0,
     }
 
 
@@ -151,26 +162,6 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
         "photon_precision": both / int(kept.sum()) if kept.any() else None,
         "photon_recall": both / int(right.sum()) if right.any() else None,
     }
-
-
-def _boundary_f(claimed: np.ndarray, true: np.ndarray) -> float:
-    """F-measure of the outlines: shares of each that lie within the tolerance of the other."""
-    from scipy.ndimage import distance_transform_edt
-
-    outlines = [_outline(mask) for mask in (claimed, true)]
-    if not all(outline.any() for outline in outlines):
-        return 0.0
-    near = [np.asarray(distance_transform_edt(~outline)) <= BOUNDARY_TOLERANCE_PX for outline in outlines]
-    precision = near[1][outlines[0]].mean()
-    recall = near[0][outlines[1]].mean()
-    total = precision + recall
-    return float(2 * precision * recall / total) if total else 0.0
-
-
-def _outline(mask: np.ndarray) -> np.ndarray:
-    """Pixels of the mask with a neighbour (of four) outside it; the frame's border is no outline."""
-    p = np.pad(mask, 1, mode="edge")
-    return mask & ~(p[:-2, 1:-1] & p[2:, 1:-1] & p[1:-1, :-2] & p[1:-1, 2:])
 
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:

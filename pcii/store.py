@@ -2,7 +2,9 @@
 
     manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
     counts.zarr/             events k, l, i, j, n (N,) or dense counts (K, L, H, W)
-    truth.zarr/              z_mm, object_id (H, W); on request view_z_mm, view_object_id (K, L, H, W)
+    truth.zarr/              z_mm, object_id, normal, coverage (H, W) of the virtual centre, and in_focus
+                             (Z, H, W); on request visible_views (H, W), and view_z_mm, view_object_id,
+                             view_normal, view_coverage (K, L, H, W); its attributes say what each is
     photon_truth.zarr/       object_id, z_mm (photons,) of each photon's first hit, in the events' order
     radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
 
@@ -17,7 +19,8 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -86,22 +89,30 @@ def write_arrays_safely(
     folder: Path, arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]
 ) -> None:
     """Write a Zarr v3 group of arrays (zstd, crc32c per chunk) as a whole: all of it or nothing."""
-    import zarr
+    with new_group_safely(folder, attributes) as group:
+        for name, array in arrays.items():
+            stored = new_array(group, name, array.shape, array.dtype)
+            if array.size:
+                stored[...] = array
+
+
+def new_array(group: Any, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
+    """An empty array in a group, to be filled by whole leading steps."""
     from zarr.codecs import Crc32cCodec, ZstdCodec
+
+    codecs = [ZstdCodec(level=3), Crc32cCodec()]
+    return group.create_array(name, shape=shape, dtype=dtype, chunks=_chunks(shape), compressors=codecs)
+
+
+@contextmanager
+def new_group_safely(folder: Path, attributes: Mapping[str, Any]) -> Iterator[Any]:
+    """A new Zarr v3 group to write to, which stands in `folder` once the block has ended without fault."""
+    import zarr
 
     temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".tmp"))
     try:
         group = zarr.open_group(temporary, mode="w", zarr_format=3, attributes=dict(attributes))
-        for name, array in arrays.items():
-            stored = group.create_array(
-                name,
-                shape=array.shape,
-                dtype=array.dtype,
-                chunks=_chunks(array.shape),
-                compressors=[ZstdCodec(level=3), Crc32cCodec()],
-            )
-            if array.size:
-                stored[...] = array
+        yield group
         temporary.chmod(0o755)
         for file in temporary.rglob("*"):
             if file.is_file():

@@ -266,12 +266,20 @@ class Truth:
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
     backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
+
+    More is there if the dataset has it. `normal` (H, W, 3) float32: unit normal of the surface in world axes,
+    on the side that the camera sees; 0 where nothing is hit. `coverage` (H, W) float32: the share of the
+    pixel's square that belongs to the object (or to none) that its centre hits. `visible_views` (H, W)
+    uint16: how many cameras of the grid see the point; 0 where nothing is hit.
     """
 
     z_mm: np.ndarray
     object_id: np.ndarray
     names: Mapping[int, str]
     photons: PhotonTruth | None = None
+    normal: np.ndarray | None = None
+    coverage: np.ndarray | None = None
+    visible_views: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
@@ -281,8 +289,23 @@ class Truth:
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
         if unknown:
             raise InputError(f"object_id: id {min(unknown)} has no name")
+        H, W = self.z_mm.shape
+        self._check_map("normal", (H, W, 3), np.float32, -1, 1)
+        self._check_map("coverage", (H, W), np.float32, 0, 1)
+        self._check_map("visible_views", (H, W), np.uint16, 0, np.inf)
         object.__setattr__(self, "z_mm", read_only(self.z_mm))
         object.__setattr__(self, "object_id", read_only(self.object_id))
+
+    def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
+        """An optional map, made read-only; lengths of 1 may be rounded by 1e-6."""
+        values = getattr(self, name)
+        if values is None:
+            return
+        if values.shape != shape or values.dtype != dtype:
+            raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
+        if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
+            raise InputError(f"{name}: expected values from {least} to {most}")
+        object.__setattr__(self, name, read_only(values))
 
 
 @dataclass(frozen=True)

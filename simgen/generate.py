@@ -33,7 +33,6 @@ from pcii.store import (
     read_exr,
     read_manifest,
     sweep_temporaries,
-    write_arrays_safely,
     write_exr_safely,
     write_json_safely,
 )
@@ -47,7 +46,7 @@ from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene, load_scene, scene_files
 from simgen.sensor import sense, sensitivities
-from simgen.truth import first_hits_at_centre, first_hits_of_view
+from simgen.truth_file import traced_for_visibility, write_truth
 
 RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
 SPECTRAL_UNIT = "cd/m^2 of light of 555 nm that gives as many photons to a pixel that detects them all"
@@ -91,9 +90,9 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
         products, photons, made = recipe.products, None, None
-        if products.truth or products.view_truth:
+        if products.truth or products.view_passes:
             with clock.stage("truth"):
-                _write_truth(recipe, built, out, report)
+                write_truth(recipe, built, out, report)
         if products.counts:
             with clock.stage("plan"):
                 made = plan(recipe, built, engine["kind"])
@@ -115,7 +114,7 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
             files = list_files(out, [TRUTH, *parts, RADIANCE])
         manifest = _manifest(recipe, scene, built, engine, identity) | {
             "photons": photons,
-            "skipped": _skipped(recipe, made, photons),
+            "skipped": _skipped(recipe, made, photons, traced_for_visibility(out)),
             "timings_s": clock.seconds,
             "files": files,
         }
@@ -202,25 +201,6 @@ def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[None]
         yield
 
 
-def _write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> None:
-    if (out / TRUTH).is_dir():
-        return
-    grid = recipe.grid.camera_grid()
-    K, L, H, W = grid.shape_KLHW
-    arrays: dict[str, np.ndarray] = {}
-    if recipe.products.truth:
-        centre = first_hits_at_centre(built, grid)
-        arrays |= {"z_mm": centre.z_mm, "object_id": centre.object_id}
-    if recipe.products.view_truth:
-        z = arrays["view_z_mm"] = np.empty((K, L, H, W), np.float32)
-        ids = arrays["view_object_id"] = np.empty((K, L, H, W), np.int16)
-        for done, (k, l) in enumerate(np.ndindex(K, L), start=1):
-            hits = first_hits_of_view(built, grid, k, l)
-            z[k, l], ids[k, l] = hits.z_mm, hits.object_id
-            report("truth of views", done, K * L)
-    write_arrays_safely(out / TRUTH, arrays, {"z_mm": "planar depth in mm, +inf for a miss"})
-
-
 def _render_views(recipe: Recipe, built: Built, made: Plan | None, out: Path, report: Report) -> None:
     """Radiance of every view that is not on disk yet."""
     grid, light = recipe.grid.camera_grid(), recipe.sensor.full_light
@@ -267,7 +247,9 @@ def _stored_mosaic(recipe: Recipe, out: Path) -> Callable[[int, int], np.ndarray
     return mosaic_of
 
 
-def _skipped(recipe: Recipe, made: Plan | None, photons: dict[str, Any] | None) -> list[str]:
+def _skipped(
+    recipe: Recipe, made: Plan | None, photons: dict[str, Any] | None, shadow_rays: int | None
+) -> list[str]:
     """What was not done, why, and what that saved."""
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
@@ -285,7 +267,13 @@ def _skipped(recipe: Recipe, made: Plan | None, photons: dict[str, Any] | None) 
             "two of three colours of the radiance images: the Bayer pattern hides them; saved "
             f"{8 * pixels} bytes before compression"
         )
-    if not recipe.products.view_truth:
+    if shadow_rays is not None:
+        skipped.append(
+            f"visibility where no shape can stand in the way: {shadow_rays} rays instead of {pixels}"
+        )
+    elif recipe.products.truth:
+        skipped.append(f"visibility: the recipe does not ask for it; saved up to {pixels} rays")
+    if not recipe.products.view_passes:
         skipped.append(f"truth of every view: the recipe does not ask for it; saved {pixels} first hits")
     return skipped
 

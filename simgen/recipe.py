@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -25,6 +25,8 @@ from simgen.schema import (
 )
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
+ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
+VIEW_PASSES: tuple[ViewPass, ...] = get_args(ViewPass)
 Efficiency = Annotated[Real, Field(gt=0, le=1)]
 MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
@@ -142,11 +144,26 @@ class Products(Strict):
     counts: bool = True
     """Photon counts of every view."""
     truth: bool = True
-    """Depth and object of every pixel of the virtual centre."""
-    view_truth: bool = False
-    """Depth and object of every pixel of every view."""
+    """What every pixel of the virtual centre sees: depth, object, normal, the share of the pixel that the
+    object covers, and whether it is in focus at each plane of `analysis.z_mm`."""
+    visibility: bool = False
+    """How many cameras see the point that each pixel of the virtual centre sees."""
+    view_truth: bool | tuple[ViewPass, ...] = False
+    """What every pixel of every view sees: any of "z_mm", "object_id", "normal", "coverage"; true: all."""
     radiance: Literal["none", "mosaic", "rgb"] = "none"
     """Full-light images as float32 EXR: behind the Bayer pattern, or all three colours."""
+
+    @property
+    def view_passes(self) -> tuple[ViewPass, ...]:
+        """The passes of every view that are kept, each once and in a fixed order."""
+        asked = self.view_truth
+        return tuple(one for one in VIEW_PASSES if asked is True or (asked and one in asked))
+
+    @model_validator(mode="after")
+    def _visibility_is_of_the_truth(self) -> Self:
+        if self.visibility and not self.truth:
+            raise ValueError("visibility: it is counted for the points of the truth; set truth = true too")
+        return self
 
 
 class Analysis(Strict):

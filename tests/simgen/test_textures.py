@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from simgen.areas import half_plane, square_wave
 from simgen.asset_names import MeshName
 from simgen.build_surface import aspect_of
-from simgen.areas import half_plane, square_wave
 from simgen.paint import paint
 from simgen.shapes import Card, Mesh, Sphere
 from simgen.srgb import srgb_to_linear

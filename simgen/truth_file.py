@@ -1,0 +1,89 @@
+"""The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.console import Report
+from pcii.store import TRUTH, new_array, new_group_safely
+from pcii.types import CameraGrid
+from simgen.build import Built
+from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.coverage import coverage
+from simgen.recipe import Recipe, ViewPass
+from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
+from simgen.visibility import visible_views
+
+MEANINGS = {
+    "z_mm": "planar depth in mm, +inf for a miss",
+    "object_id": "0 for the backdrop and for a miss, else a key of the manifest's objects",
+    "normal": "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
+    "0 for a miss",
+    "coverage": "share of the pixel's square that belongs to the object (or to none) that its centre hits",
+    "visible_views": "number of cameras that see the point; 0 for a miss",
+    "in_focus": "blur half-extent of at most 1 px at each plane of in_focus_z_mm",
+}
+RAYS = "visibility_rays"
+
+
+def write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> None:
+    """Write what the recipe asks for, unless it is there already; one view in memory at a time."""
+    if (out / TRUTH).is_dir():
+        return
+    grid, products, planes = recipe.grid.camera_grid(), recipe.products, recipe.analysis.z_mm
+    with new_group_safely(out / TRUTH, MEANINGS) as group:
+        if products.truth:
+            centre = first_hits_at_centre(built, grid)
+            for name in ("z_mm", "object_id", "normal"):
+                _store(group, name, getattr(centre, name))
+            _store(group, "coverage", coverage(built, grid, centre.object_id, 0.0, 0.0))
+            if planes:
+                _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
+                group.attrs["in_focus_z_mm"] = list(planes)
+            if products.visibility:
+                views, rays = visible_views(built, grid, centre, report)
+                _store(group, "visible_views", views)
+                group.attrs[RAYS] = rays
+        if products.view_passes:
+            _write_views(group, built, grid, products.view_passes, report)
+
+
+def traced_for_visibility(out: Path) -> int | None:
+    """How many rays were traced to count views, None if they were not counted."""
+    import zarr
+
+    if not (out / TRUTH).is_dir():
+        return None
+    rays = zarr.open_group(out / TRUTH, mode="r", zarr_format=3).attrs.get(RAYS)
+    return None if rays is None else int(str(rays))
+
+
+def _write_views(
+    group: Any, built: Built, grid: CameraGrid, passes: tuple[ViewPass, ...], report: Report
+) -> None:
+    arrays: dict[str, Any] = {}
+    for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
+        for name, image in _view(built, grid, k, l, passes):
+            if name not in arrays:
+                shape = (grid.rows, grid.cols, *image.shape)
+                arrays[name] = new_array(group, f"view_{name}", shape, image.dtype)
+            arrays[name][k, l] = image
+        report("truth of views", done, grid.view_count)
+
+
+def _view(
+    built: Built, grid: CameraGrid, k: int, l: int, passes: tuple[ViewPass, ...]
+) -> Iterator[tuple[ViewPass, np.ndarray]]:
+    hits: FirstHits = first_hits_of_view(built, grid, k, l)
+    for name in passes:
+        if name == "coverage":
+            x_mm, y_mm = float(camera_x_mm(grid)[l]), float(camera_y_mm(grid)[k])
+            yield name, coverage(built, grid, hits.object_id, x_mm, y_mm)
+        else:
+            yield name, getattr(hits, name)
+
+
+def _store(group: Any, name: str, array: np.ndarray) -> None:
+    new_array(group, name, array.shape, array.dtype)[...] = array
