@@ -90,7 +90,7 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
         products, photons, made = recipe.products, None, None
-        if products.truth or products.view_passes:
+        if products.truth or products.view_truth:
             with clock.stage("truth"):
                 write_truth(recipe, built, out, report)
         if products.counts:
@@ -273,7 +273,7 @@ def _skipped(
         )
     elif recipe.products.truth:
         skipped.append(f"visibility: the recipe does not ask for it; saved up to {pixels} rays")
-    if not recipe.products.view_passes:
+    if not recipe.products.view_truth:
         skipped.append(f"truth of every view: the recipe does not ask for it; saved {pixels} first hits")
     return skipped
 

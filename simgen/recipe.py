@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.bayer import PATTERNS
 from pcii.errors import InputError
@@ -26,7 +26,13 @@ from simgen.schema import (
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
 ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
-VIEW_PASSES: tuple[ViewPass, ...] = get_args(ViewPass)
+ViewPasses = Annotated[
+    tuple[ViewPass, ...],
+    BeforeValidator(
+        lambda given: {True: get_args(ViewPass), False: ()}[given] if isinstance(given, bool) else given,
+        json_schema_input_type=bool | tuple[ViewPass, ...],
+    ),
+]
 Efficiency = Annotated[Real, Field(gt=0, le=1)]
 MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
@@ -148,16 +154,10 @@ class Products(Strict):
     object covers, and whether it is in focus at each plane of `analysis.z_mm`."""
     visibility: bool = False
     """How many cameras see the point that each pixel of the virtual centre sees."""
-    view_truth: bool | tuple[ViewPass, ...] = False
+    view_truth: ViewPasses = ()
     """What every pixel of every view sees: any of "z_mm", "object_id", "normal", "coverage"; true: all."""
     radiance: Literal["none", "mosaic", "rgb"] = "none"
     """Full-light images as float32 EXR: behind the Bayer pattern, or all three colours."""
-
-    @property
-    def view_passes(self) -> tuple[ViewPass, ...]:
-        """The passes of every view that are kept, each once and in a fixed order."""
-        asked = self.view_truth
-        return tuple(one for one in VIEW_PASSES if asked is True or (asked and one in asked))
 
     @model_validator(mode="after")
     def _visibility_is_of_the_truth(self) -> Self:

@@ -46,8 +46,8 @@ def write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> None
                 views, rays = visible_views(built, grid, centre, report)
                 _store(group, "visible_views", views)
                 group.attrs[RAYS] = rays
-        if products.view_passes:
-            _write_views(group, built, grid, products.view_passes, report)
+        if products.view_truth:
+            _write_views(group, built, grid, products.view_truth, report)
 
 
 def traced_for_visibility(out: Path) -> int | None:

@@ -12,7 +12,7 @@ from simgen.truth import FirstHits, towards_film
 OFF_SURFACE = 1e-5
 """Rays start so far off their surface, in units of 1 mm + the point's largest coordinate (float32 rays)."""
 ROUNDING = 1e-6
-"""Boxes around shapes are grown by this share of their largest coordinate."""
+"""Boxes around shapes are grown by this share of their coordinates."""
 
 
 def visible_views(
@@ -69,7 +69,7 @@ def _can_be_blocked(built: Built, grid: CameraGrid, start: np.ndarray) -> np.nda
     for shape in built.scene.shapes():
         box = shape.bbox()
         low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
-        margin = ROUNDING * max(np.abs(low).max(), np.abs(high).max())
+        margin = ROUNDING * np.maximum(np.abs(low), np.abs(high))
         low, high = low - margin, high + margin
         touches = (low[2] <= z) & (high[2] >= 0)
         ends = [np.clip(side[2], 0, z) / z for side in (low, high)]

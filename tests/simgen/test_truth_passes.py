@@ -1,0 +1,252 @@
+"""Depth, normals, coverage, visibility and focus against what can be written down."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from plain_scenes import built, card, grid, sphere
+
+from pcii.geometry import project_px
+from pcii.score import pixel_masks
+from pcii.types import CameraGrid, Truth
+from simgen import backend, cameras, visibility
+from simgen.coverage import SAMPLES, coverage
+from simgen.truth import first_hits_at_centre, first_hits_of_view, in_focus
+from simgen.visibility import visible_views
+
+pytestmark = pytest.mark.renders
+WHITE = {"reflectance": [1, 1, 1]}
+CENTRE, RADIUS = np.array([20.0, -15.0, 650.0]), 60.0
+
+
+def directions(of: CameraGrid, fine: int = 1) -> np.ndarray:
+    """Rays (H, W, 3) of length 1 along Z through pixel centres, or of `fine` x `fine` cells of each pixel."""
+    i = (np.arange(of.height * fine) + 0.5) / fine - of.height / 2
+    j = (np.arange(of.width * fine) + 0.5) / fine - of.width / 2
+    v, u = np.meshgrid(i * of.pixel_mm / of.focal_mm, j * of.pixel_mm / of.focal_mm, indexing="ij")
+    return np.stack([u, v, np.ones_like(u)], axis=-1)
+
+
+def on_sphere(rays: np.ndarray, centre: np.ndarray = CENTRE, radius: float = RADIUS) -> np.ndarray:
+    """Depth of the first hit, inf for none, from the origin."""
+    a, b, c = (rays**2).sum(-1), rays @ centre, centre @ centre - radius**2
+    root = b * b - a * c
+    return np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
+
+
+def at_rim(rays: np.ndarray) -> np.ndarray:
+    """Rays that float32 may or may not take past the sphere; there depth has an infinite slope."""
+    a, b, c = (rays**2).sum(-1), rays @ CENTRE, CENTRE @ CENTRE - RADIUS**2
+    return np.abs(b * b - a * c) <= 1e-4 * b * b
+
+
+def test_scalar_mode_passes_the_tests_of_this_file() -> None:
+    if os.environ.get("SIMGEN_BACKEND") == "scalar" or backend.choose().kind == "scalar":
+        pytest.skip("this is scalar mode")
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", __file__],
+        env=os.environ | {"SIMGEN_BACKEND": "scalar"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout[-3000:]
+
+
+@pytest.mark.parametrize("near_clip_mm", [0.01, 10.0])
+def test_depth_is_planar_whatever_the_near_clip(
+    near_clip_mm: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The renderer's own depth counts from the near clip plane: 10 mm would be an error of 1.5 %.
+    monkeypatch.setattr(cameras, "NEAR_CLIP_MM", near_clip_mm)
+    of = grid(2, 2, 96, 120)
+    rays = directions(of)
+    ball = first_hits_at_centre(built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)]), of)
+    expected, sure = on_sphere(rays), ~at_rim(rays)
+    expected = np.where(np.isfinite(expected), expected, 3000.0)
+    np.testing.assert_allclose(ball.z_mm[sure], expected[sure], rtol=1e-5)
+    # Turned by 25 degrees about X (down- to forward axis) the normal (0, 0, -1) becomes (0, sin, -cos).
+    turn = np.radians(25)
+    normal = np.array([0, np.sin(turn), -np.cos(turn)])
+    slanted = first_hits_at_centre(built(tmp_path, [card("c", 500.0, 900.0, WHITE, (25, 0, 0))]), of)
+    np.testing.assert_allclose(slanted.z_mm, 500.0 * normal[2] / (rays @ normal), rtol=1e-5)
+
+
+def test_normals_are_the_surfaces_own_and_face_the_camera(tmp_path: Path) -> None:
+    of = grid(2, 2, 96, 120)
+    rays = directions(of)
+    ball = first_hits_at_centre(
+        built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)], backdrop_mm=None), of
+    )
+    here = (ball.object_id == 1) & ~at_rim(rays)
+    expected = (rays * on_sphere(rays)[..., None])[here] - CENTRE
+    np.testing.assert_allclose(ball.normal[here], expected / RADIUS, atol=1e-4)
+    assert (ball.normal[ball.object_id == 0] == 0).all()
+    # A card from its front, and from behind (turned by 205 degrees): the same plane, the same normal.
+    turn = np.radians(25)
+    for degrees in (25.0, 205.0):
+        slanted = first_hits_at_centre(built(tmp_path, [card("c", 500.0, 900.0, WHITE, (degrees, 0, 0))]), of)
+        flat = slanted.normal.reshape(-1, 3)
+        np.testing.assert_allclose(flat, np.tile([0, np.sin(turn), -np.cos(turn)], (len(flat), 1)), atol=1e-4)
+    assert slanted.normal.dtype == np.float32
+
+
+def test_normals_are_the_slope_of_depth(tmp_path: Path) -> None:
+    # Independent of any formula for the ball: neighbouring points differ by vectors along the surface.
+    of = grid(1, 1, 96, 120)
+    hits = first_hits_at_centre(built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)]), of)
+    point = directions(of) * hits.z_mm[..., None].astype(np.float64)
+    inner = (slice(36, 46), slice(70, 80))
+    assert (hits.object_id[inner] == 1).all()
+    across = point[36:46, 71:81] - point[36:46, 69:79]
+    down = point[37:47, 70:80] - point[35:45, 70:80]
+    normal = np.cross(down, across)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    # Central differences over a pixel, 0.9 mm of a radius of 60 mm: off by some (0.9 / 60)^2.
+    np.testing.assert_allclose(hits.normal[inner], normal, atol=1e-3)
+
+
+def test_the_virtual_centre_of_an_even_grid_stands_between_cameras(tmp_path: Path) -> None:
+    scene = built(tmp_path, [card("dot", 500.0, 20.0, WHITE)])
+    even = grid(2, 2, 61, 81)
+
+    def middle(object_id: np.ndarray) -> np.ndarray:
+        return np.argwhere(object_id == 1).mean(axis=0)
+
+    np.testing.assert_allclose(middle(first_hits_at_centre(scene, even).object_id), [30, 40], atol=1e-9)
+    for k, l in np.ndindex(2, 2):
+        own = middle(first_hits_of_view(scene, even, k, l).object_id)
+        # Half a step of 6 x 4 mm is 4.3 x 2.8 px; a mask's middle is known to a pixel's half.
+        np.testing.assert_allclose(own, project_px(even, (0, 0, 500.0), k, l), atol=0.5)
+        assert np.abs(own - [30, 40]).min() > 2
+
+
+def test_coverage_is_the_area_that_the_object_has_of_the_pixel(tmp_path: Path) -> None:
+    of = grid(1, 1, 48, 60, pixel_mm=0.1408)
+    scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)])
+    ids = first_hits_at_centre(scene, of).object_id
+    found = coverage(scene, of, ids, 0.0, 0.0)
+    fine = np.isfinite(on_sphere(directions(of, 32))).reshape(48, 32, 60, 32)
+    ball = fine.mean(axis=(1, 3))
+    assert found.dtype == np.float32
+    # Half of the points of one line of the lattice, some 15, may be on the wrong side of an edge,
+    # and half a cell of the 32 x 32 that are counted here.
+    np.testing.assert_allclose(found, np.where(ids == 1, ball, 1 - ball), atol=8 / SAMPLES + 1 / 64)
+    own = np.where(ids == 1, found, 1 - found)
+    rim = np.count_nonzero((ball > 0) & (ball < 1))
+    assert abs(own.sum() - ball.sum()) < 3 * np.sqrt(rim) * 3 / SAMPLES  # such errors have either sign
+
+
+def test_coverage_of_a_card_from_a_camera_off_the_centre(tmp_path: Path) -> None:
+    of = grid(2, 2, 60, 80)
+    scene = built(tmp_path, [card("c", 500.0, 33.0, WHITE)])
+    ids = first_hits_of_view(scene, of, 0, 1).object_id
+    found = coverage(scene, of, ids, 3.0, -2.0)
+    spans = []
+    for size, corner in ((60, -16.5 + 2.0), (80, -16.5 - 3.0)):
+        low, high = (size - 1) / 2 + np.array([corner, corner + 33.0]) * 50 / (500 * 0.0704)
+        at = np.arange(size)
+        spans.append(np.clip(np.minimum(high, at + 0.5) - np.maximum(low, at - 0.5), 0, 1))
+    expected = np.outer(*spans)
+    np.testing.assert_allclose(found, np.where(ids == 1, expected, 1 - expected), atol=8 / SAMPLES)
+
+
+def test_focus_is_what_the_score_takes_it_for() -> None:
+    rng = np.random.default_rng(8)
+    z = rng.uniform(400, 900, (30, 40)).astype(np.float32)
+    z[0, :5] = np.inf
+    planes = (450.0, 540.0, 620.0, 1e6)
+    for rows, cols in ((10, 10), (2, 7), (9, 3), (1, 1)):
+        of = grid(rows, cols, 30, 40)
+        truth = Truth(z, np.zeros(z.shape, np.int16), {})
+        np.testing.assert_array_equal(in_focus(of, z, planes), pixel_masks(of, truth, np.array(planes)))
+    assert in_focus(of, z, ()).shape == (0, 30, 40)
+
+
+# Visibility: a small card before a smaller one, which the centre cannot see but which stands in the way of
+# others; a ball; and a large slanted card behind everything.
+CARDS = {
+    "front": ((-10.0, 5.0, 300.0), 16.0, 0.0),
+    "hidden": ((-11.0, 6.0, 330.0), 15.0, 0.0),
+    "rear": ((0.0, 0.0, 600.0), 220.0, 20.0),
+}
+BALL, BALL_RADIUS = np.array([25.0, -8.0, 420.0]), 14.0
+
+
+def occluders(folder: Path):
+    objects = [
+        card(name, at[2], size, WHITE, (0, turn, 0), at[:2]) for name, (at, size, turn) in CARDS.items()
+    ]
+    return built(folder, [*objects, sphere("ball", (25.0, -8.0, 420.0), BALL_RADIUS)], backdrop_mm=None)
+
+
+def slow_count(of: CameraGrid, point: np.ndarray, object_id: int) -> tuple[int, float]:
+    """How many cameras see a point, shape by shape; and by how many mm the nearest decision was taken."""
+    count, closest = 0, np.inf
+    for k, l in np.ndindex(of.rows, of.cols):
+        camera = np.array([(l - (of.cols - 1) / 2) * 6.0, (k - (of.rows - 1) / 2) * 4.0, 0.0])
+        i, j = project_px(of, (point[0], point[1], point[2]), k, l)
+        seen = -0.5 < i < of.height - 0.5 and -0.5 < j < of.width - 0.5
+        away = camera - point
+        for number, (at, size, turn) in enumerate(CARDS.values(), start=1):
+            if number == object_id:
+                continue
+            c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+            normal, right = np.array([-s, 0, -c]), np.array([c, 0, -s])
+            share = (normal @ (np.array(at) - point)) / (normal @ away)
+            if 0 < share < 1:
+                x, y = right @ (point + share * away - at), point[1] + share * away[1] - at[1]
+                room = max(abs(x), abs(y)) - size / 2
+                closest = min(closest, abs(room))
+                seen &= room > 0
+        if object_id == 4:
+            facing = (point - BALL) @ away / np.linalg.norm(away)
+            closest, seen = min(closest, abs(facing)), seen and facing > 0
+        else:
+            share = np.clip((BALL - point) @ away / (away @ away), 0, 1)
+            room = np.linalg.norm(point + share * away - BALL) - BALL_RADIUS
+            closest, seen = min(closest, abs(room)), seen and room > 0
+        count += bool(seen)
+    return count, float(closest)
+
+
+def test_visibility_is_what_a_loop_over_cameras_and_shapes_counts(tmp_path: Path) -> None:
+    of = grid(5, 4, 33, 42, pixel_mm=0.24)
+    scene = occluders(tmp_path)
+    hits = first_hits_at_centre(scene, of)
+    found, _ = visible_views(scene, of, hits)
+    assert found.dtype == np.uint16
+    assert 2 not in hits.object_id  # "hidden" is
+    rays, compared = directions(of), 0
+    for i, j in np.argwhere(np.isfinite(hits.z_mm)):
+        expected, closest = slow_count(of, rays[i, j] * float(hits.z_mm[i, j]), int(hits.object_id[i, j]))
+        if closest > 0.02:  # rays start 0.006 mm off the surface, and are rounded to float32
+            assert found[i, j] == expected, (i, j)
+            compared += 1
+    assert compared > 0.9 * found.size
+    assert set(np.unique(found)) >= {*range(8, 21)}  # from seen by few to seen by all
+    assert (found[np.isinf(hits.z_mm)] == 0).all()
+
+
+def test_no_ray_is_skipped_that_could_be_blocked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    of = grid(3, 4, 44, 56, pixel_mm=0.18)
+    scene = occluders(tmp_path)
+    hits = first_hits_at_centre(scene, of)
+    found, traced = visible_views(scene, of, hits)
+    monkeypatch.setattr(visibility, "_can_be_blocked", lambda *given: np.ones(len(given[2]), dtype=bool))
+    exhaustive, all_rays = visible_views(scene, of, hits)
+    np.testing.assert_array_equal(found, exhaustive)
+    assert traced < all_rays
+
+
+def test_a_wall_alone_is_seen_by_all_whose_film_it_falls_on(tmp_path: Path) -> None:
+    of = grid(2, 3, 20, 30)
+    scene = built(tmp_path, [], backdrop_mm=426.0)  # one step of 6 mm is 10.003 px there, of 4 mm 6.669 px
+    found, traced = visible_views(scene, of, first_hits_at_centre(scene, of))
+    cols = [sum(-0.5 < j - 10.003 * (l - 1) < 29.5 for l in range(3)) for j in range(30)]
+    rows = [sum(-0.5 < i - 6.669 * (k - 0.5) < 19.5 for k in range(2)) for i in range(20)]
+    np.testing.assert_array_equal(found, np.outer(rows, cols))
+    assert traced == 0
