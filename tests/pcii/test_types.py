@@ -163,6 +163,25 @@ def test_every_object_of_the_truth_has_a_name():
         Truth(np.ones((1, 3)), np.array([[0, 1, 2]]), {1: "ball"})
 
 
+def test_more_maps_of_the_truth_are_checked_and_read_only():
+    z, ids = np.ones((2, 3)), np.zeros((2, 3), dtype=int)
+    maps: dict[str, Any] = {
+        "normal": np.zeros((2, 3, 3), dtype=np.float32),
+        "coverage": np.ones((2, 3), dtype=np.float32),
+        "visible_views": np.full((2, 3), 100, dtype=np.uint16),
+    }
+    truth = Truth(z, ids, {}, **maps)
+    for name, values in maps.items():
+        assert not getattr(truth, name).flags.writeable
+        with pytest.raises(InputError, match=rf"^{name}: expected {values.dtype} \(2, 3"):
+            Truth(z, ids, {}, **{name: values[:1]})
+        with pytest.raises(InputError, match=rf"^{name}: expected {values.dtype}"):
+            Truth(z, ids, {}, **{name: values.astype(np.float64)})
+    for name, worst in (("coverage", 1.1), ("coverage", np.nan), ("normal", -2.0)):
+        with pytest.raises(InputError, match=rf"^{name}: expected values from"):
+            Truth(z, ids, {}, **{name: np.full_like(maps[name], worst)})
+
+
 def test_a_score_keeps_the_spelling_of_its_file():
     score = Score(planes=({"iou": 1.0},), objects=(), depth={"mae_mm": None}, dataset="x")
     assert score.to_dict() == {
