@@ -4,6 +4,7 @@ What all backends share. `lanes` works on a whole wavefront at once, `singles` o
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from pcii.bayer import channel_count, colour_cells
 from pcii.types import CameraGrid
 from simgen.build import Built
+from simgen.cameras import Cameras, Rig, as_rig
 from simgen.majorant import Majorant, Samples
 
 
@@ -19,9 +21,19 @@ class Setup:
     """What is looked at, by which cameras, through which filters, along how long paths."""
 
     built: Built
-    grid: CameraGrid
+    cameras: Cameras
     cfa: str | None
     max_depth: int
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The cameras as they really are."""
+        return as_rig(self.cameras)
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras as they ought to be."""
+        return self.rig.grid
 
     @property
     def channels(self) -> int:

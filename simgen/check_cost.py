@@ -53,7 +53,7 @@ def product_bytes(facts: Facts) -> dict[str, float]:
         sizes["counts"] = EVENT_BYTES * min(_photons(facts), everywhere)
     if products.radiance != "none":
         sizes["radiance"] = 4.0 * everywhere * (3 if products.radiance == "rgb" else 1)
-    truth = pixels * products.truth + everywhere * products.view_truth
+    truth = pixels * products.truth + everywhere * bool(products.view_truth)
     if truth:
         sizes["truth"] = TRUTH_BYTES * truth
     return sizes

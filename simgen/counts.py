@@ -15,6 +15,7 @@ from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_arrays_safely
 from pcii.types import CameraGrid
 from simgen import seeds
 from simgen.build import Built
+from simgen.cameras import rig_of
 from simgen.candidates import Setup
 from simgen.detector import Arrivals, detect, members, stop_counting
 from simgen.exposure import photons_per_radiance
@@ -88,7 +89,7 @@ def thin(
 ) -> tuple[Arrivals, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them."""
     grid = recipe.grid.camera_grid()
-    setup = Setup(built, grid, recipe.cfa, recipe.render.max_depth)
+    setup = Setup(built, rig_of(recipe), recipe.cfa, recipe.render.max_depth)
     gain = absolute_gain(recipe)
     drawn = draw_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
     names = ("k", "l", "i", "j", "scope", "rank")

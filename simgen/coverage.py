@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from pcii.types import CameraGrid
 from simgen.build import Built
+from simgen.cameras import Camera
 from simgen.rays import first_objects
-from simgen.truth import towards_film
 
 SAMPLES = 233
 """Rays through a pixel, on a Fibonacci lattice. An edge along one of its lines is worst: half of the some
@@ -15,11 +14,11 @@ PART = 1 << 13
 """Pixels that are sampled at once."""
 
 
-def coverage(built: Built, grid: CameraGrid, object_id: np.ndarray, x_mm: float, y_mm: float) -> np.ndarray:
+def coverage(built: Built, camera: Camera, object_id: np.ndarray) -> np.ndarray:
     """Share (H, W) float32 of each pixel's square in which rays hit the object that its centre hits first.
 
-    Seen from the camera at (x, y, 0), whose `object_id` (H, W) is given; what is no object (id 0) counts as
-    one. A pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its
+    Seen by the camera, without its lens, whose `object_id` (H, W) is given; what is no object (id 0)
+    counts as one. A pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its
     share is 1: what is lost is only what passes between the centres of pixels.
     """
     share = np.ones(object_id.shape, dtype=np.float32)
@@ -27,8 +26,8 @@ def coverage(built: Built, grid: CameraGrid, object_id: np.ndarray, x_mm: float,
     down, right = _lattice()
     for start in range(0, row.size, PART):
         i, j = row[start : start + PART], col[start : start + PART]
-        rays = towards_film(grid, i[:, None] + down, j[:, None] + right).reshape(-1, 3)
-        found = first_objects(built, np.array([x_mm, y_mm, 0.0]), rays).reshape(i.size, SAMPLES)
+        rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)
+        found = first_objects(built, camera.position_mm, rays).reshape(i.size, SAMPLES)
         share[i, j] = (found == object_id[i, j, None]).mean(axis=1)
     return share
 

@@ -39,6 +39,7 @@ from pcii.store import (
 from simgen import backend, seeds
 from simgen.asset_names import asset
 from simgen.build import Built, build
+from simgen.cameras import rig_of
 from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import full_light_image
 from simgen.exposure import photons_per_radiance
@@ -203,14 +204,15 @@ def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[None]
 
 def _render_views(recipe: Recipe, built: Built, made: Plan | None, out: Path, report: Report) -> None:
     """Radiance of every view that is not on disk yet."""
-    grid, light = recipe.grid.camera_grid(), recipe.sensor.full_light
+    rig, light = rig_of(recipe), recipe.sensor.full_light
+    grid = rig.grid
     samples = recipe.render.samples_per_pixel if made is None or made.thins else made.samples
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
         number, rendered = k * grid.cols + l, out / _rendered_name(recipe, k, l)
         if not rendered.is_file():
             image = render_view(
                 built,
-                grid,
+                rig,
                 k,
                 l,
                 samples_per_pixel=samples,

@@ -18,7 +18,7 @@ LEAST_GUESS = 1e-30
 
 @dataclass(frozen=True)
 class _Lanes:
-    """Candidates as the renderer holds them: camera, pixel, film point, entry, colour, wavelengths."""
+    """Candidates as the renderer holds them: camera, pixel, film point, entry, colour, wavelengths, lens."""
 
     k: Any
     l: Any
@@ -30,6 +30,7 @@ class _Lanes:
     colour: Any
     hue: Any
     inside: Any
+    lens_point: Any
 
 
 Record = TypeVar("Record", _Lanes, FirstHits)
@@ -156,7 +157,8 @@ class LanePool:
         return hit_first(self.setup.built, self._rays(lanes), lanes.inside, ambient)
 
     def _rays(self, lanes: _Lanes) -> Any:
-        ray = film_rays(self.setup.built, self.setup.grid, lanes.k, lanes.l, lanes.row_px, lanes.col_px)
+        at = lanes.k, lanes.l, lanes.row_px, lanes.col_px, lanes.lens_point
+        ray = film_rays(self.setup.built, self.setup.rig, *at)
         return self.light.aim(ray, lanes.colour, lanes.hue)
 
     def _follow(self, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
@@ -212,7 +214,11 @@ class LanePool:
         col_px = mi.Float(col) + (right - dr.floor(right)) - 0.5
         colour = dr.gather(mi.UInt32, self.colour, cell)
         hue = self.light.hues(sampler, len(group))
-        return _Lanes(k, l, row, col, row_px, col_px, entry, colour, hue, inside)
+        lens_point = None
+        if self.setup.rig.lens is not None:
+            radius_mm = self.setup.rig.lens.aperture_mm / 2
+            lens_point = radius_mm * mi.warp.square_to_uniform_disk_concentric(sampler.next_2d())
+        return _Lanes(k, l, row, col, row_px, col_px, entry, colour, hue, inside, lens_point)
 
     def _owner(self, lanes: _Lanes, z_mm: Any) -> Any:
         """The entry that each lane's path belongs to (see `majorant`)."""
@@ -256,7 +262,8 @@ def _at(dr: Any, array: Any, index: Any, active: Any = True) -> Any:
 
 def _take(dr: Any, lanes: Record, index: Any) -> Record:
     """Some lanes of a record of arrays."""
-    return type(lanes)(**{name: _at(dr, array, index) for name, array in vars(lanes).items()})
+    known = {name: array for name, array in vars(lanes).items() if array is not None}
+    return replace(lanes, **{name: _at(dr, array, index) for name, array in known.items()})
 
 
 def _samples(lanes: _Lanes, z_mm: Any, guess: list[Any], light: list[Any]) -> Samples:

@@ -163,17 +163,19 @@ def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:
     seen = np.unique(np.rint(disparity_px / step_px))
     steps = np.arange(int(seen[-1]) + 1)
     layer_at = np.abs(steps[:, None] - seen).argmin(axis=1)
-    # Further right a camera sees the point further left, so its film moves right by as much.
+    # Further right a camera sees the point further left, but for shear, so its film moves right by as much.
     disparity = seen[:, None] * step_px
-    col = _even(disparity * np.arange(grid.cols) * grid.pitch_mm[0] / longer)
-    row = _even(disparity * np.arange(grid.rows) * grid.pitch_mm[1] / longer)
+    col = _from_zero((disparity * grid.pitch_mm[0] / longer - grid.shear_px[0]) * np.arange(grid.cols))
+    row = _from_zero((disparity * grid.pitch_mm[1] / longer - grid.shear_px[1]) * np.arange(grid.rows))
     rows = -(-(grid.height + int(row.max())) // tile_px)
     cols = -(-(grid.width + int(col.max())) // tile_px)
     return Frame(tile_px, step_px, disparity_mm, layer_at, row, col, rows, cols)
 
 
-def _even(pixels: np.ndarray) -> np.ndarray:
-    return 2 * np.rint(pixels / 2).astype(np.int64)
+def _from_zero(shifts_px: np.ndarray) -> np.ndarray:
+    """Shifts (N, K) rounded to even pixels, the least of each layer 0."""
+    even = 2 * np.rint(shifts_px / 2).astype(np.int64)
+    return even - even.min(axis=1, keepdims=True)
 
 
 def tile_px_for(grid: CameraGrid) -> int:

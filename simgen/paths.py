@@ -7,15 +7,15 @@ varies, the fewer candidates are needed. Everything here stays on the renderer's
 of one lane a ray. Needs a compiled backend.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from pcii.types import CameraGrid
 from simgen.backend import load_drjit
 from simgen.build import Built
-from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.cameras import Rig
 from simgen.wavelengths import Light
 
 STRATA = 2
@@ -44,16 +44,42 @@ class FirstHits:
     guess: Any
 
 
-def film_rays(built: Built, grid: CameraGrid, k: Any, l: Any, row_px: Any, col_px: Any) -> Any:
-    """Rays through points of the film: to the right is +X, downwards +Y, straight ahead +Z."""
-    mi, dr = built.mi, load_drjit()
+def film_rays(
+    built: Built, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
+) -> Any:
+    """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`."""
+    mi, dr, grid = built.mi, load_drjit(), rig.grid
+    camera = k * grid.cols + l
+
+    def own(values: np.ndarray) -> Any:
+        if (values == values.flat[0]).all():
+            return float(values.flat[0])  # what all cameras share needs no look-up
+        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
+
+    def turned(*vector: Any) -> list[Any]:
+        columns = range(len(vector))
+        return [_dot([own(rig.rotation[..., row, col]) for col in columns], vector) for row in range(3)]
+
     per_px = grid.pixel_mm / grid.focal_mm
-    x_mm = mi.Float(camera_x_mm(grid).astype(np.float32))
-    y_mm = mi.Float(camera_y_mm(grid).astype(np.float32))
-    origin = mi.Point3f(dr.gather(mi.Float, x_mm, l), dr.gather(mi.Float, y_mm, k), 0)
-    x = (col_px - (grid.width - 1) / 2) * per_px
-    y = (row_px - (grid.height - 1) / 2) * per_px
-    return mi.RayDifferential3f(mi.Ray3f(origin, dr.normalize(mi.Vector3f(x, y, 1))))
+    x = (col_px - own((grid.width - 1) / 2 + rig.shift_px[..., 0])) * per_px
+    y = (row_px - own((grid.height - 1) / 2 + rig.shift_px[..., 1])) * per_px
+    origin = mi.Point3f(*(own(rig.position_mm[..., axis]) for axis in range(3)))
+    if rig.lens is not None:
+        x, y = x - lens_point.x / rig.lens.focus_mm, y - lens_point.y / rig.lens.focus_mm
+        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
+    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
+    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
+
+
+def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
+    """Sum of products, but for what is multiplied by a plain 0 or 1."""
+    parts = zip(row, vector, strict=True)
+    terms = [part if isinstance(f, float) and f == 1 else f * part for f, part in parts if not _is_zero(f)]
+    return sum(terms[1:], terms[0]) if terms else 0
+
+
+def _is_zero(factor: Any) -> bool:
+    return isinstance(factor, float) and factor == 0
 
 
 def hit_first(built: Built, ray: Any, active: Any, ambient: Any) -> FirstHits:

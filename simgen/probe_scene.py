@@ -14,7 +14,7 @@ from pcii.bayer import channel_count, colour_cells
 from pcii.types import CameraGrid
 from simgen import backend, seeds
 from simgen.build import Built, build
-from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.cameras import as_rig
 from simgen.counts import plan
 from simgen.facts import Elsewhere, Facts, ObjectFacts
 from simgen.lights import AreaLight
@@ -165,7 +165,7 @@ def _boxes(built: Built) -> dict[int, np.ndarray]:
 
 
 def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
-    place = np.array([camera_x_mm(grid)[l], camera_y_mm(grid)[k], 0.0])
+    place = as_rig(grid).camera(k, l).position_mm
     return bool(np.all((box[0] <= place) & (place <= box[1])))
 
 

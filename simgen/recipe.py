@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.bayer import PATTERNS
 from pcii.errors import InputError
-from pcii.types import CameraGrid
+from simgen.camera_grid import Grid
 from simgen.locations import find, recipe_roots
 from simgen.schema import (
     Count,
@@ -38,28 +38,9 @@ MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
+APERTURE_TOLERANCE = 0.01
+"""F-numbers are rounded by about so much."""
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
-
-
-class Grid(Strict):
-    """The camera grid: parallel pinhole cameras in the plane Z = 0."""
-
-    rows: Count = 10
-    cols: Count = 10
-    pitch_mm: tuple[Positive, Positive] = (5.0, 5.0)
-    """Distance between neighbouring cameras, (x, y)."""
-    focal_mm: Positive = 50.0
-    """Distance from pinhole to sensor."""
-    pixel_mm: Positive = 0.0352
-    """Side of a square pixel."""
-    height: Count = 1024
-    """Rows of pixels of one view."""
-    width: Count = 1024
-    """Columns of pixels of one view."""
-
-    def camera_grid(self) -> CameraGrid:
-        """The same grid as the type that the dataset is written with."""
-        return CameraGrid(**self.model_dump())
 
 
 class FullLight(Strict):
@@ -215,6 +196,17 @@ class Recipe(Strict):
             raise ValueError(
                 "sensor.full_light: a camera's images need the table [exposure] with f_number and time_s"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _one_aperture(self) -> Self:
+        if self.exposure is not None and self.grid.lens is not None:
+            told = self.grid.focal_mm / self.exposure.f_number
+            if abs(self.grid.lens.aperture_mm / told - 1) > APERTURE_TOLERANCE:
+                raise ValueError(
+                    f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {told:g} mm, "
+                    f"and aperture_mm is {self.grid.lens.aperture_mm:g}; make them agree"
+                )
         return self
 
     @property

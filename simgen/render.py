@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.types import CameraGrid
 from simgen.build import Built
 from simgen.build_colour import spectrum_plugin
-from simgen.cameras import camera_x_mm, camera_y_mm, sensor_plugin
+from simgen.cameras import Cameras, as_rig, sensor_plugin
 from simgen.filters import Filters
 
 SEED_STEP = 0x9E3779B9
@@ -16,7 +15,7 @@ SEED_STEP = 0x9E3779B9
 
 def render_view(
     built: Built,
-    grid: CameraGrid,
+    cameras: Cameras,
     k: int,
     l: int,
     *,
@@ -32,13 +31,13 @@ def render_view(
     """
     mi = built.mi
     sampler = {"type": "independent"}
-    x_mm, y_mm = camera_x_mm(grid)[l], camera_y_mm(grid)[k]
-    plugin = sensor_plugin(mi, grid, float(x_mm), float(y_mm), sampler)
+    camera = as_rig(cameras).camera(k, l)
+    plugin = sensor_plugin(mi, camera, sampler)
     if built.filters is not None:
         plugin["film"] = _film(plugin["film"], built.filters)
     sensor = mi.load_dict(plugin)
     channels = 3 if built.filters is None else len(built.filters.sensitivity)
-    total = np.zeros((grid.height, grid.width, channels))
+    total = np.zeros((camera.grid.height, camera.grid.width, channels))
     # By powers of two: other numbers of samples the renderer adds in an order that is left to chance.
     parts = [1 << bit for bit in range(samples_per_pixel.bit_length()) if samples_per_pixel >> bit & 1]
     for number, samples in enumerate(reversed(parts)):

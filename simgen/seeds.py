@@ -20,6 +20,7 @@ Stage = Literal[
     "saturation",
     "full light",
     "probe",
+    "camera errors",
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from pcii.bayer import colour_cells
 from simgen.backend import shape_numbers
-from simgen.cameras import camera_x_mm, camera_y_mm
 from simgen.candidates import Found, Setup, chances
 from simgen.majorant import Majorant, Samples
 from simgen.srgb import LUMINANCE
@@ -25,7 +24,10 @@ PART = 1 << 14
 
 @dataclass(frozen=True)
 class _Rays:
-    """Candidates (N,): camera, pixel, point of the film, entry of the majorant, colour."""
+    """Candidates (N,): camera, pixel, point of the film, entry of the majorant, colour, point of the lens.
+
+    `lens_x_mm` and `lens_y_mm` are 0 without a lens.
+    """
 
     k: np.ndarray
     l: np.ndarray
@@ -35,6 +37,8 @@ class _Rays:
     col_px: np.ndarray
     entry: np.ndarray
     colour: np.ndarray
+    lens_x_mm: np.ndarray
+    lens_y_mm: np.ndarray
 
     def take(self, which: np.ndarray) -> "_Rays":
         return _Rays(**{name: column[which] for name, column in vars(self).items()})
@@ -119,7 +123,11 @@ class SinglePool:
         row -= np.where(layer < 0, 0, majorant.frame.row_shift[layer, k])
         col -= np.where(layer < 0, 0, majorant.frame.col_shift[layer, l])
         row_px, col_px = row + down % 1 - 0.5, col + right % 1 - 0.5
-        return _Rays(k, l, row, col, row_px, col_px, entry, colour_cells(self.setup.cfa).ravel()[cell])
+        lens_point, rig = np.zeros((2, group.size)), self.setup.rig
+        if rig.lens is not None:
+            lens_point = rig.lens_points(rng.random((2, group.size)))
+        colour = colour_cells(self.setup.cfa).ravel()[cell]
+        return _Rays(k, l, row, col, row_px, col_px, entry, colour, *lens_point)
 
     def _inside(self, rays: _Rays) -> np.ndarray:
         """Numbers of those that fall on the film."""
@@ -159,18 +167,14 @@ class SinglePool:
         return seen
 
     def _traced(self, rays: _Rays) -> Iterator[Any]:
-        """The renderer's rays: to the right is +X, downwards +Y, straight ahead +Z."""
-        mi, grid = self.setup.built.mi, self.setup.grid
-        per_px = grid.pixel_mm / grid.focal_mm
-        x = (rays.col_px - (grid.width - 1) / 2) * per_px
-        y = (rays.row_px - (grid.height - 1) / 2) * per_px
-        ahead = 1 / np.sqrt(1 + x * x + y * y)
-        left, top = camera_x_mm(grid)[rays.l], camera_y_mm(grid)[rays.k]
-        columns = np.stack([left, top, x * ahead, y * ahead, ahead], axis=1)
+        """The renderer's rays."""
+        mi, lens_point = self.setup.built.mi, np.stack([rays.lens_x_mm, rays.lens_y_mm])
+        origins, directions = self.setup.rig.rays(rays.k, rays.l, rays.row_px, rays.col_px, lens_point)
+        columns = np.concatenate([origins, directions], axis=1)
         # Python's numbers take several times the memory of NumPy's, so there are never many at once.
         for part in np.split(columns, range(PART, len(columns), PART)):
-            for x_mm, y_mm, *direction in part.tolist():
-                yield mi.RayDifferential3f(mi.Point3f(x_mm, y_mm, 0), mi.Vector3f(direction))
+            for ray in part.tolist():
+                yield mi.RayDifferential3f(mi.Point3f(ray[:3]), mi.Vector3f(ray[3:]))
 
     def _samples(self, rays: _Rays, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
         guess = np.full((rays.k.size, self.setup.channels), GUESS)

@@ -7,7 +7,7 @@ import numpy as np
 
 from pcii.types import CameraGrid
 from simgen.build import Built
-from simgen.cameras import camera_x_mm, camera_y_mm, sensor_plugin
+from simgen.cameras import Camera, Cameras, as_rig, centre_camera, sensor_plugin
 
 IN_FOCUS_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
@@ -28,47 +28,40 @@ class FirstHits:
 
 def first_hits_at_centre(built: Built, grid: CameraGrid) -> FirstHits:
     """First hits of the virtual centre camera, at X = Y = 0 between the cameras of an even grid."""
-    return _first_hits(built, grid, 0.0, 0.0)
+    return _first_hits(built, centre_camera(grid))
 
 
-def first_hits_of_view(built: Built, grid: CameraGrid, k: int, l: int) -> FirstHits:
-    """First hits of camera (k, l)."""
-    return _first_hits(built, grid, float(camera_x_mm(grid)[l]), float(camera_y_mm(grid)[k]))
-
-
-def towards_film(grid: CameraGrid, row_px: np.ndarray, col_px: np.ndarray) -> np.ndarray:
-    """Directions (..., 3) from the pinhole through points of the film, of length 1 along Z; float64."""
-    per_px = grid.pixel_mm / grid.focal_mm
-    x = (np.asarray(col_px, dtype=np.float64) - (grid.width - 1) / 2) * per_px
-    y = (np.asarray(row_px, dtype=np.float64) - (grid.height - 1) / 2) * per_px
-    return np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1)
+def first_hits_of_view(built: Built, cameras: Cameras, k: int, l: int) -> FirstHits:
+    """First hits of camera (k, l) where it really is; with a lens, those of the rays through its centre."""
+    return _first_hits(built, as_rig(cameras).pinhole(k, l))
 
 
 def in_focus(grid: CameraGrid, z_mm: np.ndarray, planes_mm: Sequence[float]) -> np.ndarray:
     """Which pixels are in focus at each plane, (Z, H, W) bool: their blur half-extent is at most 1 px.
 
-    The outermost camera, at distance A from the centre of the grid, sees a point at depth z displaced by
-    f A / z on its film, and a section at z0 takes f A / z0 back. What is left over is the half-extent.
+    The outermost camera, at distance A from the centre of the grid along an axis, sees a point at depth z
+    displaced by f A / z on its film, and a section at z0 takes f A / z0 back. What is left over is the
+    half-extent; cameras are taken to stand where they ought to.
     """
-    farthest_mm = max(np.abs(camera_x_mm(grid)).max(), np.abs(camera_y_mm(grid)).max())
+    farthest_mm = np.abs(as_rig(grid).position_mm).max()
     seen_px = grid.focal_mm * farthest_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
     back_px = [grid.focal_mm * farthest_mm / (plane * grid.pixel_mm) for plane in planes_mm]
     masks = [np.abs(seen_px - own) <= IN_FOCUS_PX for own in back_px]
     return np.array(masks, dtype=bool).reshape(len(masks), *seen_px.shape)
 
 
-def _first_hits(built: Built, grid: CameraGrid, x_mm: float, y_mm: float) -> FirstHits:
+def _first_hits(built: Built, camera: Camera) -> FirstHits:
     # Mitsuba's own depth output is ray length from the near clip plane, averaged at edges. Here one
     # ray goes through each pixel's centre (stratified without jitter) and gives the hit's position.
     mi = built.mi
     centre_ray = {"type": "stratified", "sample_count": 1, "jitter": False}
-    sensor = mi.load_dict(sensor_plugin(mi, grid, x_mm, y_mm, centre_ray))
+    sensor = mi.load_dict(sensor_plugin(mi, camera, centre_ray))
     aovs = "hit:position,normal:geo_normal,shape:shape_index"
     integrator = mi.load_dict({"type": "aov", "aovs": aovs})
     passes = np.array(mi.render(built.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
     point, normal, shape = passes[..., -7:-4], passes[..., -4:-1], passes[..., -1].astype(np.int64)
     hit = shape > 0  # shape 0 is a miss
-    along = ((point - np.array([x_mm, y_mm, 0.0])) * normal).sum(axis=-1)
+    along = ((point - camera.position_mm) * normal).sum(axis=-1)
     facing = normal * np.where(hit, -np.sign(along), 0)[..., None]
     z_mm = np.where(hit, point[..., 2], np.inf)
     return FirstHits(z_mm.astype(np.float32), built.object_of_shape[shape], facing.astype(np.float32))

@@ -8,9 +8,8 @@ import numpy as np
 
 from pcii.console import Report
 from pcii.store import TRUTH, new_array, new_group_safely
-from pcii.types import CameraGrid
 from simgen.build import Built
-from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.cameras import Rig, centre_camera, rig_of
 from simgen.coverage import coverage
 from simgen.recipe import Recipe, ViewPass
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
@@ -22,6 +21,8 @@ MEANINGS = {
     "normal": "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
     "0 for a miss",
     "coverage": "share of the pixel's square that belongs to the object (or to none) that its centre hits",
+    "camera_position_mm": "where the cameras really are",
+    "camera_rotation": "its columns are the cameras' right, down and forward directions",
     "visible_views": "number of cameras that see the point; 0 for a miss",
     "in_focus": "blur half-extent of at most 1 px at each plane of in_focus_z_mm",
 }
@@ -32,22 +33,26 @@ def write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> None
     """Write what the recipe asks for, unless it is there already; one view in memory at a time."""
     if (out / TRUTH).is_dir():
         return
-    grid, products, planes = recipe.grid.camera_grid(), recipe.products, recipe.analysis.z_mm
+    rig, products, planes = rig_of(recipe), recipe.products, recipe.analysis.z_mm
+    grid = rig.grid
     with new_group_safely(out / TRUTH, MEANINGS) as group:
         if products.truth:
             centre = first_hits_at_centre(built, grid)
             for name in ("z_mm", "object_id", "normal"):
                 _store(group, name, getattr(centre, name))
-            _store(group, "coverage", coverage(built, grid, centre.object_id, 0.0, 0.0))
+            _store(group, "coverage", coverage(built, centre_camera(grid), centre.object_id))
             if planes:
                 _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
                 group.attrs["in_focus_z_mm"] = list(planes)
+            if recipe.grid.errors is not None:
+                _store(group, "camera_position_mm", rig.position_mm)
+                _store(group, "camera_rotation", rig.rotation)
             if products.visibility:
-                views, rays = visible_views(built, grid, centre, report)
+                views, rays = visible_views(built, rig, centre, report)
                 _store(group, "visible_views", views)
                 group.attrs[RAYS] = rays
         if products.view_truth:
-            _write_views(group, built, grid, products.view_truth, report)
+            _write_views(group, built, rig, products.view_truth, report)
 
 
 def traced_for_visibility(out: Path) -> int | None:
@@ -60,12 +65,10 @@ def traced_for_visibility(out: Path) -> int | None:
     return None if rays is None else int(str(rays))
 
 
-def _write_views(
-    group: Any, built: Built, grid: CameraGrid, passes: tuple[ViewPass, ...], report: Report
-) -> None:
-    arrays: dict[str, Any] = {}
+def _write_views(group: Any, built: Built, rig: Rig, passes: tuple[ViewPass, ...], report: Report) -> None:
+    grid, arrays = rig.grid, dict[str, Any]()
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        for name, image in _view(built, grid, k, l, passes):
+        for name, image in _view(built, rig, k, l, passes):
             if name not in arrays:
                 shape = (grid.rows, grid.cols, *image.shape)
                 arrays[name] = new_array(group, f"view_{name}", shape, image.dtype)
@@ -74,13 +77,12 @@ def _write_views(
 
 
 def _view(
-    built: Built, grid: CameraGrid, k: int, l: int, passes: tuple[ViewPass, ...]
+    built: Built, rig: Rig, k: int, l: int, passes: tuple[ViewPass, ...]
 ) -> Iterator[tuple[ViewPass, np.ndarray]]:
-    hits: FirstHits = first_hits_of_view(built, grid, k, l)
+    hits: FirstHits = first_hits_of_view(built, rig, k, l)
     for name in passes:
         if name == "coverage":
-            x_mm, y_mm = float(camera_x_mm(grid)[l]), float(camera_y_mm(grid)[k])
-            yield name, coverage(built, grid, hits.object_id, x_mm, y_mm)
+            yield name, coverage(built, rig.pinhole(k, l), hits.object_id)
         else:
             yield name, getattr(hits, name)
 

@@ -3,11 +3,10 @@
 import numpy as np
 
 from pcii.console import Report, silent
-from pcii.types import CameraGrid
 from simgen.build import Built
-from simgen.cameras import camera_x_mm, camera_y_mm
+from simgen.cameras import Cameras, Rig, as_rig, centre_camera
 from simgen.rays import blocked
-from simgen.truth import FirstHits, towards_film
+from simgen.truth import FirstHits
 
 OFF_SURFACE = 1e-5
 """Rays start so far off their surface, in units of 1 mm + the point's largest coordinate (float32 rays)."""
@@ -16,7 +15,7 @@ ROUNDING = 1e-6
 
 
 def visible_views(
-    built: Built, grid: CameraGrid, hits: FirstHits, report: Report = silent
+    built: Built, cameras: Cameras, hits: FirstHits, report: Report = silent
 ) -> tuple[np.ndarray, int]:
     """Number (H, W) uint16 of cameras that see each first hit of the virtual centre, and rays traced.
 
@@ -28,22 +27,22 @@ def visible_views(
     cameras, nothing stands in any camera's way, and no ray is traced.
     """
     H, W = hits.z_mm.shape
+    rig = as_rig(cameras)
+    grid = rig.grid
     row, col = np.nonzero(np.isfinite(hits.z_mm))
     normal = hits.normal[row, col].astype(np.float64)
-    point = towards_film(grid, row, col) * hits.z_mm[row, col, None].astype(np.float64)
+    point = centre_camera(grid).towards(row, col) * hits.z_mm[row, col, None].astype(np.float64)
     start = point + normal * (OFF_SURFACE * (1 + np.abs(point).max(axis=1, initial=0)))[:, None]
-    doubtful = _can_be_blocked(built, grid, start)
-    # A camera faces a point if normal . (camera - point) > 0; with its Z = 0 that is linear in X and Y.
-    own, across, down = (normal * point).sum(axis=1), normal[:, 0].copy(), normal[:, 1].copy()
-    in_rows = [_on_film(grid.height, grid, point[:, 1] - y, point[:, 2]) for y in camera_y_mm(grid)]
-    in_cols = [_on_film(grid.width, grid, point[:, 0] - x, point[:, 2]) for x in camera_x_mm(grid)]
+    doubtful = _can_be_blocked(built, rig, start)
+    own = (normal * point).sum(axis=1)
     count, traced = np.zeros(row.size, dtype=np.uint16), 0
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        x_mm, y_mm = camera_x_mm(grid)[l], camera_y_mm(grid)[k]
-        seen = in_rows[k] & in_cols[l] & (across * x_mm + down * y_mm > own)
+        camera = rig.pinhole(k, l)
+        # It faces a point if normal . (camera - point) > 0.
+        seen = camera.on_film(point) & (normal @ camera.position_mm > own)
         asked = np.flatnonzero(seen & doubtful)
         if asked.size:
-            seen[asked] = ~blocked(built, start[asked], np.array([x_mm, y_mm, 0.0]))
+            seen[asked] = ~blocked(built, start[asked], camera.position_mm)
         count += seen
         traced += asked.size
         report("visibility", done, grid.view_count)
@@ -52,20 +51,18 @@ def visible_views(
     return result, traced
 
 
-def _on_film(size_px: int, grid: CameraGrid, offset_mm: np.ndarray, z_mm: np.ndarray) -> np.ndarray:
-    """Whether points so far from a camera's axis fall on its film, in one of the film's two directions."""
-    return np.abs(offset_mm) * grid.focal_mm < z_mm * (size_px * grid.pixel_mm / 2)
-
-
-def _can_be_blocked(built: Built, grid: CameraGrid, start: np.ndarray) -> np.ndarray:
+def _can_be_blocked(built: Built, rig: Rig, start: np.ndarray) -> np.ndarray:
     """Whether a shape's box may reach between points (N, 3) and any camera; never False by mistake.
 
     At depth s the pyramid from a point at depth z to the cameras is a rectangle, whose sides move linearly
     with s: over the depths of a box each is farthest out at one of the two ends.
     """
+    x_mm, y_mm, z_mm = np.moveaxis(rig.position_mm, -1, 0)
+    if z_mm.any():  # cameras that are not in one plane make no such pyramid
+        return np.ones(len(start), dtype=bool)
     doubtful = np.zeros(len(start), dtype=bool)
     z = start[:, 2]
-    reach = [(camera_x_mm(grid)[0], camera_x_mm(grid)[-1]), (camera_y_mm(grid)[0], camera_y_mm(grid)[-1])]
+    reach = [(x_mm.min(), x_mm.max()), (y_mm.min(), y_mm.max())]
     for shape in built.scene.shapes():
         box = shape.bbox()
         low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)

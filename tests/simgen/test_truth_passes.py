@@ -14,6 +14,7 @@ from pcii.geometry import project_px
 from pcii.score import pixel_masks
 from pcii.types import CameraGrid, Truth
 from simgen import backend, cameras, visibility
+from simgen.cameras import as_rig, centre_camera
 from simgen.coverage import SAMPLES, coverage
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
 from simgen.visibility import visible_views
@@ -129,7 +130,7 @@ def test_coverage_is_the_area_that_the_object_has_of_the_pixel(tmp_path: Path) -
     of = grid(1, 1, 48, 60, pixel_mm=0.1408)
     scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)])
     ids = first_hits_at_centre(scene, of).object_id
-    found = coverage(scene, of, ids, 0.0, 0.0)
+    found = coverage(scene, centre_camera(of), ids)
     fine = np.isfinite(on_sphere(directions(of, 32))).reshape(48, 32, 60, 32)
     ball = fine.mean(axis=(1, 3))
     assert found.dtype == np.float32
@@ -145,7 +146,7 @@ def test_coverage_of_a_card_from_a_camera_off_the_centre(tmp_path: Path) -> None
     of = grid(2, 2, 60, 80)
     scene = built(tmp_path, [card("c", 500.0, 33.0, WHITE)])
     ids = first_hits_of_view(scene, of, 0, 1).object_id
-    found = coverage(scene, of, ids, 3.0, -2.0)
+    found = coverage(scene, as_rig(of).camera(0, 1), ids)
     spans = []
     for size, corner in ((60, -16.5 + 2.0), (80, -16.5 - 3.0)):
         low, high = (size - 1) / 2 + np.array([corner, corner + 33.0]) * 50 / (500 * 0.0704)
