@@ -18,8 +18,8 @@ def coverage(built: Built, camera: Camera, object_id: np.ndarray) -> np.ndarray:
     """Share (H, W) float32 of each pixel's square in which rays hit the object that its centre hits first.
 
     Seen by the camera, without its lens, whose `object_id` (H, W) is given; what is no object (id 0)
-    counts as one. A pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its
-    share is 1: what is lost is only what passes between the centres of pixels.
+    counts as one. A pixel is sampled if it lies at the frame or one of its eight neighbours has another id,
+    else its share is 1: what is lost is only what passes between the centres of pixels.
     """
     share = np.ones(object_id.shape, dtype=np.float32)
     row, col = np.nonzero(_beside_another(object_id))

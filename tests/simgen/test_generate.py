@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zarr
 from tiny import TINY_RECIPE
 
 from pcii.dataset import open_dataset
 from pcii.errors import InputError
-from pcii.store import MANIFEST, RADIANCE
+from pcii.store import MANIFEST, RADIANCE, TRUTH
 from simgen import generate as module
+from simgen.cameras import rig_of
 from simgen.generate import MARKER, generate, verify
 from simgen.recipe import Recipe
 
@@ -167,6 +169,30 @@ def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) ->
     assert dim.truth is not None
     assert dim.truth.photons is not None
     assert dim.truth.photons.z_mm.shape == (dim.counts.total,)
+
+
+def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_path: Path) -> None:
+    errors = {"position_sd_mm": (1.0, 2.0, 0.5), "rotation_sd_deg": (0.2, 0.1, 0.3), "pitch_error": 0.01}
+    wrong = recipe(grid=TINY["grid"] | {"errors": errors})
+    generate(wrong, Path(), tmp_path / "wrong")
+    assert open_dataset(tmp_path / "wrong").grid == open_dataset(made).grid
+    truth, rig = zarr.open_group(tmp_path / "wrong" / TRUTH, mode="r"), rig_of(wrong)
+    np.testing.assert_array_equal(np.asarray(truth["camera_position_mm"]), rig.position_mm)
+    np.testing.assert_array_equal(np.asarray(truth["camera_rotation"]), rig.rotation)
+    own, perfect = digest(tmp_path / "wrong"), digest(made)
+    same = {name for name in perfect if own[name] == perfect[name]}
+    assert any(name.startswith(f"{TRUTH}/z_mm/c/") for name in same)  # the virtual centre has no errors
+    assert not any(name.startswith((f"{TRUTH}/view_z_mm/c/", RADIANCE)) for name in same)
+
+
+def test_errors_of_nothing_change_nothing(made: Path, tmp_path: Path) -> None:
+    generate(recipe(grid=TINY["grid"] | {"errors": {}}), Path(), tmp_path / "none")
+    own, perfect = digest(tmp_path / "none"), digest(made)
+    assert {name: own[name] for name in perfect if name != f"{TRUTH}/zarr.json"} == {
+        name: value for name, value in perfect.items() if name != f"{TRUTH}/zarr.json"
+    }
+    added = {name.split("/")[1] for name in set(own) - set(perfect)}
+    assert added == {"camera_position_mm", "camera_rotation"}
 
 
 def test_a_monochrome_dataset_has_one_channel(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """The majorant's book-keeping: every path has one owner, and no place is ever written off as black."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,16 @@ def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) 
     # Half a tile of blur by the layer's thickness, and shifts are even: half of 2 px more.
     assert np.ptp(at_row) <= 1 + 2 / frame.tile_px
     assert np.ptp(at_col) <= 1 + 2 / frame.tile_px
+
+
+def test_tiles_follow_a_sheared_grid_too() -> None:
+    sheared = replace(GRID, shear_px=(9.5, -6.0))
+    frame = frame_for(sheared, tile_px_for(GRID), np.array([300.0, 420.0, np.inf]))
+    assert frame.row_shift.min() == frame.col_shift.min() == 0
+    k, l = (index.ravel() for index in np.indices((3, 4)))
+    layer = frame.layer_of(np.array([420.0]))[0]
+    row = 47.5 - 6.0 * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 420
+    col = 63.5 + 9.5 * (l - 1.5) + 100 * (-20.0 - (l - 1.5) * 8.0) / 420
+    # As without shear: half a tile of blur, and half of 2 px.
+    assert np.ptp((row + frame.row_shift[layer, k]) / frame.tile_px) <= 1 + 2 / frame.tile_px
+    assert np.ptp((col + frame.col_shift[layer, l]) / frame.tile_px) <= 1 + 2 / frame.tile_px
