@@ -13,13 +13,12 @@ from simgen.targets import load_target
 
 def check(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[str, list[Finding]]:
     """A line that says what was checked, and all findings. Raises `InputError` for invalid files."""
-    recipe, scene, folder = load_target(name_or_path, overrides)
-    grid = recipe.grid
-    line = (
-        f"{recipe.title or scene.title}: {grid.rows} x {grid.cols} views of {grid.height} x {grid.width} "
-        f"pixels, pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm, {recipe.sensor.cfa}"
-    )
-    return line, findings(probe_scene(recipe, scene, folder))
+    target = load_target(name_or_path, overrides)
+    recipe, grid = target.recipe, target.recipe.grid
+    views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
+    pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
+    line = f"{recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
+    return line, findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:

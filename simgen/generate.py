@@ -38,15 +38,16 @@ from pcii.store import (
 )
 from simgen import backend, seeds
 from simgen.asset_names import asset
-from simgen.build import Built, build
+from simgen.build import Built
 from simgen.cameras import rig_of
 from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import full_light_image
 from simgen.exposure import photons_per_radiance
+from simgen.prepared import Prepared, prepare
 from simgen.recipe import Recipe
 from simgen.render import render_view
-from simgen.scene import Scene, load_scene, scene_files
-from simgen.sensor import sense, sensitivities
+from simgen.scene import Scene, scene_files
+from simgen.sensor import sense
 from simgen.truth_file import traced_for_visibility, write_truth
 
 RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
@@ -77,17 +78,15 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     same recipe is resumed, a finished one is checked and left alone; a folder that holds anything
     else is refused with `InputError`.
     """
-    scene, folder = load_scene(recipe.scene, near)
-    curves = sensitivities(recipe, near)
-    identity = _identity(recipe, scene, folder, curves)
+    prepared = prepare(recipe, near)
+    scene, identity = prepared.scene, _identity(prepared)
     finished = _finished(out, identity)
     if finished is not None:
         return finished
     engine = backend.describe(spectral=recipe.is_spectral)
     clock = _Clock()
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
-        mi = backend.load(spectral=recipe.is_spectral)
-        built = build(mi, scene, folder, recipe.render.max_depth, curves)
+        built = prepared.built()
     with _claimed(out, identity, engine):
         sweep_temporaries(out)
         products, photons, made = recipe.products, None, None
@@ -133,11 +132,12 @@ def verify(path: Path, report: Report = silent) -> int:
     return len(files)
 
 
-def _identity(recipe: Recipe, scene: Scene, folder: Path, curves: np.ndarray | None) -> str:
+def _identity(prepared: Prepared) -> str:
     """Hash of all that decides the dataset's content, but for the machine."""
+    scene, folder, curves = prepared.scene, prepared.folder, prepared.curves
     assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
     content = {
-        "recipe": recipe.model_dump(mode="json"),
+        "recipe": prepared.recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),
         "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
         "sensitivities": None if curves is None else curves.tolist(),

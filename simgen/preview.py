@@ -38,10 +38,11 @@ def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
     check_picture_path(out)
-    recipe, scene, folder = load_target(name_or_path)
+    target = load_target(name_or_path)
+    recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
-    built = build(backend.load(), scene, folder, recipe.render.max_depth)
+    built = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
     picture = render_view(built, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
     hits = first_hits_at_centre(built, grid)
     things = hits.object_id > 0
@@ -57,5 +58,5 @@ def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
         frame_part(axes[0], box)
     draw_depth(figure, axes[1], hits.z_mm[box], things[box])
     draw_objects(axes[2], hits.object_id[box], built.names)
-    figure.suptitle(recipe.title or scene.title)
+    figure.suptitle(recipe.title or target.scene.title)
     save_figure(figure, out)

@@ -5,7 +5,6 @@ import os
 import time
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,9 @@ from simgen.build import Built, build
 from simgen.cameras import as_rig
 from simgen.counts import plan
 from simgen.facts import Elsewhere, Facts, ObjectFacts
-from simgen.lights import AreaLight
+from simgen.lights import AreaLight, UniformLight
+from simgen.materials import Material
+from simgen.prepared import Prepared
 from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene
@@ -33,11 +34,11 @@ SAME_DEPTH = 1e-3
 """So near to the backdrop's depth, as a share of it, a hit is taken to be on it."""
 
 
-def probe_scene(recipe: Recipe, scene: Scene, folder: Path) -> Facts:
+def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
-    mi, kind = backend.load(), backend.choose().kind
+    recipe, scene, kind = target.recipe, target.scene, backend.choose().kind
     compiled = kind != "scalar"
-    built = build(mi, scene, folder, recipe.render.max_depth)
+    built = target.built()
     grid = recipe.grid.camera_grid()
     made = plan(recipe, built, kind) if recipe.products.counts else None
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
@@ -49,7 +50,7 @@ def probe_scene(recipe: Recipe, scene: Scene, folder: Path) -> Facts:
     hit_s = (time.perf_counter() - begun) / (len(corners) * centre.z_mm.size)
     boxes = _boxes(built)
     alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
-    hidden = _hidden_shares(built, scene, folder, alone, boxes)
+    hidden = _hidden_shares(built, target, alone, boxes)
     light = image.sum(axis=(0, 1))
     return Facts(
         recipe=recipe,
@@ -89,13 +90,13 @@ def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
 def _picture(built: Built, grid: CameraGrid, recipe: Recipe) -> tuple[np.ndarray, float]:
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
-    total, spent = np.zeros((grid.height, grid.width, 3)), 0.0
+    total, spent = np.zeros((grid.height, grid.width, 1)), 0.0
     for part in (2, 3):  # 0 and 1 are those of the plan; the first here compiles, the second is timed
         seed = seeds.integer(recipe.seed, view=0, stage="probe", part=part)
         begun = time.perf_counter()
-        total += render_view(built, single, 0, 0, samples_per_pixel=SAMPLES, seed=seed) / 2
+        total = total + render_view(built, single, 0, 0, samples_per_pixel=SAMPLES, seed=seed) / 2
         spent = time.perf_counter() - begun
-    image = sense(total, None)[..., None] if recipe.cfa is None else total
+    image = total if recipe.cfa is not None else sense(total, None)[..., None]
     return image, spent / (SAMPLES * grid.height * grid.width)
 
 
@@ -170,19 +171,22 @@ def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
 
 
 def _hidden_shares(
-    built: Built, scene: Scene, folder: Path, grid: CameraGrid, boxes: dict[int, np.ndarray]
+    built: Built, target: Prepared, grid: CameraGrid, boxes: dict[int, np.ndarray]
 ) -> dict[int, float]:
     """Share of each object, seen alone from the virtual centre, that other objects stand before.
 
     Only objects whose boxes appear to overlap another's are looked at alone.
     """
+    lamps = [light for light in target.scene.lights if isinstance(light, AreaLight)]
     together, shares = first_hits_at_centre(built, grid).object_id, dict[int, float]()
-    for number, thing in enumerate(scene.objects, start=1):
+    for number, thing in enumerate(target.scene.objects, start=1):
         others = [box for other, box in boxes.items() if other != number]
         if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
             continue
-        single = scene.model_copy(update={"objects": (thing,), "backdrop": None})
-        alone = first_hits_at_centre(build(built.mi, single, folder, 2), grid).object_id == 1
+        # Only its shape and lamps in view matter, so that no more files than its mesh are needed.
+        plain = thing.model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5))})
+        single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
+        alone = first_hits_at_centre(build(built.mi, single, target.folder, 2), grid).object_id == 1
         before = alone & (together > 0) & (together != number)
         shares[number] = float(before.sum() / alone.sum()) if alone.any() else 0.0
     return shares

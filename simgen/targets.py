@@ -5,13 +5,14 @@ from pathlib import Path
 
 from pcii.errors import InputError
 from simgen.locations import recipe_roots
+from simgen.prepared import Prepared, prepare
 from simgen.recipe import Recipe, load_recipe
-from simgen.scene import Scene, find_scene, load_scene, scene_names
+from simgen.scene import find_scene, scene_names
 from simgen.schema import read_toml, suggestion
 
 
-def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Scene, Path]:
-    """A recipe, its scene and the scene's folder, from the name or path of either.
+def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> Prepared:
+    """A recipe with its scene, from the name or path of either.
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid. A name of
     both a scene and a recipe means the scene; with .toml at its end, the recipe. Raises `InputError`
@@ -26,8 +27,7 @@ def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recip
     else:
         _check_name(name_or_path)
         recipe, near = load_recipe(name_or_path, overrides)
-    scene, folder = load_scene(recipe.scene, near)
-    return recipe, scene, folder
+    return prepare(recipe, near)
 
 
 def _is_scene(name_or_path: str) -> bool:

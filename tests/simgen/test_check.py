@@ -30,6 +30,7 @@ from simgen.check_photons import photon_findings, photons_per_view
 from simgen.check_sight import sight_findings
 from simgen.counts import Plan
 from simgen.facts import Facts, Finding, ObjectFacts
+from simgen.prepared import Prepared
 from simgen.probe_scene import coarser, probe_scene
 from simgen.recipe import Recipe
 from simgen.scene import Scene
@@ -328,7 +329,7 @@ def test_sizes_and_times_read_well() -> None:
 
 def probed(objects: list[dict[str, Any]], lights: list[dict[str, Any]], recipe: dict[str, Any]) -> Facts:
     scene = Scene.model_validate({"title": "test", "objects": objects, "lights": lights})
-    return probe_scene(Recipe.model_validate({"scene": "test"} | recipe), scene, Path())
+    return probe_scene(Prepared(Recipe.model_validate({"scene": "test"} | recipe), scene, Path(), None))
 
 
 GRID = {"rows": 2, "cols": 2, "pitch_mm": [10.0, 10.0], "pixel_mm": 0.8, "height": 64, "width": 64}
