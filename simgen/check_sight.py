@@ -4,6 +4,8 @@ from simgen.cameras import NEAR_CLIP_MM
 from simgen.facts import Facts, Finding, ObjectFacts, listed
 
 MOST_HIDDEN = 0.5
+LEAST_GLASS_DEPTH = 6
+"""Segments of a path: through the two sides of a ball to something lit, and on to a lamp by way of another."""
 
 
 def sight_findings(facts: Facts) -> list[Finding]:
@@ -16,7 +18,7 @@ def sight_findings(facts: Facts) -> list[Finding]:
         found.insert(0, Finding("ok", "objects", text))
     if not facts.objects:
         found = [Finding("warn", "objects", "there are none", "add [[objects]] to the scene")]
-    return found + _wall_findings(facts) + _lamp_findings(facts)
+    return found + _glass_findings(facts) + _wall_findings(facts) + _lamp_findings(facts)
 
 
 def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
@@ -68,6 +70,14 @@ def _why_unseen(facts: Facts, thing: ObjectFacts) -> str:
         return "other objects hide it"
     rows, cols = facts.probe_px
     return f"it is off the film, or smaller than the probe's {rows} x {cols} pixels show"
+
+
+def _glass_findings(facts: Facts) -> list[Finding]:
+    depth = facts.recipe.render.max_depth
+    if not facts.glass or depth >= LEAST_GLASS_DEPTH:
+        return []
+    text = f"{listed(list(facts.glass))}: paths of {depth} segments end inside glass, which looks dark"
+    return [Finding("warn", "glass", text, f"set render.max_depth to {LEAST_GLASS_DEPTH} or more")]
 
 
 def _wall_findings(facts: Facts) -> list[Finding]:

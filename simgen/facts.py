@@ -91,6 +91,8 @@ class Facts:
     """Corner cameras: fewer for a single row or column."""
     lamps_away: tuple[int, ...] = ()
     """Lamps, from 1, that shine away from all objects."""
+    glass: tuple[str, ...] = ()
+    """Names of the objects that are of glass."""
     backdrop_mm: float | None = None
     probe_px: tuple[int, int] = (256, 256)
     """Rows and columns of the probe's film."""

@@ -17,7 +17,7 @@ from simgen.cameras import as_rig
 from simgen.counts import plan
 from simgen.facts import Elsewhere, Facts, ObjectFacts
 from simgen.lights import AreaLight, UniformLight
-from simgen.materials import Material
+from simgen.materials import Glass, Material
 from simgen.prepared import Prepared
 from simgen.recipe import Recipe
 from simgen.render import render_view
@@ -70,6 +70,7 @@ def probe_scene(target: Prepared) -> Facts:
         memory_bytes=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
         corners=len(corners),
         lamps_away=_lamps_away(scene, list(boxes.values())),
+        glass=tuple(thing.name for thing in scene.objects if isinstance(thing.material.finish, Glass)),
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),
     )

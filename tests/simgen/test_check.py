@@ -344,6 +344,14 @@ AWAY = {
 }
 
 
+def test_glass_needs_longer_paths() -> None:
+    (finding,) = (f for f in sight_findings(facts(thing("a", 540), glass=("a",))) if f.subject == "glass")
+    assert finding.verdict == "warn"
+    assert "paths of 3 segments" in finding.text
+    deep = facts(thing("a", 540), recipe={"render": {"max_depth": 6}}, glass=("a",))
+    assert not [f for f in sight_findings(deep) if f.subject == "glass"]
+
+
 @pytest.mark.renders
 def test_the_probe_finds_what_is_hidden_behind_and_beside() -> None:
     objects = [
