@@ -1,6 +1,7 @@
 """How the commands behave: one sentence for bad input, progress on a terminal, plain lines in a log.
 
-Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted. Set PCII_TRACEBACK=1 to see tracebacks.
+Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted, 141 output
+no longer read. Set PCII_TRACEBACK=1 to see tracebacks.
 """
 
 import os
@@ -36,6 +37,9 @@ def run(app: "App", arguments: Sequence[str] | None = None) -> int:
         return _fail(2, str(fault))
     except KeyboardInterrupt:
         return _fail(130, "interrupted; what is finished is kept, run the same command to go on")
+    except BrokenPipeError:  # whoever read the output has read enough, such as `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
     except MemoryError as fault:
         return _fail(1, f"not enough memory: {fault}")
     except Exception as fault:

@@ -32,7 +32,9 @@ class Grid(Strict):
     """The camera grid: parallel cameras in the plane Z = 0, pinholes unless they have a lens."""
 
     rows: Count = 10
+    """Rows of cameras, counted from the top."""
     cols: Count = 10
+    """Columns of cameras, counted from the left."""
     pitch_mm: tuple[Positive, Positive] = (5.0, 5.0)
     """Distance between neighbouring cameras, (x, y)."""
     focal_mm: Positive = 50.0

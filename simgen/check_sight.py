@@ -5,7 +5,7 @@ from simgen.facts import Facts, Finding, ObjectFacts, listed
 
 MOST_HIDDEN = 0.5
 LEAST_GLASS_DEPTH = 6
-"""Segments of a path: through the two sides of a ball to something lit, and on to a lamp by way of another."""
+"""Segments of a path through the two sides of a ball to something lit, and on to a lamp by way of another."""
 
 
 def sight_findings(facts: Facts) -> list[Finding]:

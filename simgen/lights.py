@@ -22,8 +22,11 @@ class AreaLight(Strict):
     target_mm: Position
     """What the lamp faces; behind itself it is dark."""
     width_mm: Length
+    """Across, level if the lamp can be."""
     height_mm: Length
+    """Along its other side."""
     luminance_cd_m2: Positive
+    """How bright its face is; an overcast sky has some 2000, a white sheet at 500 lux 159."""
     illuminant: Illuminant = "D65"
 
     @model_validator(mode="after")
@@ -38,6 +41,7 @@ class PointLight(Strict):
 
     type: Literal["point"] = "point"
     position_mm: Position
+    """Where it stands."""
     intensity_cd: Positive
     """Luminous intensity: lux times square metres."""
     illuminant: Illuminant = "D65"
@@ -48,6 +52,7 @@ class UniformLight(Strict):
 
     type: Literal["uniform"] = "uniform"
     luminance_cd_m2: Positive
+    """Its luminance; a surface that sees nothing else gets pi times as many lux."""
     illuminant: Illuminant = "D65"
 
 
@@ -76,3 +81,4 @@ class Level(Strict):
     illuminance_lux: Positive
     """Direct light, with nothing in the way, on a surface at (0, 0, z_mm) that faces the cameras."""
     z_mm: Length
+    """Where that surface stands."""

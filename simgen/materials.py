@@ -29,6 +29,7 @@ class Metal(Strict):
 
     type: Literal["metal"] = "metal"
     name: Literal["Ag", "Al", "Au", "Cr", "Cu", "W"]
+    """Silver, aluminium, gold, chromium, copper or tungsten."""
     roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
@@ -39,6 +40,7 @@ class Glass(Strict):
 
     type: Literal["glass"] = "glass"
     refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+    """Of the glass against air: 1.5 of windows, 1.33 of water, 1.9 of heavy flint."""
 
 
 Finish = Matt | Plastic | Metal | Glass

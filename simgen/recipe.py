@@ -114,6 +114,7 @@ class Exposure(Strict):
     f_number: Positive = 8.0
     """Focal length by diameter of the aperture."""
     time_s: Positive = 0.01
+    """How long the shutter is open."""
 
 
 class Render(Strict):
@@ -166,13 +167,16 @@ class Recipe(Strict):
     """A dataset: which scene, seen by which cameras, in how much light, and what is kept."""
 
     title: str = ""
+    """What reports and pictures call it; the scene's title unless given."""
     scene: Annotated[str, Field(min_length=1)]
     """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""
     seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    """All that is random follows from it: the same seed, the same bytes."""
     grid: Grid = Grid()
     sensor: Sensor = Sensor()
     photons: Photons = Photons()
     exposure: Exposure | None = None
+    """Needed where light is absolute: photons.scope "exposure", sensor.full_light."""
     render: Render = Render()
     products: Products = Products()
     analysis: Analysis = Analysis()

@@ -38,21 +38,26 @@ class SceneObject(Strict):
     """One named thing that truth and scores know."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=64)]
+    """What truth, scores and pictures call it: a letter, then letters, digits, _ and -."""
     position_mm: Position
     """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
     rotation_deg: Vector = (0.0, 0.0, 0.0)
     """Turns about the X, Y and Z axes, applied in this order, in degrees."""
     shape: Shape
+    """A sphere, card, box, cylinder or mesh."""
     material: Material
+    """Its colour or texture, and its finish."""
 
 
 class Backdrop(Strict):
     """A flat wall parallel to the camera plane, endless for the cameras."""
 
     z_mm: Length
+    """Depth of the wall."""
     reflectance: Reflectance = (0.0, 0.0, 0.0)
     """sRGB, the name of a ColorChecker patch, or a spectrum; as of a material."""
     half_width_mm: Annotated[Real, Field(ge=0, le=LARGEST_MM)] = 5000.0
+    """How far it reaches to each side."""
 
 
 class Scene(Strict):
@@ -61,11 +66,15 @@ class Scene(Strict):
     title: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", max_length=200)]
     """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
+    """What it is for."""
     objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS, fail_fast=True)] = ()
+    """What truth and scores know by name; none makes an empty scene."""
     lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS, fail_fast=True)]
+    """At least one lamp, or light from all around."""
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
+    """A wall behind the objects, which is no object itself."""
 
     @field_validator("lights")
     @classmethod

@@ -16,6 +16,7 @@ class Sphere(Strict):
 
     type: Literal["sphere"] = "sphere"
     radius_mm: Length
+    """From the middle to the surface."""
 
 
 class Card(Strict):
@@ -23,7 +24,9 @@ class Card(Strict):
 
     type: Literal["card"] = "card"
     width_mm: Length
+    """Along X."""
     height_mm: Length
+    """Along Y."""
 
 
 class Box(Strict):
@@ -51,7 +54,9 @@ class Cylinder(Strict):
 
     type: Literal["cylinder"] = "cylinder"
     radius_mm: Length
+    """From the axis to the side."""
     length_mm: Length
+    """Along Y, from end to end."""
 
 
 class Mesh(Strict):
