@@ -2,9 +2,14 @@
 
 import sys
 
-from benchmarks import accuracy, photons, sections
+from benchmarks import accuracy, colour, photons, sections
 
-TABLES = {"sections": sections.table, "accuracy": accuracy.table, "photons": photons.table}
+TABLES = {
+    "sections": sections.table,
+    "accuracy": accuracy.table,
+    "photons": photons.table,
+    "colour": colour.table,
+}
 for name in sys.argv[1:] or TABLES:
     for line in TABLES[name]():
         print(line, flush=True)

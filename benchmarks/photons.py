@@ -5,6 +5,7 @@ The paper's recipe. Dense views are timed on a few views and scaled to all, sinc
 
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from simgen.photons import PhotonList, draw_photons
 from simgen.recipe import Recipe, load_recipe
 from simgen.render import render_view
 from simgen.scene import load_scene
-from simgen.sensor import draw_counts, photon_rates, scope_energies, sense
+from simgen.sensor import draw_counts, photon_rates, scope_energies, sense, sensitivities
 
 DENSE_VIEWS = 4
 
@@ -24,7 +25,8 @@ DENSE_VIEWS = 4
 def setup_of(recipe: Recipe) -> Setup:
     """The recipe's scene and cameras, ready to draw from."""
     scene, folder = load_scene(recipe.scene)
-    built = build(backend.load(), scene, folder, recipe.render.max_depth)
+    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe, Path())
+    built = build(mi, scene, folder, recipe.render.max_depth, curves)
     return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
 
 
