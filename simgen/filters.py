@@ -44,6 +44,8 @@ class Filters:
         for curve in self.sensitivity:
             sensitive, light = (np.interp(fine_nm, WAVELENGTH_NM, one) for one in (curve, self.light))
             often = sensitive * light
+            if not often.any():  # no lamp shines where this pixel sees, but wavelengths must be drawn
+                often = sensitive
             often = (often + FLOOR * often.mean()) * (sensitive > 0)
             steps = (often[1:] + often[:-1]) * np.diff(fine_nm)
             running = np.append(0, np.cumsum(steps))
@@ -76,8 +78,8 @@ class Filters:
 def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:
     """Filters of a camera with relative sensitivities (C, N) to power, in this light (N,).
 
-    A pixel detects every photon where the camera is most sensitive to photons, and elsewhere as many as
-    the curves say: `sensor.quantum_efficiency` is the efficiency there.
+    A pixel detects every photon where the most sensitive of these curves detects most photons, and elsewhere
+    as many as the curves say: `sensor.quantum_efficiency` is the efficiency there.
     """
     to_photons = curves / WAVELENGTH_NM
     detected = to_photons / to_photons.max()

@@ -2,14 +2,16 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from simgen.asset_names import EnvironmentName
 from simgen.schema import Length, Position, Positive, Real, Strict
+from simgen.spectra import known_illuminant
 
 Illuminant = Annotated[
     str,
     Field(max_length=40, description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2."),
+    AfterValidator(known_illuminant),
 ]
 
 

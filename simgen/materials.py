@@ -3,10 +3,11 @@
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simgen.asset_names import ImageName
 from simgen.schema import Colour, Positive, Real, Share, Strict
+from simgen.spectra import WAVELENGTH_NM, known_patch
 from simgen.textures import Texture
 
 
@@ -60,6 +61,8 @@ class Spectrum(Strict):
             raise ValueError("give as many values as wavelengths")
         if any(here >= there for here, there in pairwise(self.wavelength_nm)):
             raise ValueError("wavelength_nm: wavelengths must grow")
+        if self.wavelength_nm[0] >= WAVELENGTH_NM[-1] or self.wavelength_nm[-1] <= WAVELENGTH_NM[0]:
+            raise ValueError("wavelength_nm: light has 380 to 780 nm, and none of these are there")
         return self
 
 
@@ -69,7 +72,11 @@ def _kind_of_reflectance(value: Any) -> str:
     return "spectrum" if isinstance(value, dict | Spectrum) else "colour"
 
 
-PatchName = Annotated[str, Field(description="one of the 24 ColorChecker patches, such as 'dark skin'")]
+PatchName = Annotated[
+    str,
+    Field(description="one of the 24 ColorChecker patches, such as 'dark skin'"),
+    AfterValidator(known_patch),
+]
 Reflectance = Annotated[
     Annotated[Colour, Tag("colour")]
     | Annotated[PatchName, Tag("patch")]

@@ -13,14 +13,17 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
-from simgen.schema import suggestion
+from simgen.schema import LONGEST_PART, shorten, suggestion
 from simgen.srgb import FROM_XYZ, LUMINANCE
 
 WAVELENGTH_NM = np.arange(380.0, 781.0)
 PEAK_NM = 555.0
 """Where a lumen is 1/683 W."""
+DAYLIGHT = "D65"
+"""The white of sRGB."""
 PATCHES = "ColorChecker N Ohta"
 MOST_CSV_BYTES = 1 << 20
+HEAD = ("wavelength_nm", "R", "G", "B")
 
 
 def integral(values: np.ndarray) -> Any:
@@ -33,20 +36,36 @@ def resampled(wavelength_nm: Any, values: Any, *, outside: float | None = None) 
     return np.interp(WAVELENGTH_NM, wavelength_nm, values, left=outside, right=outside)
 
 
+def known_illuminant(name: str) -> str:
+    """The name, if there is such an illuminant, else `InputError`; of D65 this is known without colour."""
+    if name != DAYLIGHT:
+        illuminant(name)
+    return name
+
+
 @cache
 def illuminant(name: str) -> np.ndarray:
-    """Spectrum (N,) of a CIE illuminant at luminance 1. Raises `InputError` for one that is not known."""
+    """Spectrum (N,) of a CIE illuminant at luminance 1.
+
+    Raises `InputError` for one that is not known, or not at all of the wavelengths.
+    """
     table = _colour().SDS_ILLUMINANTS
     if name not in table:
-        raise InputError(f"lights: there is no illuminant {name!r}{suggestion(name, list(table))}")
-    power = resampled(table[name].wavelengths, table[name].values)
+        raise InputError(f"there is no illuminant {name!r}{suggestion(name, list(table))}")
+    told_nm = table[name].wavelengths
+    if told_nm[0] > WAVELENGTH_NM[0] or told_nm[-1] < WAVELENGTH_NM[-1]:
+        raise InputError(
+            f"illuminant {name!r} is only told from {told_nm[0]:g} to {told_nm[-1]:g} nm, and 380 to 780 nm "
+            "are needed; use another, such as D55 or A"
+        )
+    power = resampled(told_nm, table[name].values)
     luminosity = observer()[1]
     return power * (integral(luminosity) / integral(power * luminosity))
 
 
 def tint(name: str) -> np.ndarray:
     """Linear sRGB (3,) of a CIE illuminant at luminance 1; channels outside the gamut are cut to 0."""
-    if name == "D65":  # the white of sRGB; also spares the second that colour takes to load
+    if name == DAYLIGHT:  # also spares the second that colour takes to load
         return np.ones(3)
     rgb = np.clip(FROM_XYZ @ integral(observer() * illuminant(name)), 0, None)
     return rgb / (LUMINANCE @ rgb)
@@ -59,12 +78,18 @@ def observer() -> np.ndarray:
     return np.array([resampled(table.wavelengths, row) for row in table.values.T])
 
 
+def known_patch(name: str) -> str:
+    """The name, if there is such a patch, else `InputError`."""
+    patch(name)
+    return name
+
+
 @cache
 def patch(name: str) -> np.ndarray:
     """Reflectance (N,) of a ColorChecker patch by its name, such as "dark skin" or "neutral 5"."""
     table = _patches()
     if name not in table:
-        raise InputError(f"reflectance: there is no patch {name!r}{suggestion(name, list(table))}")
+        raise InputError(f"there is no patch {name!r}{suggestion(name, list(table))}")
     return resampled(table[name].wavelengths, table[name].values)
 
 
@@ -81,7 +106,7 @@ def patch_names() -> list[str]:
 
 def linear_srgb(reflectance: np.ndarray) -> np.ndarray:
     """Linear sRGB (3,) of a reflectance (N,) in daylight D65; what sRGB cannot show is cut to [0, 1]."""
-    white = illuminant("D65")
+    white = illuminant(DAYLIGHT)
     xyz = integral(observer() * white * reflectance) / integral(observer()[1] * white)
     return np.clip(FROM_XYZ @ xyz, 0, 1)
 
@@ -89,8 +114,8 @@ def linear_srgb(reflectance: np.ndarray) -> np.ndarray:
 def sensitivity(camera: str, near: Path) -> np.ndarray:
     """Relative sensitivities (3, N) of R, G and B to light's power, or (1, N); the highest value is 1.
 
-    `camera` is one that colour-science ships, or a CSV file (in the folder `near`): a head, then
-    rows of wavelength_nm, R, G, B, or of wavelength_nm and one value. Raises `InputError`.
+    `camera` is one that colour-science ships, or a CSV file (in the folder `near`): the head
+    wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
     """
     if camera.lower().endswith(".csv"):
         wavelength_nm, curves = _read_csv(near / camera)
@@ -100,8 +125,10 @@ def sensitivity(camera: str, near: Path) -> np.ndarray:
             raise InputError(f"sensor.camera: there is no camera {camera!r}{suggestion(camera, list(table))}")
         wavelength_nm, curves = table[camera].wavelengths, table[camera].values
     rows = np.array([resampled(wavelength_nm, row, outside=0.0) for row in np.transpose(curves)])
-    if not rows.max() > 0:
-        raise InputError(f"sensor.camera: {camera!r} sees no light from 380 to 780 nm")
+    blind = np.flatnonzero(rows.max(axis=1) <= 0)
+    if blind.size:
+        colour = f" in {'RGB'[blind[0]]}" if len(rows) == 3 else ""
+        raise InputError(f"sensor.camera: {camera!r} sees no light from 380 to 780 nm{colour}")
     return rows / rows.max()
 
 
@@ -111,8 +138,8 @@ def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
             raise InputError(f"{path}: there is no such file")
         if path.stat().st_size > MOST_CSV_BYTES:
             raise InputError(f"{path}: sensitivities take no more than {MOST_CSV_BYTES} bytes")
-        with path.open(newline="", encoding="utf-8") as file:
-            head, *rows = [row for row in csv.reader(file) if row]
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
         table = np.array(rows, dtype=np.float64)
     except (OSError, ValueError, csv.Error):
         raise InputError(
@@ -120,6 +147,11 @@ def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
         ) from None
     if table.ndim != 2 or table.shape[1] not in (2, 4) or len(head) != table.shape[1]:
         raise InputError(f"{path}: expected the columns wavelength_nm, R, G, B, or two for one curve")
+    if head[0] != HEAD[0] or (len(head) == len(HEAD) and tuple(head) != HEAD):
+        raise InputError(
+            f"{path}: its first line must be {','.join(HEAD)}, or {HEAD[0]} and a name of one curve; "
+            f"it is {shorten(','.join(head), LONGEST_PART)}"
+        )
     if not np.isfinite(table).all() or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
         raise InputError(f"{path}: wavelengths must grow and sensitivities be finite and not negative")
     return table[:, 0], table[:, 1:]

@@ -91,7 +91,8 @@ class Wavelengths:
         """See `Light`: of the spectrum of most of the light."""
         dr = load_drjit()
         chosen_nm, _ = self._drawn(colour, hue)
-        own = of_colour(ambient, colour) / dr.gather(self.mi.Float, self.white, colour)
+        white = dr.gather(self.mi.Float, self.white, colour)
+        own = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
         return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * own for here_nm in chosen_nm))
 
     def looks(self, colour: Any) -> Iterator[Any]:

@@ -43,9 +43,9 @@ PCII_LEVELS = [
 SIMGEN_LEVELS = [
     {"locations", "seeds", "srgb"},
     {"backend", "schema", "asset_names", "triangles"},
-    {"textures", "areas"},
+    {"textures", "areas", "spectra"},
     {"shapes", "materials", "lights", "camera_grid"},
-    {"spectra", "solids", "read_ply", "read_obj", "read_image", "paint"},
+    {"solids", "read_ply", "read_obj", "read_image", "paint"},
     {"recipe", "scene", "filters", "asset_worker"},
     {"assets"},
     {"cameras", "shifts", "figures", "thumbnails", "build_shape", "build_colour"},

@@ -1,12 +1,16 @@
-"""Spectra of lights, surfaces and cameras, and the wavelengths that are drawn: no renderer needed."""
+"""Spectra of lights, surfaces and cameras, their names in scenes, and the wavelengths that are drawn."""
 
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pcii.errors import InputError
 from simgen.filters import CELLS, Filters, filters_for
+from simgen.scene import Scene
 from simgen.schema import validate
 from simgen.spectra import (
     WAVELENGTH_NM,
@@ -112,12 +116,79 @@ def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
         ("wavelength_nm,R,G,B\n400,1,-1,2\n500,1,1,1\n", "not negative"),
         ("wavelength_nm,R,G,B\n900,1,1,2\n950,1,1,1\n", "sees no light"),
         ("wavelength_nm,R,G,B\n400,a,1,2\n500,1,1,1\n", "cannot be read"),
+        ("wavelength_nm,R,G,B\n400,0,1,2\n500,0,1,1\n", "sees no light from 380 to 780 nm in R"),
+        ("wavelength_nm,B,G,R\n400,1,1,2\n500,1,1,1\n", "first line must be wavelength_nm,R,G,B"),
+        ("nm,y\n400,1\n500,1\n", "first line must be wavelength_nm"),
+        ("400,1,1,2\n500,1,1,1\n600,1,1,1\n", "first line must be wavelength_nm,R,G,B"),
     ],
 )
 def test_bad_csv_files_are_told(tmp_path: Path, text: str, says: str) -> None:
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(InputError, match=says):
         sensitivity("bad.csv", tmp_path)
+
+
+def test_a_csv_file_as_spreadsheets_write_it(tmp_path: Path) -> None:
+    text = "\ufeffwavelength_nm, luminosity\r\n400, 0\r\n\r\n500, 2\r\n600, 0\r\n"
+    (tmp_path / "mine.csv").write_text(text, encoding="utf-8")
+    curve = sensitivity("mine.csv", tmp_path)
+    assert curve.shape == (1, WAVELENGTH_NM.size)
+    np.testing.assert_allclose(curve[0, WAVELENGTH_NM == 450], 0.5)
+
+
+def test_a_pixel_that_no_lamp_shines_for_is_dark_and_no_fault() -> None:
+    curve = np.where(WAVELENGTH_NM <= 384, 1.0, 0.0)
+    light = illuminant("LED-B4")
+    assert (light[WAVELENGTH_NM <= 385] == 0).all()
+    filters = filters_for(curve[None], light)
+    assert filters.white[0] == 0
+    chosen_nm, weight = filters.draw(np.zeros(100, dtype=np.int64), np.linspace(0, 0.99, 100))
+    assert chosen_nm.min() >= 380
+    assert chosen_nm.max() <= 385 + 1e-3
+    # Light that no lamp is known to have would be seen.
+    assert weight.sum(axis=1).mean() == pytest.approx(integral(filters.sensitivity[0]), rel=0.02)
+
+
+def test_tables_that_end_before_light_does_are_refused() -> None:
+    with pytest.raises(InputError, match="only told from 350 to 690 nm"):
+        illuminant("ISO 7589 Photoflood")
+
+
+def scene_of(reflectance: object, lamp: str) -> dict[str, Any]:
+    card = {
+        "name": "card",
+        "position_mm": (0, 0, 500),
+        "shape": {"type": "card", "width_mm": 9, "height_mm": 9},
+        "material": {"reflectance": reflectance},
+    }
+    light = {"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}
+    return {"title": "test", "objects": [card], "lights": [light]}
+
+
+def test_names_that_do_not_exist_are_told_with_their_place_in_the_scene() -> None:
+    says = r"^scene\.toml: 'objects\[0\]\.material\.reflectance': there is no patch 'darkskin'; did you mean"
+    with pytest.raises(InputError, match=says):
+        validate(Scene, scene_of("darkskin", "D65"), "scene.toml")
+    with pytest.raises(InputError, match=r"^scene\.toml: 'lights\[0\]\.illuminant': there is no illuminant"):
+        validate(Scene, scene_of("dark skin", "D655"), "scene.toml")
+    values = scene_of("dark skin", "D65") | {"backdrop": {"z_mm": 900, "reflectance": "gray"}}
+    with pytest.raises(InputError, match=r"'backdrop\.reflectance': there is no patch 'gray'; known are"):
+        validate(Scene, values, "scene.toml")
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("reflectance", "loads"), [([0.2, 0.3, 0.4], False), ("dark skin", True)])
+def test_colour_science_is_loaded_only_for_scenes_that_need_it(reflectance: object, loads: bool) -> None:
+    script = f"""
+import sys
+import pathlib
+from simgen import backend, build, scene
+world = scene.Scene.model_validate({scene_of(reflectance, "D65")})
+build.build(backend.load(), world, pathlib.Path(), 2)
+print("colour" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == str(loads)
 
 
 def test_unknown_names_get_a_suggestion() -> None:
@@ -134,6 +205,7 @@ def test_unknown_names_get_a_suggestion() -> None:
     [
         ({"wavelength_nm": [400, 500], "value": [0.1]}, "as many values"),
         ({"wavelength_nm": [500, 400], "value": [0.1, 0.2]}, "must grow"),
+        ({"wavelength_nm": [0.4, 0.7], "value": [0.1, 0.2]}, "light has 380 to 780 nm"),
         ({"wavelength_nm": [400, 500], "value": [0.1, 1.2]}, r"reflectance\.value\[1\]"),
         ({"wavelength_nm": [400, 500], "values": [0.1, 0.2]}, r"reflectance\.values'; did you mean 'value'"),
         ([0.1, 0.2], r"reflectance\[2\]' is missing"),

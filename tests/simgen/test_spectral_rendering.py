@@ -15,7 +15,7 @@ from simgen.candidates import Setup
 from simgen.counts import absolute_gain
 from simgen.exposure import PHOTONS_PER_LUMEN_SECOND
 from simgen.photons import draw_photons
-from simgen.recipe import Recipe
+from simgen.recipe import Photons, Recipe
 from simgen.render import render_view
 from simgen.scene import Scene
 from simgen.sensor import sensitivities
@@ -215,3 +215,22 @@ def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> 
     assert abs((score**2).sum() - 288) < 5 * np.sqrt(2 * 288)
     assert abs(score).max() < 5
     assert photons.log["overshoot_photons"] <= max(1e-4 * photons.k.size, 3)
+
+
+def test_photons_come_only_to_pixels_that_a_lamp_shines_for(tmp_path: Path) -> None:
+    """An LED has no light from 380 to 390 nm, where the blue pixels of this camera see all they see."""
+    rows = ["380,0,0,1", "386,0,0,1", "387,0,0,0", "500,1,1,0", "700,1,1,0"]
+    (tmp_path / "violet.csv").write_text("\n".join(["wavelength_nm,R,G,B", *rows]))
+    made = recipe("violet.csv", grid={"rows": 1, "cols": 1, "height": 24, "width": 24, "pixel_mm": PIXEL_MM})
+    led = {"type": "uniform", "luminance_cd_m2": 100.0, "illuminant": "LED-B4"}
+    scene = Scene.model_validate(
+        {"title": "test", "lights": [led], "objects": [ball("grey", 0, 600, (1, 1, 1))]}
+    )
+    built = build(backend.load(spectral=True), scene, tmp_path, 2, sensitivities(made, tmp_path))
+    photons = draw_photons(Setup(built, made.grid.camera_grid(), made.cfa, 2), Photons(budget=2000), seed=2)
+    colours = colour_index(24, 24, made.cfa)[photons.i, photons.j]
+    found = np.bincount(colours, minlength=3)
+    # Red and green pixels are as sensitive, and there are twice as many green ones.
+    assert found[2] == 0
+    assert abs(found[0] - found.sum() / 3) < 5 * np.sqrt(2 / 9 * found.sum())
+    assert abs(found.sum() - 2000) < 5 * np.sqrt(2000)
