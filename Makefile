@@ -1,13 +1,14 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
 # make bench  run time against error; TABLES="sections" for one table
+# make gallery  docs/gallery.md and its pictures, of every scene that ships
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out
 
-.PHONY: demo test bench format clean llvm
+.PHONY: demo test bench gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -41,6 +42,9 @@ test: llvm
 bench: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
 	$(BIN)/python -m benchmarks $(TABLES)
+
+gallery: llvm
+	$(BIN)/python docs/make_gallery.py
 
 format: $(VENV)/.ready
 	$(BIN)/ruff check --fix .

@@ -62,7 +62,8 @@ def disparity_findings(facts: Facts) -> list[Finding]:
         f"farthest, {far:.0f} mm; {spread:.1f} px of blur between them"
     )
     pitch = " x ".join(f"{p * LEAST_APART_PX / max(spread, 1e-9):.3g}" for p in grid.pitch_mm)
-    remedy = f"a pitch of {pitch} mm makes it {LEAST_APART_PX:g} px" if spread > 0 else "all is at one depth"
+    flat = spread < ONE_PLANE_PX
+    remedy = "all is at one depth" if flat else f"a pitch of {pitch} mm makes it {LEAST_APART_PX:g} px"
     few = spread < LEAST_SPREAD_PX
     found.insert(0, Finding("warn" if few else "ok", "disparity", text, remedy if few else ""))
     across, down = disparities_px(grid, near)

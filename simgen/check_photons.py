@@ -23,7 +23,8 @@ def photon_findings(facts: Facts) -> list[Finding]:
     for place, share in facts.elsewhere.items():
         lost = photons_per_view(facts, share) / total
         if lost > 0.0005:
-            remedy = "darken it, or raise photons.budget for the objects" if lost > MOST_LOST_SHARE else ""
+            much = lost > MOST_LOST_SHARE and bool(facts.seen)
+            remedy = "darken it, or raise photons.budget for the objects" if much else ""
             text = f"{place}: {lost:.1%} of the photons"
             found.append(Finding("warn" if remedy else "ok", "photons", text, remedy))
     return found + _false_findings(facts, total)

@@ -17,6 +17,9 @@ EMPTY = "0.93"
 GOLDEN = 0.6180339887
 MARGIN = 0.42
 """Room for names beside the picture, as a share of its width."""
+DOTS_PER_INCH = 110
+LEAST_DEPTH_MM = 1.0
+"""The colours of a picture of depth span so much at least."""
 
 
 def check_picture_path(out: Path) -> None:
@@ -55,7 +58,7 @@ def new_figure(width_in: float, height_in: float) -> Any:
     return figure
 
 
-def save_figure(figure: Any, out: Path, dots_per_inch: int = 110) -> None:
+def save_figure(figure: Any, out: Path, dots_per_inch: int = DOTS_PER_INCH) -> None:
     """Write a figure whole or not at all; `InputError` where writing is not allowed."""
     kind = "png" if out.suffix.lower() == ".png" else "jpeg"
     buffer = io.BytesIO()
@@ -88,6 +91,9 @@ def draw_depth(figure: Any, axes: Any, z_mm: np.ndarray, shown: np.ndarray) -> N
     values = np.where(shown, z_mm, np.nan)
     image = axes.imshow(values, cmap="viridis_r", interpolation="nearest")
     if shown.any():
+        middle, half = (z_mm[shown].max() + z_mm[shown].min()) / 2, np.ptp(z_mm[shown]) / 2
+        half = max(half, LEAST_DEPTH_MM / 2)  # what is flat is no picture of rounding errors
+        image.set_clim(middle - half, middle + half)
         bar = figure.colorbar(image, ax=axes, label="z (mm)", shrink=0.85, pad=0.02)
         bar.ax.invert_yaxis()
     else:
@@ -128,8 +134,7 @@ def draw_objects(axes: Any, object_id: np.ndarray, names: Mapping[int, str]) -> 
                 va="center",
                 fontsize=8,
             )
-    left = MARGIN * width if half else 0.05 * width
-    axes.set_xlim(-0.5 - left, width - 0.5 + MARGIN * width)
+    axes.set_xlim(-0.5 - MARGIN * width, width - 0.5 + MARGIN * width)
     axes.set_ylim(height - 0.5, -0.5)
 
 

@@ -9,6 +9,7 @@ from pcii.errors import InputError
 from simgen import backend
 from simgen.build import build
 from simgen.figures import (
+    DOTS_PER_INCH,
     check_picture_path,
     draw_depth,
     draw_objects,
@@ -30,7 +31,9 @@ PANEL_IN = 4.8
 """Height of a picture's panel."""
 
 
-def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
+def write_preview(
+    name_or_path: str, out: Path, samples_per_pixel: int, dots_per_inch: int = DOTS_PER_INCH
+) -> None:
     """Write the preview of a scene or of a recipe's, a PNG or JPEG.
 
     Raises `InputError` for a bad scene or recipe, and for a picture that cannot be written there.
@@ -59,4 +62,4 @@ def write_preview(name_or_path: str, out: Path, samples_per_pixel: int) -> None:
     draw_depth(figure, axes[1], hits.z_mm[box], things[box])
     draw_objects(axes[2], hits.object_id[box], built.names)
     figure.suptitle(recipe.title or target.scene.title)
-    save_figure(figure, out)
+    save_figure(figure, out, dots_per_inch)

@@ -1,22 +1,27 @@
 """What `check` and `preview` look at: a scene or a recipe, by name or path."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pcii.errors import InputError
 from simgen.locations import recipe_roots
+from simgen.materials import Glass
 from simgen.prepared import Prepared, prepare
-from simgen.recipe import Recipe, load_recipe
+from simgen.recipe import Recipe, Render, load_recipe
 from simgen.scene import find_scene, scene_names
 from simgen.schema import read_toml, suggestion
+
+GLASS_DEPTH = 8
+"""Longest light path with which a scene with glass is looked at: through a ball or a pane and back."""
 
 
 def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> Prepared:
     """A recipe with its scene, from the name or path of either.
 
-    A scene is looked at as by a recipe that says nothing else: with the paper's camera grid. A name of
-    both a scene and a recipe means the scene; with .toml at its end, the recipe. Raises `InputError`
-    for what is missing or not valid.
+    A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
+    longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
+    .toml at its end, the recipe. Raises `InputError` for what is missing or not valid.
     """
     if _is_scene(name_or_path):
         if overrides:
@@ -27,7 +32,11 @@ def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> Prepared:
     else:
         _check_name(name_or_path)
         recipe, near = load_recipe(name_or_path, overrides)
-    return prepare(recipe, near)
+    target = prepare(recipe, near)
+    if near is None and any(isinstance(thing.material.finish, Glass) for thing in target.scene.objects):
+        longer = recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
+        return replace(target, recipe=longer)
+    return target
 
 
 def _is_scene(name_or_path: str) -> bool:

@@ -1,0 +1,55 @@
+"""Draw every shipped scene into docs/gallery/ and list them in docs/gallery.md: `make gallery`."""
+
+from pathlib import Path
+
+from simgen.preview import write_preview
+from simgen.recipe import load_recipe
+from simgen.scene import load_scene
+
+DOCS = Path(__file__).resolve().parent
+SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"
+SAMPLES_PER_PIXEL = 128
+DOTS_PER_INCH = 62
+"""Keeps a picture below 60 kB."""
+
+HEAD = """# Scenes
+
+What ships in `scenes/`: `simgen check NAME` and `simgen preview NAME -o look.png` take a scene by its name,
+`simgen generate data_recipes/NAME.toml -o out/NAME` makes the data of a recipe. Each scene.toml has comments
+to learn from. Pictures from the virtual centre of the paper's camera grid; the frame in the left one is what
+the others show enlarged. All of this page is made by `make gallery`.
+"""
+
+
+def scene_names() -> list[str]:
+    """Of the scenes that ship, the paper's first."""
+    names = {file.parent.name for file in SCENES.glob("*/scene.toml")}
+    return sorted(names, key=lambda name: (name != "two_objects", name))
+
+
+def page() -> str:
+    """The text of gallery.md: title, purpose, recipes and picture of each scene."""
+    recipes: dict[str, list[str]] = {}
+    for file in sorted(RECIPES.glob("*.toml")):
+        recipe, _ = load_recipe(str(file))
+        recipes.setdefault(recipe.scene, []).append(f"`{file.stem}`")
+    parts = [HEAD]
+    for name in scene_names():
+        scene, _ = load_scene(str(SCENES / name))
+        purpose = " ".join(scene.description.split())
+        made = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
+        parts.append(f"## {name}\n\n{purpose}{made}\n\n![{scene.title}](gallery/{name}.jpg)\n")
+    return "\n".join(parts)
+
+
+def main() -> None:
+    """Write all pictures and the page."""
+    folder = DOCS / "gallery"
+    folder.mkdir(exist_ok=True)
+    for name in scene_names():
+        write_preview(str(SCENES / name), folder / f"{name}.jpg", SAMPLES_PER_PIXEL, DOTS_PER_INCH)
+    (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
