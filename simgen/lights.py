@@ -5,12 +5,16 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from simgen.asset_names import EnvironmentName
-from simgen.schema import Length, Position, Positive, Real, Strict
-from simgen.spectra import known_illuminant
+from simgen.schema import Length, Position, Positive, Real, Strict, completed_by
+from simgen.spectra import illuminant_names, known_illuminant
 
 Illuminant = Annotated[
     str,
-    Field(max_length=40, description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2."),
+    Field(
+        max_length=40,
+        description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.",
+        json_schema_extra=completed_by("enum", illuminant_names),
+    ),
     AfterValidator(known_illuminant),
 ]
 

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simgen.asset_names import ImageName
-from simgen.schema import Colour, Positive, Real, Share, Strict
-from simgen.spectra import WAVELENGTH_NM, known_patch
+from simgen.schema import Colour, Positive, Real, Share, Strict, completed_by
+from simgen.spectra import WAVELENGTH_NM, known_patch, patch_names
 from simgen.textures import Texture
 
 
@@ -74,7 +74,10 @@ def _kind_of_reflectance(value: Any) -> str:
 
 PatchName = Annotated[
     str,
-    Field(description="one of the 24 ColorChecker patches, such as 'dark skin'"),
+    Field(
+        description="one of the 24 ColorChecker patches, such as 'dark skin'",
+        json_schema_extra=completed_by("enum", patch_names),
+    ),
     AfterValidator(known_patch),
 ]
 Reflectance = Annotated[

@@ -19,10 +19,12 @@ from simgen.schema import (
     Share,
     Strict,
     Whole,
+    completed_by,
     read_toml,
     suggestion,
     validate,
 )
+from simgen.spectra import camera_names
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
 ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
@@ -59,7 +61,7 @@ class Sensor(Strict):
 
     cfa: Cfa = "GRBG"
     """Bayer pattern by its first two rows, or "none" for a monochrome sensor."""
-    camera: str | None = None
+    camera: Annotated[str | None, Field(json_schema_extra=completed_by("examples", camera_names))] = None
     """A camera's spectral sensitivities: by a name that colour-science has, such as "Nikon 5100 (NPL)", or a
     CSV file beside the recipe. Light is then traced as spectra; without, as linear sRGB, which is faster."""
     quantum_efficiency: tuple[Efficiency, Efficiency, Efficiency] = (1.0, 1.0, 1.0)

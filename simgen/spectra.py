@@ -51,6 +51,21 @@ def _measured(table: Any, *, outside: float | None = None) -> np.ndarray:
     return np.clip(aligned.values.T, 0, None)
 
 
+def illuminant_names() -> list[str]:
+    """Names of the illuminants that are told at all wavelengths."""
+    tables = _colour().SDS_ILLUMINANTS.items()
+    return [name for name, table in tables if _is_told_at_all(table)]
+
+
+def camera_names() -> list[str]:
+    """Names of the cameras that colour-science has."""
+    return list(_colour().MSDS_CAMERA_SENSITIVITIES)
+
+
+def _is_told_at_all(table: Any) -> bool:
+    return bool(table.wavelengths[0] <= WAVELENGTH_NM[0] and table.wavelengths[-1] >= WAVELENGTH_NM[-1])
+
+
 def known_illuminant(name: str) -> str:
     """The name, if there is such an illuminant, else `InputError`; of D65 this is known without colour."""
     if name != DAYLIGHT:
@@ -66,9 +81,9 @@ def illuminant(name: str) -> np.ndarray:
     """
     table = _colour().SDS_ILLUMINANTS
     if name not in table:
-        raise InputError(f"there is no illuminant {name!r}{suggestion(name, list(table))}")
-    told_nm = table[name].wavelengths
-    if told_nm[0] > WAVELENGTH_NM[0] or told_nm[-1] < WAVELENGTH_NM[-1]:
+        raise InputError(f"there is no illuminant {name!r}{suggestion(name, illuminant_names())}")
+    if not _is_told_at_all(table[name]):
+        told_nm = table[name].wavelengths
         raise InputError(
             f"illuminant {name!r} is only told from {told_nm[0]:g} to {told_nm[-1]:g} nm, and 380 to 780 nm "
             "are needed; use another, such as D55 or A"
