@@ -14,10 +14,12 @@ from simgen.build import Built, build
 from simgen.counts import Plan, absolute_gain, draw_from_views, plan, thin
 from simgen.detector import Arrivals
 from simgen.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
+from simgen.filters import filters_for
 from simgen.recipe import Exposure, Recipe
 from simgen.render import render_view
 from simgen.scene import Scene
 from simgen.sensor import sense
+from simgen.spectra import illuminant, integral, observer, patch, sensitivity
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
@@ -75,6 +77,20 @@ def test_a_lux_of_green_is_so_many_photons() -> None:
 def test_photons_per_radiance_are_those_by_hand() -> None:
     found = photons_per_radiance(Exposure(f_number=F_NUMBER, time_s=TIME_S), PIXEL_MM)
     assert LUMINANCE_CD_M2 * found == pytest.approx(BY_HAND, rel=1e-3)
+
+
+def test_the_guides_example_has_these_photons() -> None:
+    """`docs/light.md`: "neutral 5" in 0.01 lux of D65 at f/8, 10 ms and 35.2 um, in RGB mode and spectral."""
+    gain = photons_per_radiance(Exposure(f_number=8.0, time_s=0.01), 0.0352)
+    assert gain == pytest.approx(622.0, abs=0.05)
+    per_cd = gain * 0.01 / math.pi
+    grey, d65, a = patch("neutral 5"), illuminant("D65"), illuminant("A")
+    seen = per_cd * integral(observer()[1] * d65 * grey) / integral(observer()[1])
+    assert seen == pytest.approx(0.402, abs=5e-4)
+    nikon = sensitivity("Nikon 5100 (NPL)", Path())
+    for lamp, photons in ((d65, (0.193, 0.333, 0.284)), (a, (0.266, 0.251, 0.114))):
+        found = per_cd * integral(filters_for(nikon, lamp).sensitivity * lamp * grey)
+        np.testing.assert_allclose(found, photons, atol=5e-4)
 
 
 def test_photons_grow_with_time_and_with_areas() -> None:
