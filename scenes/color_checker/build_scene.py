@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+HERE = Path(__file__).resolve().parent
 ROWS = (
     ("dark skin", "light skin", "blue sky", "foliage", "blue flower", "bluish green"),
     ("orange", "purplish blue", "moderate red", "purple", "yellow green", "orange yellow"),
@@ -62,7 +63,7 @@ def scene() -> str:
     return HEAD + "".join(cards)
 
 
-def main(folder: Path = Path(__file__).resolve().parent) -> None:
+def main(folder: Path = HERE) -> None:
     """Write the scene into the folder."""
     (folder / "scene.toml").write_text(scene(), encoding="utf-8")
 

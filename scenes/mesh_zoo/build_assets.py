@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+HERE = Path(__file__).resolve().parent
 RING_MM = (46.0, 17.0)
 """Radius of the ring's middle line and of its tube."""
 KNOT_MM = (21.0, 9.5)
@@ -38,7 +39,13 @@ def tube(line: Callable[[np.ndarray], np.ndarray], radius: float, around: int, a
     u, v = np.meshgrid(np.linspace(0, 1, around + 1), np.linspace(0, 1, across + 1), indexing="ij")
     first = (np.arange(around)[:, None] * (across + 1) + np.arange(across)[None]).ravel()
     quads = np.stack([first, first + across + 1, first + across + 2, first + 1], axis=1)
-    return positions.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2), quads
+    values = positions.reshape(-1, 3), normals.reshape(-1, 3), np.stack([u, v], -1).reshape(-1, 2)
+    return *(rounded(part) for part in values), quads
+
+
+def rounded(values: np.ndarray) -> np.ndarray:
+    """To four digits behind the point, without -0: the same on every machine."""
+    return np.round(values, 4) + 0.0
 
 
 def ring(t: np.ndarray) -> np.ndarray:
@@ -63,7 +70,7 @@ def gear() -> tuple[np.ndarray, list[list[int]]]:
     ]
     rim = [(radius * math.cos(angle), radius * math.sin(angle)) for radius, angle in corners]
     bore = [(hole * math.cos(angle), hole * math.sin(angle)) for _, angle in corners]
-    positions = np.array([(x, y, z) for z in (-half, half) for line in (rim, bore) for x, y in line])
+    positions = rounded(np.array([(x, y, z) for z in (-half, half) for line in (rim, bore) for x, y in line]))
     n = len(rim)
     quads = []
     for here in range(n):
@@ -79,16 +86,16 @@ def gear() -> tuple[np.ndarray, list[list[int]]]:
 
 def obj_of_tube(positions: np.ndarray, normals: np.ndarray, texcoords: np.ndarray, quads: np.ndarray) -> str:
     """As Wavefront OBJ, indices from 1."""
-    lines = [f"v {x:.3f} {y:.3f} {z:.3f}" for x, y, z in positions]
-    lines += [f"vt {u:.4f} {v:.4f}" for u, v in texcoords]
-    lines += [f"vn {x:.3f} {y:.3f} {z:.3f}" for x, y, z in normals]
+    lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in positions]
+    lines += [f"vt {u:g} {v:g}" for u, v in texcoords]
+    lines += [f"vn {x:g} {y:g} {z:g}" for x, y, z in normals]
     lines += ["f " + " ".join(f"{i}/{i}/{i}" for i in quad) for quad in quads + 1]
     return "\n".join(lines) + "\n"
 
 
 def obj_of_gear(positions: np.ndarray, quads: list[list[int]]) -> str:
     """Positions and faces alone: flat faces, no texture."""
-    lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in positions]
+    lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in positions]
     lines += ["f " + " ".join(str(i + 1) for i in quad) for quad in quads]
     return "\n".join(lines) + "\n"
 
@@ -108,7 +115,7 @@ def ply_of_tube(
     return head.encode("ascii") + vertices.tobytes() + faces.tobytes()
 
 
-def main(folder: Path = Path(__file__).resolve().parent) -> None:
+def main(folder: Path = HERE) -> None:
     """Write the meshes into the folder."""
     (folder / "ring.obj").write_text(obj_of_tube(*tube(ring, RING_MM[1], 48, 14)))
     (folder / "gear.obj").write_text(obj_of_gear(*gear()))

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
+HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT = 256, 128
 SUN_DEG = (-130.0, 40.0)
 """Longitude from straight ahead to the right, and height: behind the cameras to the left."""
@@ -37,7 +38,7 @@ def sky() -> np.ndarray:
     return (picture + sun[..., None] * [60.0, 54.0, 44.0]).astype(np.float16)
 
 
-def main(folder: Path = Path(__file__).resolve().parent) -> None:
+def main(folder: Path = HERE) -> None:
     """Write the environment into the folder."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with OpenEXR.File(header, {"RGB": sky()}) as file:

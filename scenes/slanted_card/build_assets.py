@@ -5,6 +5,7 @@ from pathlib import Path
 import matplotlib as mpl
 from PIL import Image, ImageDraw, ImageFont
 
+HERE = Path(__file__).resolve().parent
 NEAR_MM, FAR_MM = 500, 700
 WIDTH, HEIGHT = 1500, 150
 """Pixels."""
@@ -29,7 +30,7 @@ def scale() -> Image.Image:
     return page
 
 
-def main(folder: Path = Path(__file__).resolve().parent) -> None:
+def main(folder: Path = HERE) -> None:
     """Write the picture into the folder."""
     scale().save(folder / "scale.png", optimize=True)
 

@@ -1,4 +1,4 @@
-"""Paint picture.png, a house on a hill that is neither symmetric nor flat anywhere: run it without arguments."""
+"""Paint picture.png, a house on a hill that is not symmetric: run it without arguments."""
 
 import math
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
+HERE = Path(__file__).resolve().parent
 WIDTH, HEIGHT, FINER = 640, 480, 3
 """Pixels of the picture, and how many times finer it is painted."""
 
@@ -55,7 +56,7 @@ def picture() -> Image.Image:
     return page.resize((WIDTH, HEIGHT), Image.Resampling.BOX).quantize(64, dither=Image.Dither.NONE)
 
 
-def main(folder: Path = Path(__file__).resolve().parent) -> None:
+def main(folder: Path = HERE) -> None:
     """Write the picture into the folder."""
     picture().save(folder / "picture.png", optimize=True)
 

@@ -122,6 +122,9 @@ def test_too_little_disparity_and_too_much() -> None:
     (flat,) = disparity_findings(facts(thing("a", 600, 606)))
     assert flat.verdict == "warn"  # 9 * 7102 * (1/600 - 1/606) = 1.05 px
     assert "1.1 px of blur" in flat.text
+    assert "a pitch of" in flat.remedy
+    (card,) = disparity_findings(facts(thing("a", 540, 540.001)))
+    assert card.remedy == "all is at one depth"  # no pitch of kilometres
     deep = disparity_findings(facts(thing("a", 540, 620)))
     assert verdicts(deep) == ["ok"]
     near = disparity_findings(facts(thing("a", 6.9, 7.1)))  # 7102 / 6.9 = 1029 px of 1024
@@ -277,6 +280,10 @@ def test_few_photons_are_warned_of_and_the_remedy_gives_enough() -> None:
     assert 100 <= budget * 0.0009 * 100 < 115
     (enough,) = photon_findings(facts(replace(dim, light_share=np.full(3, 0.0011))))
     assert enough.verdict == "ok"
+
+
+def test_a_wall_alone_is_not_told_to_be_darker() -> None:
+    assert verdicts(photon_findings(facts(elsewhere={"backdrop": np.ones(3)}))) == ["ok"]
 
 
 def test_light_beside_the_objects_and_dark_counts_are_told() -> None:

@@ -14,7 +14,7 @@ from pcii.dataset import open_dataset
 from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid, Views
 from simgen import cli
-from simgen.figures import draw_objects, new_figure, part_of_interest, spread_out
+from simgen.figures import draw_depth, draw_objects, new_figure, part_of_interest, spread_out
 from simgen.generate import generate
 from simgen.recipe import Recipe
 from simgen.thumbnails import count_tiles, evenly_chosen, joined, radiance_tiles
@@ -110,6 +110,15 @@ def test_names_of_two_dozen_objects_do_not_overlap() -> None:
     assert len(boxes) == len(np.unique(object_id)) - 1
     for number, box in enumerate(boxes):
         assert not any(box.overlaps(other) for other in boxes[number + 1 :])
+
+
+def test_the_depth_of_a_flat_card_shows_no_rounding_errors() -> None:
+    figure = new_figure(5, 5)
+    flat, deep = figure.subplots(1, 2)
+    draw_depth(figure, flat, np.array([[540.0, 540.0001]]), np.array([[True, True]]))
+    assert flat.images[0].get_clim() == pytest.approx((539.5, 540.5), abs=1e-3)
+    draw_depth(figure, deep, np.array([[540.0, 620.0, 3000.0]]), np.array([[True, True, False]]))
+    assert deep.images[0].get_clim() == (540, 620)
 
 
 def test_places_are_moved_apart_and_no_further_than_needed() -> None:

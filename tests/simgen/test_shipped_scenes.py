@@ -1,0 +1,169 @@
+"""Every scene and recipe that ships: it loads, shows what it names, and is in the gallery."""
+
+import importlib.util
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, get_args
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from simgen import backend
+from simgen.build import build
+from simgen.camera_grid import Grid
+from simgen.lights import Light
+from simgen.materials import Finish, Spectrum
+from simgen.probe_scene import coarser
+from simgen.recipe import load_recipe
+from simgen.scene import Scene, load_scene
+from simgen.shapes import Shape
+from simgen.targets import load_target
+from simgen.textures import Texture
+from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
+
+ROOT = Path(__file__).resolve().parents[2]
+SCENES = sorted(file.parent.name for file in (ROOT / "scenes").glob("*/scene.toml"))
+RECIPES = sorted(file.stem for file in (ROOT / "data_recipes").glob("*.toml"))
+SCRIPTS = sorted(
+    file for file in (ROOT / "scenes").glob("*/build_*.py") if file.parent.name != "two_objects"
+)  # the bird takes its time
+GRID = coarser(Grid().camera_grid(), 128)
+BEYOND_THE_FILM = {"outdoors": {"ground"}, "room": {"table", "wall"}}
+MOST_PICTURE_BYTES, MOST_ASSET_BYTES = 60_000, 100_000
+
+
+@cache
+def scene_of(name: str) -> Scene:
+    return load_scene(str(ROOT / "scenes" / name))[0]
+
+
+@cache
+def seen(name: str) -> tuple[FirstHits, list[FirstHits], dict[int, str]]:
+    """First hits at the virtual centre and at two opposite corners, and the objects' names."""
+    built = build(backend.load(), scene_of(name), ROOT / "scenes" / name, 3)
+    corners = [first_hits_of_view(built, GRID, k, k) for k in (0, GRID.rows - 1)]
+    return first_hits_at_centre(built, GRID), corners, dict(built.names)
+
+
+def script(file: Path) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"{file.parent.name}_{file.stem}", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("name", SCENES)
+def test_the_virtual_centre_sees_every_object_and_no_film_cuts_it(name: str) -> None:
+    centre, corners, names = seen(name)
+    for number, thing in names.items():
+        assert (centre.object_id == number).any(), thing
+        if thing in BEYOND_THE_FILM.get(name, ()):
+            continue
+        for hits in (centre, *corners):
+            mask = hits.object_id == number
+            border = np.concatenate([mask[[0, -1]].ravel(), mask[:, [0, -1]].ravel()])
+            assert mask.any(), thing
+            assert not border.any(), thing
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_says_what_it_is_for(name: str) -> None:
+    scene = scene_of(name)
+    assert scene.title
+    assert len(scene.description) > 80
+    assert "#" in (ROOT / "scenes" / name / "scene.toml").read_text()
+
+
+def kinds(union: Any) -> set[str]:
+    members = get_args(get_args(union)[0]) or get_args(union)  # with and without Annotated
+    return {member.model_fields["type"].default for member in members}
+
+
+def test_the_scenes_show_all_that_scenes_can_hold() -> None:
+    scenes = [scene_of(name) for name in SCENES]
+    things = [thing for scene in scenes for thing in scene.objects]
+    textures = [thing.material.texture for thing in things if thing.material.texture is not None]
+    reflectances = [thing.material.reflectance for thing in things]
+    lights = [light for scene in scenes for light in scene.lights]
+    assert {thing.shape.type for thing in things} == kinds(Shape)
+    assert {thing.material.finish.type for thing in things} == kinds(Finish)
+    assert {texture.type for texture in textures if not isinstance(texture, str)} == kinds(Texture)
+    assert {light.type for light in lights} == kinds(Light)
+    assert {getattr(light, "illuminant", "D65") for light in lights} >= {"D65", "A", "FL2"}
+    assert any(isinstance(texture, str) for texture in textures)
+    assert {type(value) for value in reflectances} >= {tuple, str, Spectrum}
+    files = {thing.shape.file[-4:] for thing in things if thing.shape.type == "mesh"}
+    assert files == {".obj", ".ply"}
+    assert any(scene.level for scene in scenes)
+    assert any(scene.backdrop for scene in scenes)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("name", RECIPES)
+def test_a_recipe_looks_where_its_objects_are(name: str) -> None:
+    recipe, near = load_recipe(str(ROOT / "data_recipes" / f"{name}.toml"))
+    load_scene(recipe.scene, near)
+    centre, _, _ = seen(recipe.scene)
+    objects = centre.z_mm[centre.object_id > 0]
+    limits = recipe.analysis.z_range_mm
+    assert limits is not None
+    assert limits[0] <= objects.min() <= objects.max() <= limits[1]
+    for z_mm in recipe.analysis.z_mm:
+        assert np.abs(objects - z_mm).min() < 5  # the paper's 540 and 620 mm are those of whole objects
+
+
+def test_recipes_of_every_kind_ship() -> None:
+    recipes = [load_recipe(str(ROOT / "data_recipes" / f"{name}.toml"))[0] for name in RECIPES]
+    assert any(recipe.is_spectral for recipe in recipes)
+    exposed = [recipe for recipe in recipes if recipe.photons.scope == "exposure"]
+    assert exposed
+    assert all(scene_of(recipe.scene).level for recipe in exposed)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_light_passes_glass_where_there_is_some(name: str) -> None:
+    recipe, scene, _ = load_target(str(ROOT / "scenes" / name))
+    glass = any(thing.material.finish.type == "glass" for thing in scene.objects)
+    assert recipe.render.max_depth == (8 if glass else 3)
+
+
+@pytest.mark.parametrize("file", SCRIPTS, ids=lambda file: file.parent.name)
+def test_scripts_make_the_files_beside_them(file: Path, tmp_path: Path) -> None:
+    script(file).main(tmp_path)
+    made = sorted(tmp_path.iterdir())
+    assert made
+    for new in made:
+        old = file.parent / new.name
+        assert old.stat().st_size < MOST_ASSET_BYTES
+        if new.suffix == ".png":  # the same pixels: compressors differ
+            with Image.open(new) as one, Image.open(old) as other:
+                np.testing.assert_array_equal(
+                    np.asarray(one.convert("RGB")), np.asarray(other.convert("RGB"))
+                )
+        elif new.suffix == ".exr":
+            with OpenEXR.File(str(new)) as one, OpenEXR.File(str(old)) as other:
+                pixels = (part.channels()["RGB"].pixels for part in (one, other))
+                np.testing.assert_allclose(*pixels, rtol=1e-3)  # float16 has 11 bits
+        else:
+            assert new.read_bytes() == old.read_bytes()
+
+
+def test_every_asset_is_made_by_a_script() -> None:
+    for name in SCENES:
+        files = {file.name for file in (ROOT / "scenes" / name).iterdir() if file.is_file()}
+        assert files == {"scene.toml"} or any(file.startswith("build_") for file in files), name
+
+
+def test_the_gallery_is_that_of_these_scenes() -> None:
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    assert page == script(ROOT / "docs" / "make_gallery.py").page(), "run make gallery"
+    for name in SCENES:
+        assert f"gallery/{name}.jpg" in page
+        assert 5000 < (ROOT / "docs" / "gallery" / f"{name}.jpg").stat().st_size < MOST_PICTURE_BYTES
+    assert len(list((ROOT / "docs" / "gallery").iterdir())) == len(SCENES)
