@@ -63,8 +63,9 @@ def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarr
     bitmap = mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))
     bitmap.set_srgb_gamma(False)
     T = mi.ScalarTransform4f
-    # Mitsuba's map has +Y on top and -Z in its middle; half a turn about X brings up to -Y and ahead to +Z.
-    to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([1, 0, 0], 180)
+    # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z brings
+    # what is above to -Y and what is right to +X.
+    to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
     return {
         "type": "envmap",
         "bitmap": bitmap,
@@ -120,10 +121,30 @@ def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) 
 
 
 def _from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
-    """The integral of the image's luminance times the cosine over the half space behind the cameras."""
+    """The integral of the image's luminance times the cosine over the half space behind the cameras.
+
+    Like the renderer, between pixels it is linear: the rows lie at polar angles from 0 to pi.
+    """
     height, width = pixels.shape[:2]
-    polar = (np.arange(height) + 0.5) * (np.pi / height)
-    longitude = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
-    behind = np.sin(polar)[:, None] * np.maximum(-np.cos(longitude), 0)
-    solid_angle = np.sin(polar)[:, None] * (np.pi / height) * (2 * np.pi / width)
-    return float(((pixels @ LUMINANCE) * behind * solid_angle).sum())
+    down, right = _midpoints(height), _midpoints(width)
+    longitude = (right - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
+    # Of the area on the sphere, and of the cosine, which is sin(polar) cos(longitude) in size.
+    of_rows = _shared(down * (height - 1), np.sin(down * np.pi) ** 2 * (np.pi / down.size), height)
+    of_columns = _shared(
+        right * width - 0.5, np.maximum(-np.cos(longitude), 0) * (2 * np.pi / right.size), width
+    )
+    return float(of_rows @ (pixels @ LUMINANCE) @ of_columns)
+
+
+def _midpoints(pixels: int) -> np.ndarray:
+    """Of equal parts of the unit interval, 8 a pixel or more."""
+    number = max(8 * pixels, 4096)
+    return (np.arange(number) + 0.5) / number
+
+
+def _shared(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:
+    """Weights at these places, each divided among the two pixels beside it; beyond the last is the first."""
+    before = np.floor(position_px).astype(np.int64)
+    after = position_px - before
+    total = np.bincount(before % pixels, weight * (1 - after), pixels)
+    return total + np.bincount((before + 1) % pixels, weight * after, pixels)

@@ -65,8 +65,8 @@ class UniformLight(Strict):
 class EnvironmentLight(Strict):
     """An image of all that shines from far away, seen by the cameras where nothing is hit; in daylight D65.
 
-    Longitude by latitude: the middle of the image lies straight ahead (+Z), its top row above, and what
-    is in its right half is to the right.
+    Longitude by latitude: the middle of the image lies straight ahead (+Z), its first row straight above,
+    its last straight below, its right half to the right.
     """
 
     type: Literal["environment"] = "environment"
