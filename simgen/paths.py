@@ -122,12 +122,19 @@ def surrounding_radiance(built: Built, light: Light) -> np.ndarray:
 
 
 def _lamps(scene: Any) -> list[Any]:
-    """Emitters that can be aimed at.
-
-    Light from all around is found by following the surface's own scattering: for uniform surroundings
-    that has no variance but for what stands in the way.
-    """
+    """Emitters that have a place."""
     return [light for light in scene.emitters() if not light.is_environment()]
+
+
+def _surroundings(mi: Any, scene: Any) -> list[Any]:
+    """The image of what shines from all around, if there is one: a sun in it is to be aimed at.
+
+    Uniform surroundings are found by following the surface's own scattering, which has no variance but
+    for what stands in the way.
+    """
+    around = scene.environment()
+    varies = around is not None and mi.has_flag(around.flags(), mi.EmitterFlags.SpatiallyVarying)
+    return [around] if varies else []
 
 
 def radiance_along(built: Built, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
@@ -149,7 +156,8 @@ class _Tracer:
     def __init__(self, built: Built, sampler: Any) -> None:
         self.mi, self.dr, self.scene, self.sampler = built.mi, load_drjit(), built.scene, sampler
         self.context = self.mi.BSDFContext()
-        self.lamps = _lamps(built.scene)
+        around = _surroundings(built.mi, built.scene)
+        self.lamps, self.aims_around = _lamps(built.scene) + around, bool(around)
 
     def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
         """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""
@@ -180,8 +188,10 @@ class _Tracer:
         hit = scene.ray_intersect(ray, active)
         lamp = hit.emitter(scene, active)
         towards = mi.DirectionSample3f(scene, hit, mi.Interaction3f(before))
-        # Lamps could have been aimed at instead; what lies behind everything is no such lamp.
-        aimed = hit.is_valid() & ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
+        aimed = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        if not self.aims_around:
+            aimed &= hit.is_valid()
         pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(before), towards, active)
         share = dr.select(aimed, _share(bounces * sample.pdf, pdf_lamp), 1)
         radiance = lamp.eval(hit, active) * share
