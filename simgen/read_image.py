@@ -64,6 +64,10 @@ def read_environment(path: Path) -> np.ndarray:
             f"is {width} x {height} pixels of {len(channels)} channels, "
             f"more than {LARGEST_ENVIRONMENT_BYTES} bytes"
         )
+    if width != 2 * height:
+        raise ValueError(
+            f"is {width} x {height} pixels; what shines from all around is twice as wide as high"
+        )
     with OpenEXR.File(str(path), separate_channels=True) as file:
         planes = file.channels()
         radiance = np.stack([planes[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
