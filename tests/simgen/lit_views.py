@@ -1,0 +1,129 @@
+"""Scenes in colours or in spectra: what one small camera sees of them, dense or photon by photon."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pcii.bayer import colour_index, mosaic
+from pcii.store import write_exr_safely
+from pcii.types import CameraGrid
+from simgen import backend
+from simgen.build import Built, build
+from simgen.candidates import Setup
+from simgen.photons import PhotonList, draw_photons
+from simgen.recipe import Photons, Recipe
+from simgen.render import render_view
+from simgen.scene import Scene
+from simgen.sensor import sensitivities
+
+CAMERA = "Nikon 5100 (NPL)"
+SCALAR = backend.choose().kind == "scalar"
+SKY = "sky.exr"
+
+
+def film(height: int = 32, width: int = 32, focal_mm: float = 50.0) -> CameraGrid:
+    """One camera with pixels of 1 mm."""
+    return CameraGrid(
+        rows=1, cols=1, pitch_mm=(1, 1), focal_mm=focal_mm, pixel_mm=1.0, height=height, width=width
+    )
+
+
+def card(z_mm: float, size_mm: float, material: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "name": "card",
+        "position_mm": (0.0, 0.0, z_mm),
+        "shape": {"type": "card", "width_mm": size_mm, "height_mm": size_mm},
+        "material": material,
+    }
+
+
+def made(
+    objects: Sequence[dict],
+    lights: Sequence[dict],
+    *,
+    spectral: bool = False,
+    max_depth: int = 2,
+    folder: Path = Path(),
+    **more: Any,
+) -> Built:
+    values = {"title": "test", "objects": list(objects), "lights": list(lights), **more}
+    mi, curves = backend.load(spectral=spectral), None
+    if spectral:
+        grid = {"rows": 1, "cols": 1, "height": 2, "width": 2}
+        recipe = Recipe.model_validate({"scene": "-", "grid": grid, "sensor": {"camera": CAMERA}})
+        curves = sensitivities(recipe, Path())
+    return build(mi, Scene.model_validate(values), folder, max_depth, curves)
+
+
+def white(built: Built) -> np.ndarray:
+    """What pixels of each colour see of a luminance of 1 of the scene's light, (3,)."""
+    return np.ones(3) if built.filters is None else built.filters.white
+
+
+def seen(built: Built, grid: CameraGrid, samples: int, seed: int = 1) -> np.ndarray:
+    """Radiance (H, W, 3), float64, of which 1 is that of the scene's light at luminance 1."""
+    view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=seed)
+    return view.astype(np.float64) / white(built)
+
+
+def thinned(built: Built, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1) -> PhotonList:
+    """Photons, `gain` for each unit of radiance."""
+    setup = Setup(built, grid, "GRBG", max_depth)
+    photons = Photons(scope="exposure")
+    return draw_photons(setup, photons, seed=seed, photons_per_radiance=gain)
+
+
+def counted(photons: PhotonList, grid: CameraGrid) -> np.ndarray:
+    counts = np.zeros((grid.height, grid.width))
+    np.add.at(counts, (photons.i, photons.j), 1)
+    return counts
+
+
+def surprise(
+    photons: PhotonList, radiance: np.ndarray, grid: CameraGrid, gain: float, block_px: int = 4
+) -> float:
+    """By how many deviations chi-square of counts exceeds its mean, for rates of gain times a view.
+
+    Blocks of each colour, but those where less than five photons are expected, are compared.
+    """
+    counts, rates = counted(photons, grid), gain * mosaic(radiance, "GRBG")
+    colours = colour_index(grid.height, grid.width, "GRBG")
+    found, expected = (
+        np.concatenate([on_blocks(values * (colours == colour), block_px).ravel() for colour in range(3)])
+        for values in (counts, rates)
+    )
+    enough = expected >= 5
+    score = ((found - expected)[enough] ** 2 / expected[enough]).sum()
+    # Of a Poisson number of mean m the square of the deviate varies by 2 + 1 / m.
+    return float((score - enough.sum()) / np.sqrt((2 + 1 / expected[enough]).sum()))
+
+
+def on_blocks(pixels: np.ndarray, side_px: int) -> np.ndarray:
+    height, width = pixels.shape
+    return pixels.reshape(height // side_px, side_px, width // side_px, side_px).sum(axis=(1, 3))
+
+
+def sky(folder: Path, pixels: np.ndarray, **light: Any) -> dict[str, Any]:
+    """An environment light of these pixels (H, W, 3)."""
+    write_exr_safely(folder / SKY, pixels.astype(np.float32))
+    return {"type": "environment", "file": SKY, "luminance_cd_m2": 1.0, **light}
+
+
+def in_scalar_mode(*tests: str) -> None:
+    """Run tests, as pytest names them, once more in scalar mode, where they must pass too."""
+    if SCALAR:
+        pytest.skip("this is scalar mode")
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests],
+        env=os.environ | {"SIMGEN_BACKEND": "scalar"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout[-3000:]
