@@ -1,0 +1,127 @@
+"""No two views of a large grid share their noise: not of rendering, not of photons, not of the detector."""
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lit_views import made
+
+from pcii.dataset import open_dataset
+from simgen import seeds
+from simgen.candidates import Setup
+from simgen.generate import generate
+from simgen.photons import draw_photons
+from simgen.recipe import Grid, Photons, Recipe
+
+pytestmark = pytest.mark.renders
+SIDE, VIEWS = 64, 100
+MOST = 5 / SIDE
+"""Of 4950 coefficients of independent noise, each normal of width 1 / 64, one in 350 times one exceeds it."""
+SCENE = """title = "An evenly lit wall"
+lights = [{ %s }]
+backdrop = { z_mm = 500, reflectance = [0.8, 0.8, 0.8] }
+"""
+LAMP = (
+    'type = "area", position_mm = [300, 0, 100], target_mm = [0, 0, 500], '
+    "width_mm = 300, height_mm = 300, luminance_cd_m2 = 100.0"
+)
+EVENLY = 'type = "uniform", luminance_cd_m2 = 100.0'
+# Cameras so close together that all see the same.
+GRID = {"rows": 10, "cols": 10, "pitch_mm": [1e-3, 1e-3], "pixel_mm": 0.3, "height": SIDE, "width": SIDE}
+EXPOSURE = {"f_number": 4.0, "time_s": 1e-7}
+
+
+def dataset(folder: Path, lamp: str, **changes: Any) -> Path:
+    (folder / "wall").mkdir()
+    (folder / "wall" / "scene.toml").write_text(SCENE % lamp)
+    values: dict[str, Any] = {
+        "scene": "wall",
+        "seed": 11,
+        "grid": GRID,
+        "render": {"samples_per_pixel": 1, "max_depth": 2},
+        "products": {"truth": False, "radiance": "mosaic"},
+    }
+    generate(Recipe.model_validate(values | changes), folder, folder / "out")
+    return folder / "out"
+
+
+def radiance(path: Path) -> np.ndarray:
+    views = open_dataset(path).views
+    assert views is not None
+    return np.stack([np.asarray(views.radiance[k, l])[..., 0] for k, l in np.ndindex(10, 10)])
+
+
+def counts(path: Path) -> np.ndarray:
+    found = open_dataset(path).counts
+    return np.stack([found.view(k, l) for k, l in np.ndindex(10, 10)])
+
+
+def likeness(pixels: np.ndarray) -> np.ndarray:
+    """Correlation of what each view has more than all on average, of each of the 4950 pairs."""
+    excess = pixels.astype(np.float64) - pixels.mean(axis=0, dtype=np.float64)
+    assert (excess.std(axis=(1, 2)) > 0).all(), "there is no noise to be compared"
+    every = np.asarray(np.corrcoef(excess.reshape(VIEWS, -1)))
+    return np.abs(every[np.triu_indices(VIEWS, 1)])
+
+
+def rendered(folder: Path) -> np.ndarray:
+    return radiance(dataset(folder, LAMP, photons={"budget": 100}))
+
+
+def one_by_one(folder: Path) -> np.ndarray:
+    grid = Grid.model_validate(GRID).camera_grid()
+    built = made(
+        [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
+    )
+    photons = draw_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
+    found = np.zeros((VIEWS, SIDE, SIDE))
+    np.add.at(found, (10 * photons.k + photons.l, photons.i, photons.j), 1)
+    return found
+
+
+def from_views(folder: Path) -> np.ndarray:
+    path = dataset(folder, LAMP, photons={"budget": 4000}, products={"truth": False})
+    assert open_dataset(path).manifest["photons"]["method"] == "dense"
+    return counts(path)
+
+
+def detected(folder: Path) -> np.ndarray:
+    sensor = {"full_light": {"full_well_e": 1000.0, "read_noise_e": 3.0, "adc_bits": 12}}
+    return radiance(dataset(folder, EVENLY, photons={"budget": 100}, sensor=sensor, exposure=EXPOSURE))
+
+
+@pytest.mark.parametrize("noisy", [rendered, one_by_one, from_views, detected])
+def test_all_pairs_of_a_hundred_views_have_noise_of_their_own(
+    noisy: Callable[[Path], np.ndarray], tmp_path: Path
+) -> None:
+    pixels = noisy(tmp_path)
+    found = likeness(pixels)
+    assert found.size == 4950
+    assert found.max() <= MOST
+    pixels[73] += pixels[41]  # the fault: one view has another's noise besides its own
+    assert (likeness(pixels) > MOST).sum() == 1
+
+
+@pytest.mark.parametrize("noisy", [rendered, detected])
+def test_one_seed_for_two_views_is_caught(
+    noisy: Callable[[Path], np.ndarray], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact = seeds._sequence
+
+    def slipped(seed: int, view: int, *rest: Any) -> np.random.SeedSequence:
+        return exact(seed, 41 if view == 73 else view, *rest)
+
+    monkeypatch.setattr(seeds, "_sequence", slipped)
+    found = likeness(noisy(tmp_path))
+    assert (found > MOST).sum() == 1
+    assert found.max() > 0.9
+
+
+def test_a_grid_has_as_many_seeds_as_views() -> None:
+    for stage in ("radiance", "photons", "full light"):
+        own = {seeds.integer(11, view=view, stage=stage) for view in range(10_000)}
+        # Of 10 000 numbers of 32 bits two are the same in one of a hundred cases.
+        assert len(own) == 10_000

@@ -1,0 +1,147 @@
+"""Lamps: inverse square and cosine of a point, and that a plane gets the lux that a scene asks for."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
+
+from pcii.errors import InputError
+from simgen import backend
+from simgen.srgb import LUMINANCE, srgb_to_linear
+
+pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
+GREY = 0.6
+RHO = float(srgb_to_linear(np.array(GREY)))
+Z_MM = 500.0
+LUX = 300.0
+GRID = film()
+FLAT = card(Z_MM, 600.0, {"reflectance": [GREY] * 3})
+
+
+@pytest.fixture(autouse=True, scope="module")
+def variant_is_put_back() -> Iterator[None]:
+    yield
+    backend.load()
+
+
+def lit_by_a_point(lamp_mm: np.ndarray, intensity_cd: float, fine: int = 1) -> np.ndarray:
+    """Radiance (H fine, W fine) of the card: rho / pi times I cos / d^2, in metres; nothing else is used."""
+    side = np.arange(32 * fine)
+    at_mm = ((side + 0.5) / fine - 16) * (Z_MM / 50.0)
+    y, x = np.meshgrid(at_mm, at_mm, indexing="ij")
+    towards_m = (lamp_mm - np.stack([x, y, np.full_like(x, Z_MM)], axis=-1)) / 1000
+    distance_m = np.linalg.norm(towards_m, axis=-1)
+    cosine = np.maximum(-towards_m[..., 2] / distance_m, 0)
+    return RHO / np.pi * intensity_cd * cosine / distance_m**2
+
+
+def point(x: float, y: float, z: float, intensity_cd: float) -> dict[str, Any]:
+    return {"type": "point", "position_mm": (x, y, z), "intensity_cd": intensity_cd}
+
+
+PLACES = [(0.0, 0.0, 300.0), (200.0, -150.0, 100.0), (-100.0, 60.0, -400.0)]
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_a_points_light_falls_off_with_the_square_and_the_cosine(place: tuple[float, float, float]) -> None:
+    view = seen(made([FLAT], [point(*place, 2.5)]), GRID, 256)
+    expected = lit_by_a_point(np.array(place), 2.5, fine=8).reshape(32, 8, 32, 8).mean(axis=(1, 3))
+    # Only the place within a pixel varies: by a few per cent, of which 256 paths leave a sixteenth.
+    np.testing.assert_allclose(view, expected[..., None].repeat(3, axis=2), rtol=0.01)
+    np.testing.assert_allclose(view.mean(axis=(0, 1)), expected.mean(), rtol=5e-4)
+    # The fault: a millimetre, or a per cent, is off.
+    other = lit_by_a_point(np.add(place, (0, 0, 1)), 2.5)
+    assert abs(view.mean() / other.mean() - 1) > 5e-4
+    assert abs(view.mean() / (1.01 * expected.mean()) - 1) > 5e-4
+
+
+def test_a_points_light_in_spectra_is_that_in_colours() -> None:
+    place = PLACES[1]
+    grey = {"wavelength_nm": (400, 700), "value": (RHO, RHO)}
+    lamp = point(*place, 2.5) | {"illuminant": "A"}
+    built = made([card(Z_MM, 600.0, {"reflectance": grey})], [lamp], spectral=True)
+    expected = lit_by_a_point(np.array(place), 2.5, fine=8).mean()
+    # A quarter of a million paths whose wavelengths vary by 0.5 of the mean.
+    np.testing.assert_allclose(seen(built, GRID, 256).mean(axis=(0, 1)), expected, rtol=5e-3)
+
+
+def test_photons_of_a_points_light_fall_off_likewise() -> None:
+    place, wanted = PLACES[1], 20_000 if SCALAR else 400_000
+    expected = lit_by_a_point(np.array(place), 2.5, fine=8).reshape(32, 8, 32, 8).mean(axis=(1, 3))
+    gain = wanted / expected.sum()
+    photons = thinned(made([FLAT], [point(*place, 2.5)]), GRID, 2, gain)
+    assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
+    # The fault: the cosine is forgotten.
+    y, x = np.indices((32, 32)) - 15.5
+    distance_mm = np.linalg.norm(np.stack([10 * x - place[0], 10 * y - place[1], 0 * x + 400]), axis=0)
+    bare = expected * distance_mm / distance_mm.mean()
+    assert surprise(photons, bare[..., None].repeat(3, axis=2), GRID, gain) > (4 if SCALAR else 10)
+
+
+NEAR_LAMP = {
+    "type": "area",
+    "position_mm": (-260.0, 40.0, 400.0),
+    "target_mm": (0.0, 0.0, Z_MM),
+    "width_mm": 300.0,
+    "height_mm": 300.0,
+    "luminance_cd_m2": 7.0,
+}
+"""As wide as it is far away, and with its edge behind the plane that it lights."""
+SUN = "sun"
+
+
+def lights_of(kind: str, folder: Path, coloured: bool) -> list[dict[str, Any]]:
+    lamp = point(300.0, 100.0, -50.0, 2.0)
+    if kind == SUN:
+        pixels = np.random.default_rng(1).random((16, 32, 1)) * ((1.2, 1.0, 0.5) if coloured else (1, 1, 1))
+        pixels[4, 2] *= 100  # behind the cameras, above
+        return [sky(folder, pixels, turn_deg=-25.0)]
+    uniform = {"type": "uniform", "luminance_cd_m2": 3.0}
+    return {"uniform": [uniform], "area": [NEAR_LAMP], "point": [lamp], "two": [NEAR_LAMP, lamp]}[kind]
+
+
+@pytest.mark.parametrize("kind", ["uniform", "area", "point", "two", SUN])
+@pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
+def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_path: Path) -> None:
+    grey = {"wavelength_nm": (400, 700), "value": (RHO, RHO)}
+    lights = lights_of(kind, tmp_path, coloured=not spectral)
+    level = {"illuminance_lux": LUX, "z_mm": Z_MM}
+    spot = card(Z_MM, 4.0, {"reflectance": grey})
+    built = made([spot], lights, spectral=spectral, folder=tmp_path, level=level)
+    # The middle of the spot fills the film; a million paths that vary by 1 or 2.
+    found = seen(built, film(16, 16, focal_mm=5000.0), 4096).mean(axis=(0, 1))
+    if not spectral:
+        found = LUMINANCE @ found  # that of light whose colours differ is meant
+    np.testing.assert_allclose(found, LUX * RHO / np.pi, rtol=5e-3)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        point(0.0, 0.0, Z_MM + 1, 2.0),
+        point(100.0, 0.0, Z_MM, 2.0),
+        NEAR_LAMP | {"position_mm": (0.0, 0.0, 900.0)},
+        NEAR_LAMP | {"target_mm": (-800.0, 40.0, 400.0)},
+    ],
+    ids=["behind", "in the plane", "a lamp behind", "a lamp that looks away"],
+)
+def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match=r"level: none of the lights shines on a surface at z_mm = 500"):
+        made([FLAT], [light], level={"illuminance_lux": LUX, "z_mm": Z_MM})
+
+
+def test_surroundings_that_shine_only_from_ahead_give_the_plane_nothing(tmp_path: Path) -> None:
+    pixels = np.zeros((16, 32, 3))
+    pixels[6:10, 14:18] = 1
+    with pytest.raises(InputError, match="level: none of the lights shines"):
+        made([FLAT], [sky(tmp_path, pixels)], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
+    # Turned round they shine from behind the cameras.
+    turned = sky(tmp_path, pixels, turn_deg=180.0)
+    made([FLAT], [turned], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
+
+
+def test_scalar_mode_passes_the_tests_of_this_file() -> None:
+    in_scalar_mode(__file__)
