@@ -128,9 +128,9 @@ def test_recipes_of_every_kind_ship() -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_light_passes_glass_where_there_is_some(name: str) -> None:
-    recipe, scene, _ = load_target(str(ROOT / "scenes" / name))
-    glass = any(thing.material.finish.type == "glass" for thing in scene.objects)
-    assert recipe.render.max_depth == (8 if glass else 3)
+    target = load_target(str(ROOT / "scenes" / name))
+    glass = any(thing.material.finish.type == "glass" for thing in target.scene.objects)
+    assert target.recipe.render.max_depth == (8 if glass else 3)
 
 
 @pytest.mark.parametrize("file", SCRIPTS, ids=lambda file: file.parent.name)
