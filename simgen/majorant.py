@@ -45,7 +45,6 @@ NEXT_LAYERS = (0, -1, 1)
 ENDLESS = 1e30
 """A shade that rejects nothing by the guess."""
 _RING = np.array([(a, b) for a in range(-1, 3) for b in range(-1, 3)])
-_AROUND = np.array([(a, b) for a in (-1, 0, 1) for b in (-1, 0, 1)])
 
 
 @dataclass(frozen=True)
@@ -125,10 +124,11 @@ class Frame:
         layer, row = np.divmod(rest, self.rows)
         return layer, row, col
 
-    def around(self, tiles: np.ndarray) -> np.ndarray:
-        """Flat indices (N, 9) of each tile and its neighbours; the border's own beyond the border."""
+    def around(self, tiles: np.ndarray, reach: int = 1) -> np.ndarray:
+        """Flat indices (N, (2 reach + 1)^2) of the tiles up to `reach` away; the border's own beyond it."""
         layer, row, col = self.split(tiles)
-        return self._beside(layer, row, col, _AROUND)
+        offsets = np.argwhere(np.ones((2 * reach + 1, 2 * reach + 1))) - reach
+        return self._beside(layer, row, col, offsets)
 
     def ring(self, doubled: np.ndarray) -> np.ndarray:
         """Flat indices (N, 16) of the 2 x 2 tiles that each tile of twice the size holds, and around."""
@@ -229,8 +229,8 @@ class Majorant:
         self.bound[listed] = np.maximum(self.bound[listed] * factor, self.dim)
         self.shade[listed] *= factor
 
-    def lift(self, over: Samples) -> None:
-        """Raise the limits, of the tiles of these paths and those around them, above what they brought."""
+    def lift(self, over: Samples, reach: int = 1) -> None:
+        """Raise limits above what these paths brought, on their tiles and on those up to `reach` away."""
         owner = self.owner_of(over)
         faint = (owner < self.coarse_count) & (over.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
@@ -239,13 +239,14 @@ class Majorant:
             over = over.take(~faint)
         if not over.k.size:
             return
-        near = self.frame.around(self.frame.tiles_of(over)).ravel()
+        around = self.frame.around(self.frame.tiles_of(over), reach)
+        near = around.ravel()
         unlisted = _distinct(near[self.entry_of[near] < 0])
         nothing = np.zeros((unlisted.size, over.light.shape[1]))
         self.list_tiles(unlisted, nothing, nothing)
         entry = self.entry_of[near]
         for levels, needed in ((self.bound, over.light), (self.shade, over.light / over.guess)):
-            lifted, height = _largest(entry, LIFT * needed.repeat(9, axis=0))
+            lifted, height = _largest(entry, LIFT * needed.repeat(around.shape[1], axis=0))
             levels[lifted] = np.maximum(levels[lifted], height)
 
 

@@ -128,20 +128,22 @@ class _Drawing:
         self.scopes, self.tally = self._scopes(), _Tally()
         self.pilot = explore(setup, self._expected, seed)
         self.share = LIKELY_SHARE
+        self.attempt = 0
 
     def run(self) -> PhotonList:
         """Warm up and draw, anew if too many photons came in clumps."""
-        paths, attempt = self.pilot.paths, 0
+        paths = self.pilot.paths
         drawn: list[dict[str, np.ndarray]] = []
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
             self.scopes.start()
             self.tally = _Tally()
-            drawn = list(self._exposed(attempt) if self.gain is not None else self._budgeted(attempt))
+            drawn = list(self._exposed() if self.gain is not None else self._budgeted())
             paths += self.tally.paths
-            attempt += 1
-            if self.tally.overshoot <= OVERSHOOT_SHARE * self.tally.kept or attempt == ATTEMPTS:
+            self.attempt += 1
+            enough = self.tally.overshoot <= OVERSHOOT_SHARE * self.tally.kept
+            if enough or self.attempt == ATTEMPTS:
                 break
         tally, scopes = self.tally, self.scopes
         log = {
@@ -151,7 +153,7 @@ class _Drawing:
             "kept": tally.kept,
             "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
             "overshoot_photons": tally.overshoot,
-            "attempts": attempt,
+            "attempts": self.attempt,
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
@@ -207,28 +209,28 @@ class _Drawing:
     def _pool(self) -> Pool:
         return pool_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
 
-    def _budgeted(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
+    def _budgeted(self) -> Iterator[dict[str, np.ndarray]]:
         """Rounds of candidates until every scope has its photons, or is dark."""
         for number, block in enumerate(_blocks(self.scopes.wanted)):
             round_number = 0
             while (wanting := np.intersect1d(self.scopes.open(self.pilot.patience), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = _candidates_needed(missing, round_number, self.share)
-                part = attempt << 16 | round_number
+                part = self.attempt << 16 | round_number
                 yield self._round(wanting, candidates, self._pool(), number, part)
                 round_number += 1
                 self.report("photons", int(self.scopes.got.sum()), int(self.scopes.wanted.sum()))
 
-    def _exposed(self, attempt: int) -> Iterator[dict[str, np.ndarray]]:
+    def _exposed(self) -> Iterator[dict[str, np.ndarray]]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
         assert self.gain is not None
         views = np.arange(self.setup.grid.view_count)
         parts = int(np.ceil(self.gain * self._pool().mass[0] * views.size / (WAVEFRONT / 2)))
         for part in range(parts):
             pool = self._pool()
-            rng = seeds.generator(self.seed, view=part, stage="totals", part=attempt)
+            rng = seeds.generator(self.seed, view=part, stage="totals", part=self.attempt)
             candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
-            yield self._round(views, candidates, pool, part, attempt << 16)
+            yield self._round(views, candidates, pool, part, self.attempt << 16)
             self.report("parts of the exposure", part + 1, parts)
 
     def _round(
@@ -239,7 +241,8 @@ class _Drawing:
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
         path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
         found = pool.try_candidates(self.scopes.group[owner], views, path_seed)
-        pool.majorant.lift(found.over)
+        # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
+        pool.majorant.lift(found.over, reach=1 + self.attempt)
         path = np.arange(found.k.size).repeat(found.copies)
         scope = owner[found.candidate[path]]
         rank = places(scope) + self.scopes.got[scope]

@@ -72,6 +72,18 @@ def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) 
     assert majorant.layer.size >= before
 
 
+@pytest.mark.parametrize("reach", [1, 3])
+def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) -> None:
+    over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
+    over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
+    majorant.lift(over, reach)
+    _, row, col = majorant.frame.split(majorant.frame.tiles_of(over))
+    bright = np.flatnonzero(majorant.bound[:, 1] > 40)
+    apart = np.maximum(abs(majorant.row[bright] - row), abs(majorant.col[bright] - col))
+    assert bright.size == (2 * reach + 1) ** 2
+    assert apart.max() == reach
+
+
 def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.
     frame = majorant.frame
