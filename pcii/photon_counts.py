@@ -91,8 +91,9 @@ class PhotonCounts:
 
     @property
     def dense(self) -> np.ndarray:
-        """The counts (K, L, H, W) as they are kept; only if they are not sparse."""
-        assert self._dense is not None
+        """The counts (K, L, H, W) as they are kept; `InputError` if they are sparse."""
+        if self._dense is None:
+            raise InputError("dense: these counts are kept as events; use .view(k, l) or .events")
         return self._dense
 
     @cached_property

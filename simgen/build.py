@@ -33,6 +33,8 @@ class Built:
     """Names by object id, from 1."""
     filters: Filters | None
     """What the camera's pixels see of spectra; None where light is linear sRGB."""
+    gain: float = 1.0
+    """By how much lights are brighter than they say, for the scene's level."""
 
 
 def build(mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarray | None = None) -> Built:
@@ -68,7 +70,7 @@ def build(mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarra
     except RuntimeError as fault:
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
     filters = None if curves is None else filters_for(curves, main_spectrum(scene.lights))
-    return Built(mi, loaded, _object_of_shape(loaded), names, filters)
+    return Built(mi, loaded, _object_of_shape(loaded), names, filters, gain)
 
 
 def _object_of_shape(loaded: Any) -> np.ndarray:

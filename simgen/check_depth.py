@@ -1,5 +1,6 @@
 """Findings on depth: disparities, how far objects stand apart in px of blur, planes, colours that alias."""
 
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -100,7 +101,7 @@ def _separation(facts: Facts, near: ObjectFacts, far: ObjectFacts) -> Finding:
     ways, factor = [], LEAST_APART_PX / apart
     inverse = 1 / near.middle_mm - LEAST_APART_PX / spread_px_mm(facts.grid)
     if inverse > 0:
-        ways.append(f"move {far.name} back to {1 / inverse:.0f} mm")
+        ways.append(f"move {far.name} {math.ceil(1 / inverse - far.middle_mm)} mm further away")
     if factor <= MOST_PITCH_FACTOR or not ways:
         ways.append(f"take a pitch of {' x '.join(f'{p * factor:.3g}' for p in facts.grid.pitch_mm)} mm")
     return Finding("warn", "separation", f"{text} of blur apart", " or ".join(ways))

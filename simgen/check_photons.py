@@ -24,7 +24,8 @@ def photon_findings(facts: Facts) -> list[Finding]:
         lost = photons_per_view(facts, share) / total
         if lost > 0.0005:
             much = lost > MOST_LOST_SHARE and bool(facts.seen)
-            remedy = "darken it, or raise photons.budget for the objects" if much else ""
+            more = "expose longer" if facts.recipe.photons.scope == "exposure" else "raise photons.budget"
+            remedy = f"darken it, or {more} for the objects" if much else ""
             text = f"{place}: {lost:.1%} of the photons"
             found.append(Finding("warn" if remedy else "ok", "photons", text, remedy))
     return found + _false_findings(facts, total)

@@ -88,8 +88,19 @@ def _wall_findings(facts: Facts) -> list[Finding]:
     return [Finding("bad", "backdrop", text, "give it a z_mm behind the objects")]
 
 
+def _level_findings(facts: Facts) -> list[Finding]:
+    level, wall = facts.level, facts.backdrop_mm
+    if level is None:
+        return []
+    text = f"{level.illuminance_lux:g} lux at {level.z_mm:g} mm: lights are {facts.gain:.3g} x what they say"
+    if wall is not None and level.z_mm > wall:
+        remedy = "set level.z_mm to where the objects are"
+        return [Finding("warn", "lights", f"{text}; that is behind the backdrop", remedy)]
+    return [Finding("ok", "lights", text)]
+
+
 def _lamp_findings(facts: Facts) -> list[Finding]:
-    found = []
+    found = _level_findings(facts)
     for number in facts.lamps_away:
         text = f"lamp {number} shines away from every object"
         found.append(Finding("warn", "lights", text, f"turn lights[{number - 1}].target_mm to the objects"))
@@ -97,6 +108,7 @@ def _lamp_findings(facts: Facts) -> list[Finding]:
         remedy = "point a lamp at the objects, or add a light of type 'uniform'"
         found.append(Finding("bad", "lights", "nothing that the cameras see is lit", remedy))
     elif not found:
-        text = f"the picture's mean radiance is {facts.luminance:.3g} cd/m^2"
+        unit = "cd/m^2, as the camera's pixels see it" if facts.recipe.is_spectral else "cd/m^2"
+        text = f"the picture's mean luminance is {facts.luminance:.3g} {unit}"
         found.append(Finding("ok", "lights", text))
     return found

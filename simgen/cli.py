@@ -64,9 +64,10 @@ def schema(what: Literal["scene", "recipe"]) -> None:
     """
     from simgen.recipe import Recipe
     from simgen.scene import Scene
+    from simgen.schema import schema_of
 
     model = {"scene": Scene, "recipe": Recipe}[what]
-    json.dump(model.model_json_schema(), sys.stdout, indent=2)
+    json.dump(schema_of(model), sys.stdout, indent=2)
     say("")
 
 
@@ -120,9 +121,12 @@ def preview(
     target: str,
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
     samples_per_pixel: int = 32,
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
+
+    In full light and in sRGB, whatever the recipe's camera and photons.
 
     Example:  simgen preview two_objects -o look.png
 
@@ -132,12 +136,14 @@ def preview(
         A recipe, or a scene, which is looked at with the paper's field of view; by name or path.
     out
         The picture to write, .png or .jpg, in a folder that exists.
+    set
+        Override one value of the recipe, such as grid.pixel_mm=0.02; may be repeated.
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
     from simgen.preview import write_preview
 
-    write_preview(target, out, samples_per_pixel)
+    write_preview(target, out, samples_per_pixel, overrides=set)
     say(f"{out}")
 
 

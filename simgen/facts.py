@@ -9,6 +9,7 @@ import numpy as np
 
 from pcii.types import CameraGrid
 from simgen.counts import Plan
+from simgen.lights import Level
 from simgen.recipe import Recipe
 from simgen.shifts import apart_px
 
@@ -72,7 +73,7 @@ class Facts:
     recipe: Recipe
     objects: tuple[ObjectFacts, ...]
     luminance: float
-    """Mean radiance of the virtual centre's image, over its colours."""
+    """Mean luminance of the virtual centre's image in cd/m^2; in spectral mode what its pixels see."""
     colour_share: np.ndarray
     """Share (C,) of that image's light that the pixels of each colour get; sums to 1."""
     elsewhere: Mapping[Elsewhere, np.ndarray]
@@ -91,6 +92,9 @@ class Facts:
     """Corner cameras: fewer for a single row or column."""
     lamps_away: tuple[int, ...] = ()
     """Lamps, from 1, that shine away from all objects."""
+    level: Level | None = None
+    gain: float = 1.0
+    """By how much the level makes lights brighter than they say."""
     glass: tuple[str, ...] = ()
     """Names of the objects that are of glass."""
     backdrop_mm: float | None = None

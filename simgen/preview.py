@@ -1,5 +1,6 @@
 """A quick look at a scene: the picture, depth and objects that the virtual centre camera sees."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,7 +33,12 @@ PANEL_IN = 4.8
 
 
 def write_preview(
-    name_or_path: str, out: Path, samples_per_pixel: int, dots_per_inch: int = DOTS_PER_INCH
+    name_or_path: str,
+    out: Path,
+    samples_per_pixel: int,
+    *,
+    overrides: Sequence[str] = (),
+    dots_per_inch: int = DOTS_PER_INCH,
 ) -> None:
     """Write the preview of a scene or of a recipe's, a PNG or JPEG.
 
@@ -41,7 +47,7 @@ def write_preview(
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
     check_picture_path(out)
-    target = load_target(name_or_path)
+    target = load_target(name_or_path, overrides)
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)

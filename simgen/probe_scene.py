@@ -58,7 +58,7 @@ def probe_scene(target: Prepared) -> Facts:
             _object_facts(number, name, centre, corners, image, boxes.get(number), hidden, small)
             for number, name in built.names.items()
         ),
-        luminance=float(image.mean()),
+        luminance=float(image.mean() if built.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
         elsewhere={
             place: _share(image[mask].sum(axis=0), light) for place, mask in _elsewhere(scene, centre).items()
@@ -70,6 +70,8 @@ def probe_scene(target: Prepared) -> Facts:
         memory_bytes=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
         corners=len(corners),
         lamps_away=_lamps_away(scene, list(boxes.values())),
+        level=scene.level,
+        gain=built.gain,
         glass=tuple(thing.name for thing in scene.objects if isinstance(thing.material.finish, Glass)),
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),

@@ -3,6 +3,7 @@
 World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking along +Z.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,13 +32,14 @@ from simgen.schema import (
 from simgen.shapes import Shape
 
 MOST_OBJECTS = 1000
+NAME = "^[A-Za-z][A-Za-z0-9_-]*$"
 MOST_LIGHTS = 100
 
 
 class SceneObject(Strict):
     """One named thing that truth and scores know."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$", max_length=64)]
+    name: Annotated[str, Field(max_length=64, json_schema_extra={"pattern": NAME})]
     """What truth, scores and pictures call it: a letter, then letters, digits, _ and -."""
     position_mm: Position
     """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
@@ -47,6 +49,16 @@ class SceneObject(Strict):
     """A sphere, card, box, cylinder or mesh."""
     material: Material
     """Its colour or texture, and its finish."""
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_name(cls, name: str) -> str:
+        if not re.match(NAME, name):
+            shown = shorten(repr(name), LONGEST_PART)
+            raise ValueError(
+                f"a name is a letter, then letters, digits, _ and -, such as 'left-wheel', not {shown}"
+            )
+        return name
 
 
 class Backdrop(Strict):

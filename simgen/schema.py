@@ -22,6 +22,14 @@ _LONG_KEY = re.compile(
 )
 
 
+_IN_TOML = {
+    "a valid tuple": "a list in brackets",
+    "a valid dictionary or object to extract fields from": 'a table such as { type = "..." }',
+    "a valid dictionary or instance of": "a table, as of",
+}
+"""What pydantic calls things, and what they are to whoever writes TOML."""
+
+
 class Strict(BaseModel):
     """Frozen; an unknown key, NaN or infinity is an error."""
 
@@ -51,6 +59,15 @@ def completed_by(key: Literal["enum", "examples"], names: Callable[[], list[str]
         schema[key] = names()
 
     return add
+
+
+def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+    """The JSON Schema of a model's files; by its `type` an editor tells which of several tables is meant."""
+    schema = model.model_json_schema()
+    for table in schema.get("$defs", {}).values():
+        if "const" in table.get("properties", {}).get("type", {}):
+            table["required"] = ["type", *table.get("required", [])]
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | schema
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -91,6 +108,8 @@ def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
 
 
 def _repr(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
     try:
         # A large array is not written out first.
         return shorten(
@@ -122,6 +141,8 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
         text += str(first.get("ctx", {}).get("error"))
     else:
         message = first["msg"][0].lower() + first["msg"][1:]
+        for theirs, ours in _IN_TOML.items():
+            message = message.replace(theirs, ours)
         text = f"'{where}': {message}, got {_repr(first['input'])}"
     more = len(errors) - 1
     return text + (f" (and {more} more)" if more else "")

@@ -163,17 +163,17 @@ def sensitivity(camera: str, near: Path) -> np.ndarray:
 
 
 def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    if not path.is_file():
+        raise InputError(f"sensor.camera: there is no file {path}")
+    if path.stat().st_size > MOST_CSV_BYTES:
+        raise InputError(f"{path}: sensitivities take no more than {MOST_CSV_BYTES} bytes")
     try:
-        if not path.is_file():
-            raise InputError(f"{path}: there is no such file")
-        if path.stat().st_size > MOST_CSV_BYTES:
-            raise InputError(f"{path}: sensitivities take no more than {MOST_CSV_BYTES} bytes")
         with path.open(newline="", encoding="utf-8-sig") as file:
             head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
         table = np.array(rows, dtype=np.float64)
     except (OSError, ValueError, csv.Error):
         raise InputError(
-            f"{path}: cannot be read; write a head and rows of numbers: wavelength_nm, R, G, B"
+            f"{path}: cannot be read; write a head and rows of numbers, with commas: wavelength_nm, R, G, B"
         ) from None
     if table.ndim != 2 or table.shape[1] not in (2, 4) or len(head) != table.shape[1]:
         raise InputError(f"{path}: expected the columns wavelength_nm, R, G, B, or two for one curve")

@@ -106,7 +106,7 @@ def test_near_objects_are_warned_of_and_one_plane_is_not(apart: float, verdict: 
 def test_moving_an_object_as_told_mends_the_separation() -> None:
     (finding,) = separation_findings(facts(thing("a", 540), thing("b", 545)))
     assert finding.verdict == "warn"
-    depth = float(finding.remedy.split("move b back to ")[1].split(" mm")[0])
+    depth = 545 + float(finding.remedy.split("move b ")[1].split(" mm further")[0])
     assert apart_px(paper_grid(), 540, depth) == pytest.approx(3, abs=0.2)  # told in whole millimetres
 
 

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,15 +19,20 @@ from simgen.scene import load_scene
 LIMIT_S = 2.0
 
 
+def spent_s() -> float:
+    """Processor time of this process and of those it has started and ended: other work does not count."""
+    return sum(os.times()[:4])
+
+
 def refusal(folder: Path) -> str:
     """The sentence with which the scene in this folder is refused, by the way that every command takes.
 
     `build` begins with `read_assets`, before the renderer sees anything.
     """
-    start = time.perf_counter()
+    start = spent_s()
     with pytest.raises(InputError) as caught:
         read_assets(*load_scene(str(folder)))
-    assert time.perf_counter() - start < LIMIT_S
+    assert spent_s() - start < LIMIT_S
     sentence = str(caught.value)
     assert sentence.isprintable()
     assert len(sentence) < 800
