@@ -1,10 +1,15 @@
 """Photons that come through glass: one by one they must be as many as in rendered views."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import lit_views
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, surprise, thinned
+from lit_views import SCALAR, card, film, in_scalar_mode, seen, sky, surprise, thinned
 
-from simgen import backend
+from simgen.build import Built
 
 pytestmark = pytest.mark.renders
 DEPTH = 8
@@ -28,23 +33,43 @@ PANE = {
 GRID = film()
 
 
-def test_photons_through_glass_are_those_of_rendered_views() -> None:
-    # In uniform light glass gathers none, and rendered views are clean.
-    backend.load()
-    built = made([BEHIND, BALL, PANE], [EVENLY], max_depth=DEPTH)
+@pytest.mark.parametrize("index", [1.5, 2.0])
+@pytest.mark.parametrize("thing", [BALL, PANE], ids=["ball", "pane"])
+def test_glass_reflects_what_fresnel_says(thing: dict[str, Any], index: float) -> None:
+    glass = thing | {"position_mm": (0.0, 0.0, 400.0), "rotation_deg": (0.0, 0.0, 0.0)}
+    glass["material"] = {"finish": {"type": "glass", "refractive_index": index}}
+    black = card(600.0, 5000.0, {"reflectance": [0, 0, 0]})
+    # Right in the middle, where both surfaces are met at right angles: R and, from inside, again and again.
+    view = seen(lit_views.made([black, glass], [EVENLY], max_depth=DEPTH), film(4, 4, focal_mm=5000.0), 16384)
+    once = ((index - 1) / (index + 1)) ** 2
+    # A quarter of a million paths, each of which brings 0 or 1.
+    both = 2 * once / (1 + once)
+    assert abs(view.mean() - both) < 4 * np.sqrt(both / 262_144)
+
+
+@pytest.mark.parametrize(("light", "depth"), [("uniform", DEPTH), ("an image", 4)])
+def test_photons_through_glass_are_those_of_rendered_views(light: str, depth: int, tmp_path: Path) -> None:
+    # Glass gathers no uniform light, and of an image as smooth as this not much: rendered views are clean.
+    pixels = np.linspace(1.6, 0.4, 16)[:, None, None] * np.ones((16, 32, 3))
+    lamp = EVENLY if light == "uniform" else sky(tmp_path, pixels)
+
+    def made(objects: Sequence[dict[str, Any]], max_depth: int) -> Built:
+        return lit_views.made(objects, [lamp], max_depth=max_depth, folder=tmp_path)
+
+    built = made([BEHIND, BALL, PANE], max_depth=depth)
     view = seen(built, GRID, 512 if SCALAR else 8192)
     gain = (20_000 if SCALAR else 200_000) / view.sum() * 3
-    photons = thinned(built, GRID, DEPTH, gain)
+    photons = thinned(built, GRID, depth, gain)
     assert abs(surprise(photons, view, GRID, gain)) < 5
     assert photons.log["overshoot_photons"] <= max(1e-4 * photons.k.size, 3)
     # The faults: what is seen through the pane, or upside down in the ball, is that without glass.
-    bare = seen(made([BEHIND], [EVENLY], max_depth=DEPTH), GRID, 256)
+    bare = seen(made([BEHIND], max_depth=depth), GRID, 256)
     for half in (slice(0, 16), slice(16, 32)):
         without = view.copy()
         without[:, half] = bare[:, half]
         assert surprise(photons, without, GRID, gain) > 5
     # The fault: paths that are too short to leave the glass.
-    short = seen(made([BEHIND, BALL, PANE], [EVENLY], max_depth=3), GRID, 256)
+    short = seen(made([BEHIND, BALL, PANE], max_depth=3), GRID, 256)
     assert surprise(photons, np.maximum(short, 1e-3), GRID, gain) > 5
 
 

@@ -85,11 +85,11 @@ NEAR_LAMP = {
     "type": "area",
     "position_mm": (-260.0, 40.0, 400.0),
     "target_mm": (0.0, 0.0, Z_MM),
-    "width_mm": 300.0,
-    "height_mm": 300.0,
+    "width_mm": 400.0,
+    "height_mm": 400.0,
     "luminance_cd_m2": 7.0,
 }
-"""As wide as it is far away, and with its edge behind the plane that it lights."""
+"""Wider than it is far away, and with its edge behind the plane that it lights."""
 SUN = "sun"
 
 
