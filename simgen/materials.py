@@ -18,7 +18,11 @@ class Matt(Strict):
 
 
 class Plastic(Strict):
-    """A coloured body under a clear coat of refractive index 1.49, which gives highlights."""
+    """A coloured body under a clear coat of refractive index 1.49, which gives highlights.
+
+    Light that a rough coat scatters more than once is lost: a white ball alone in even light looks 0.98,
+    0.91, 0.70 and 0.55 bright at roughness 0.01, 0.1, 0.3 and 0.5.
+    """
 
     type: Literal["plastic"] = "plastic"
     roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
