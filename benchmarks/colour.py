@@ -133,7 +133,7 @@ def table() -> Iterator[str]:
 
 def _raw(charts: dict[tuple[str, str | None], Chart]) -> Iterator[str]:
     """Errors of spectral mode relative to the white patch's green, of RGB mode to the white patch's own."""
-    yield "| raw channels: largest, mean error | spectral mode | of that linear tables | of that noise | " + (
+    yield "| raw channels: largest, mean error | spectral mode | without rendering | of that noise | " + (
         "RGB mode | RGB mode after the best matrix | its colours from the camera's: CIEDE2000 |"
     )
     yield "|---|---|---|---|---|---|---|"
@@ -143,21 +143,21 @@ def _raw(charts: dict[tuple[str, str | None], Chart]) -> Iterator[str]:
             chart, exact = charts[lamp, camera], integrated(lamp, camera)
             found = chart.channels / chart.channels[WHITE, GREEN]
             spectral = abs(found / (exact / exact[WHITE, GREEN]) - 1)
-            tables = _by_linear_tables(lamp, camera)
-            linear = abs(tables / tables[WHITE, GREEN] / (exact / exact[WHITE, GREEN]) - 1)
+            tables = _by_tables(lamp, camera)
+            unrendered = abs(tables / tables[WHITE, GREEN] / (exact / exact[WHITE, GREEN]) - 1)
             noise = chart.error / chart.channels
             balanced = exact / exact[WHITE]
             untouched = abs(plain / plain[WHITE] / balanced - 1)
             fitted = abs(plain @ _relative_fit(plain, balanced) / balanced - 1)
             apart = _difference(colours(plain, lamp), colours(exact, lamp))
             yield (
-                f"| {lamp}, {camera} | {_worst(spectral)} | {_worst(linear)} | {_worst(noise)} "
+                f"| {lamp}, {camera} | {_worst(spectral)} | {_worst(unrendered)} | {_worst(noise)} "
                 f"| {_worst(untouched)} | {_worst(fitted)} | {apart.max():.1f}, {apart.mean():.1f} |"
             )
 
 
-def _by_linear_tables(lamp: str, camera: str) -> np.ndarray:
-    """Raw channels (24, 3) without rendering: integrals of what is linear between the entries of tables."""
+def _by_tables(lamp: str, camera: str) -> np.ndarray:
+    """Raw channels (24, 3) without rendering: integrals of the tables that renderings are made from."""
     curves = sensitivity(camera, Path())
     return np.array([integral(curves * illuminant(lamp) * patch(name)) for name in patch_names()])
 
