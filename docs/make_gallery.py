@@ -47,7 +47,9 @@ def main() -> None:
     folder = DOCS / "gallery"
     folder.mkdir(exist_ok=True)
     for name in scene_names():
-        write_preview(str(SCENES / name), folder / f"{name}.jpg", SAMPLES_PER_PIXEL, DOTS_PER_INCH)
+        write_preview(
+            str(SCENES / name), folder / f"{name}.jpg", SAMPLES_PER_PIXEL, dots_per_inch=DOTS_PER_INCH
+        )
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
 
 
