@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
@@ -153,6 +153,7 @@ def generate(
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+    seeds: int | None = None,
 ) -> None:
     """Make the dataset of a recipe; run again to resume.
 
@@ -162,6 +163,8 @@ def generate(
 
         simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
 
+        simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
+
     Parameters
     ----------
     recipe
@@ -170,19 +173,32 @@ def generate(
         Folder for the dataset: new, empty, or the same recipe's unfinished one.
     set
         Override one value of the recipe, such as photons.budget=300; may be repeated.
+    seeds
+        Make so many datasets, out/seed_<n>, for the recipe's seed and those that follow. Each is complete;
+        radiance is rendered anew for each, so set products.radiance=none where nothing looks at it.
     """
     from simgen import backend
     from simgen.generate import generate as make
     from simgen.recipe import load_recipe
+    from simgen.series import generate_series
 
     resolved, near = load_recipe(recipe, set)
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:
-        manifest = make(resolved, near, out, report)
+        if seeds is None:
+            say(_made(out, make(resolved, near, out, report)))
+            return
+        for done, (folder, manifest) in enumerate(generate_series(resolved, near, out, seeds), start=1):
+            say(_made(folder, manifest))
+            report("datasets", done, seeds)
+
+
+def _made(folder: Path, manifest: dict[str, Any]) -> str:
+    """One line about a finished dataset."""
     seconds = sum(manifest["timings_s"].values())
     photons = manifest["photons"]
     caught = f", {photons['total']} photons" if photons else ""
-    say(f"{out}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s")
+    return f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
 
 
 @app.command

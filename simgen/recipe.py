@@ -40,6 +40,8 @@ MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
+SEED_LIMIT = 1 << 63
+"""Seeds are less."""
 APERTURE_TOLERANCE = 0.01
 """F-numbers are rounded by about so much."""
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
@@ -172,7 +174,7 @@ class Recipe(Strict):
     """What reports and pictures call it; the scene's title unless given."""
     scene: Annotated[str, Field(min_length=1)]
     """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    seed: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] = 0
     """All that is random follows from it: the same seed, the same bytes."""
     grid: Grid = Grid()
     sensor: Sensor = Sensor()

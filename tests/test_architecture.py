@@ -62,7 +62,7 @@ SIMGEN_LEVELS = [
     {"counts", "truth_file"},
     {"facts"},
     {"generate", "probe_scene", "check_sight", "check_depth", "check_photons", "check_cost"},
-    {"check", "preview", "sheet"},
+    {"check", "preview", "sheet", "series"},
     {"cli"},
 ]
 
