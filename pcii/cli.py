@@ -201,6 +201,48 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
     say(f"{results.save_score(out, result)}")
 
 
+@app.command
+def evaluate(
+    datasets: Annotated[tuple[Path, ...], Parameter(negative=())],
+    *,
+    out: Out,
+    method: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+    budget: Annotated[tuple[float, ...], Parameter(negative=())] = (),
+    part: str = "1/1",
+) -> None:
+    """Compare methods over datasets and photon budgets, with intervals over seeds; run again to go on.
+
+    Writes evaluation.json, evaluation.html and evaluation.md, and rows.jsonl as it goes.
+
+    Examples:
+
+        pcii evaluate out/twenty -o out/compared
+
+        pcii evaluate out/twenty out/slats -o out/compared --method likelihood --budget 300 --part 1/2
+
+    Parameters
+    ----------
+    datasets
+        Dataset folders, or folders of such, as made by `simgen generate --seeds`.
+    out
+        Folder for the evaluation: new, empty, or that of an earlier one, which is added to.
+    method
+        A method of removal, or "depth"; may be repeated. Default: all.
+    budget
+        A photon budget that every dataset has; may be repeated. Default: all that each has.
+    part
+        i/n: measure only every n-th dataset from the i-th on, so that n processes share one OUT.
+    """
+    from pcii.evaluate import evaluate as compare
+    from pcii.evaluate import part_of
+
+    with Stages() as report:
+        result = compare(datasets, out, methods=method, budgets=budget, part=part_of(part), report=report)
+    if result["missing"]:
+        say(f"{result['missing']} rows are still to be measured, by other parts")
+    say(f"report: {out / 'evaluation.html'}")
+
+
 def main() -> int:
     """Entry point of the `pcii` command."""
     return console.run(app)

@@ -40,18 +40,22 @@ class Dataset:
     budget: float | None = None
     """Nested photon budget that `counts` are of; None for the recipe's own."""
 
-    def at_budget(self, budget: float) -> "Dataset":
-        """The same dataset with the photons of a smaller, nested budget; `InputError` if it has none."""
+    @property
+    def budgets(self) -> tuple[float | None, ...]:
+        """Photon budgets that it has counts of: nested ones, then the recipe's own; None for an exposure."""
         own = self.manifest.get("recipe", {}).get("photons", {})
         whole = None if own.get("scope") == "exposure" else own.get("budget")
-        nested = own.get("nested") or []
+        return (*sorted(own.get("nested") or []), whole)
+
+    def at_budget(self, budget: float | None) -> "Dataset":
+        """The same dataset with the photons of a smaller, nested budget; `InputError` if it has none."""
+        *nested, whole = self.budgets
         if budget == whole:
             return replace(self, budget=None)
-        if budget not in nested:
+        if budget is None or budget not in nested:
             known = ", ".join(f"{n:g}" for n in (whole, *nested) if n is not None)
-            raise InputError(
-                f"{self.path}: no photons of budget {budget:g} here; there are {known or 'none'}"
-            )
+            asked = "none" if budget is None else f"{budget:g}"
+            raise InputError(f"{self.path}: no photons of budget {asked} here; there are {known or 'none'}")
         return replace(self, budget=budget)
 
     @property

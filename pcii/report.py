@@ -14,6 +14,7 @@ from pcii.demosaic import demosaic
 from pcii.pipeline import Outcome, depth_range_of
 from pcii.score import object_masks, pixel_masks
 from pcii.store import write_bytes_safely
+from pcii.summary import own_planes
 from pcii.types import Sections, Truth
 
 PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
@@ -80,10 +81,7 @@ def table1_holds(
     objects: tuple[Mapping[str, Any], ...], planes: tuple[Mapping[str, Any], ...]
 ) -> bool | None:
     """Whether each object's entropy is lowest at its own plane; None if that cannot be said."""
-    own: dict[str, str] = {}
-    for row in planes:
-        for name in (row["object"] or "").split(", "):
-            own[name] = f"{row['z_mm']:g}"
+    own = own_planes(planes)
     verdicts: list[bool] = []
     for row in objects:
         bits = {z: value for z, value in row["entropy"].items() if value is not None}

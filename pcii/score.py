@@ -51,7 +51,7 @@ def score(
     ]
     objects = _object_rows(methods[0], pooled[0], truth) if methods and truth is not None else []
     grid = methods[0].sections.grid if methods else None
-    errors = _depth_errors(grid, depth, truth)
+    errors = depth_errors(grid, depth, truth)
     return Score(tuple(rows), tuple(objects), errors, dataset)
 
 
@@ -195,9 +195,10 @@ def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dic
     return rows
 
 
-def _depth_errors(
+def depth_errors(
     grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None
 ) -> dict[str, float | None]:
+    """Errors of a depth map over the objects' pixels, as `score` tells them; None where they are unknown."""
     keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage")
     if grid is None or depth is None or truth is None or not (truth.object_id > 0).any():
         return dict.fromkeys(keys)

@@ -24,7 +24,7 @@ SHARED = {
 # Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
 PCII_LEVELS = [
     {"errors"},
-    {"bayer", "store", "console", "kernels"},
+    {"bayer", "store", "console", "kernels", "paired", "evaluation_tables", "evaluation_plots"},
     {"types", "dense_kernels", "demosaic_kernels"},
     {"photon_counts"},
     {"geometry", "dataset", "demosaic", "picture"},
@@ -34,10 +34,10 @@ PCII_LEVELS = [
     {"likelihood"},
     {"three_step", "depth", "score"},
     {"segment"},
-    {"results"},
-    {"pipeline"},
-    {"report"},
-    {"run"},
+    {"results", "measurements"},
+    {"pipeline", "summary"},
+    {"report", "evaluation_report"},
+    {"run", "evaluate"},
     {"cli"},
 ]
 SIMGEN_LEVELS = [

@@ -1,0 +1,63 @@
+"""Plots of an evaluation: accuracy against light, and against time."""
+
+import base64
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""Okabe and Ito's colours, which the colour-blind tell apart."""
+MARKERS = "osD^vPX"
+
+
+def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
+    """Object IoU against photons per view, and against seconds, as a PNG in a data URI.
+
+    One colour and marker for each of `methods`, whichever of them the group has; bars are intervals.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10.5, 3.9), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    light, time = figure.subplots(1, 2, sharey=True)
+    for number, method in enumerate(methods):
+        rows = [row for row in group["results"] if row["method"] == method and row["object"].get("iou")]
+        if not rows:
+            continue
+        style = {
+            "color": COLOURS[number % len(COLOURS)],
+            "marker": MARKERS[number % len(MARKERS)],
+            "linestyle": "-" if number < len(COLOURS) else "--",
+            "markersize": 5,
+            "linewidth": 1.4,
+            "capsize": 2.5,
+        }
+        iou = [row["object"]["iou"]["mean"] for row in rows]
+        bars = _bars([row["object"]["iou"] for row in rows])
+        light.errorbar([row["photons_per_view"] for row in rows], iou, yerr=bars, label=method, **style)
+        seconds = [row["seconds"]["mean"] for row in rows]
+        across = _bars([row["seconds"] for row in rows])
+        time.errorbar(seconds, iou, yerr=bars, xerr=across, **style)
+    for axes, name in ((light, "photons per view"), (time, "seconds a dataset")):
+        axes.set_xlabel(name)
+        axes.set_ylim(-0.02, 1.02)
+        axes.grid(True, color="#d9dde5", linewidth=0.6)
+        axes.spines[["top", "right"]].set_visible(False)
+    if all(row["photons_per_view"] > 0 for row in group["results"]):
+        light.set_xscale("log")
+    time.set_xscale("log")
+    light.set_ylabel("IoU, mean over planes")
+    if light.get_legend_handles_labels()[0]:
+        light.legend(frameon=False, fontsize=9)
+    stored = io.BytesIO()
+    figure.savefig(stored, format="png")
+    return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"
+
+
+def _bars(means: Sequence[Mapping[str, Any]]) -> list[list[float]]:
+    """How far each interval reaches below and above its mean, (2, N); 0 where there is none."""
+    ends = [mean["interval"] or (mean["mean"], mean["mean"]) for mean in means]
+    below = [max(0.0, mean["mean"] - low) for mean, (low, _) in zip(means, ends, strict=True)]
+    above = [max(0.0, high - mean["mean"]) for mean, (_, high) in zip(means, ends, strict=True)]
+    return [below, above]

@@ -1,0 +1,84 @@
+"""An evaluation to keep and to read: evaluation.json, a self-contained page, and Markdown."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pcii.evaluation_plots import accuracy_plots
+from pcii.evaluation_tables import budget_name, markdown, overview, tables_of, told
+from pcii.store import write_bytes_safely, write_json_safely
+
+
+def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
+    """Write evaluation.json, evaluation.md and evaluation.html of what `summarise` gives."""
+    write_json_safely(out / "evaluation.json", evaluation)
+    write_bytes_safely(out / "evaluation.md", _markdown(evaluation).encode())
+    write_bytes_safely(out / "evaluation.html", _page(evaluation).encode())
+
+
+def _methods(evaluation: Mapping[str, Any]) -> list[str]:
+    rows = [row for group in evaluation["groups"] for row in group["results"] if "object" in row]
+    return sorted({row["method"] for row in rows})
+
+
+def _notes(evaluation: Mapping[str, Any]) -> list[str]:
+    """What has to be known to read the tables."""
+    notes = [
+        "IoU, boundary F and photons are of the objects that belong to each plane, mean over the planes where "
+        "none is named. In brackets: " + evaluation["interval"] + ".",
+        "p: sign-flip permutation test on the same datasets, two-sided, not corrected for the number of rows.",
+    ]
+    if evaluation.get("missing"):
+        notes.append(f"Not finished: {evaluation['missing']} rows are still to be measured.")
+    return notes
+
+
+def _falls(group: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{fall['method']}: IoU is worse with {budget_name(fall['to'])} photons than with "
+        f"{budget_name(fall['from'])}, by {told(fall['difference'])}."
+        for fall in group["monotonic"]
+    ]
+
+
+def _markdown(evaluation: Mapping[str, Any]) -> str:
+    parts = ["# Evaluation", *_notes(evaluation)]
+    table = overview(evaluation["groups"])
+    if table.rows:
+        parts += [f"## {table.title}", markdown(table)]
+    for group in evaluation["groups"]:
+        parts.append(f"## {group['title']}")
+        parts += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
+        parts += _falls(group)
+    return "\n\n".join(parts) + "\n"
+
+
+def _page(evaluation: Mapping[str, Any]) -> str:
+    from jinja2 import Environment, PackageLoader, select_autoescape
+
+    environment = Environment(
+        loader=PackageLoader("pcii"),
+        autoescape=select_autoescape(),
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    methods = _methods(evaluation)
+    groups = [
+        {
+            "title": group["title"],
+            "datasets": group["datasets"],
+            "recipe": group["recipe"],
+            "plot": accuracy_plots(group, methods)
+            if any("object" in row for row in group["results"])
+            else "",
+            "tables": tables_of(group),
+            "falls": _falls(group),
+        }
+        for group in evaluation["groups"]
+    ]
+    return environment.get_template("evaluation.html.j2").render(
+        version=evaluation["version"],
+        notes=_notes(evaluation),
+        overview=overview(evaluation["groups"]),
+        groups=groups,
+    )
