@@ -17,6 +17,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator, NullLocator
 
     figure = Figure(figsize=(10.5, 3.9), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
@@ -37,16 +38,17 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         bars = _bars([row["object"]["iou"] for row in rows])
         light.errorbar([row["photons_per_view"] for row in rows], iou, yerr=bars, label=method, **style)
         seconds = [row["seconds"]["mean"] for row in rows]
-        across = _bars([row["seconds"] for row in rows])
-        time.errorbar(seconds, iou, yerr=bars, xerr=across, **style)
+        time.errorbar(seconds, iou, yerr=bars, **style)
     for axes, name in ((light, "photons per view"), (time, "seconds a dataset")):
         axes.set_xlabel(name)
         axes.set_ylim(-0.02, 1.02)
         axes.grid(True, color="#d9dde5", linewidth=0.6)
         axes.spines[["top", "right"]].set_visible(False)
-    if all(row["photons_per_view"] > 0 for row in group["results"]):
-        light.set_xscale("log")
-    time.set_xscale("log")
+        if name != "photons per view" or all(row["photons_per_view"] > 0 for row in group["results"]):
+            axes.set_xscale("log")
+            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            axes.xaxis.set_minor_locator(NullLocator())
     light.set_ylabel("IoU, mean over planes")
     if light.get_legend_handles_labels()[0]:
         light.legend(frameon=False, fontsize=9)

@@ -24,9 +24,9 @@ def _methods(evaluation: Mapping[str, Any]) -> list[str]:
 def _notes(evaluation: Mapping[str, Any]) -> list[str]:
     """What has to be known to read the tables."""
     notes = [
-        "IoU, boundary F and photons are of the objects that belong to each plane, mean over the planes where "
-        "none is named. In brackets: " + evaluation["interval"] + ".",
-        "p: sign-flip permutation test on the same datasets, two-sided, not corrected for the number of rows.",
+        "Figures are against the objects that belong to each plane, and means over the planes where none is "
+        "named. In brackets: " + evaluation["interval"] + ".",
+        "p: sign-flip permutation test on the same datasets, two-sided, not corrected for many comparisons.",
     ]
     if evaluation.get("missing"):
         notes.append(f"Not finished: {evaluation['missing']} rows are still to be measured.")
@@ -68,9 +68,7 @@ def _page(evaluation: Mapping[str, Any]) -> str:
             "title": group["title"],
             "datasets": group["datasets"],
             "recipe": group["recipe"],
-            "plot": accuracy_plots(group, methods)
-            if any("object" in row for row in group["results"])
-            else "",
+            "plot": accuracy_plots(group, methods) if methods else "",
             "tables": tables_of(group),
             "falls": _falls(group),
         }

@@ -50,7 +50,8 @@ def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
 def markdown(table: Table) -> str:
     """The table in Markdown, without its title."""
     rule = [":--" if column < table.words else "--:" for column in range(len(table.header))]
-    return "\n".join(f"| {' | '.join(row)} |" for row in (table.header, rule, *table.rows))
+    rows = [[cell.replace("|", "\\|") for cell in row] for row in (table.header, *table.rows)]
+    return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 
 def told(mean: Mapping[str, Any] | None, digits: int = 3) -> str:

@@ -1,4 +1,4 @@
-"""Scores as they are measured, one JSON object a line in rows.jsonl, kept through kills and shared by processes.
+"""Scores as they are measured, one JSON object a line in rows.jsonl, through kills and by many processes.
 
 A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice.
 """

@@ -1,4 +1,4 @@
-"""Rows of an evaluation, summed up: means over seeds, methods against each other, more photons against fewer."""
+"""Rows of an evaluation, summed up: means over seeds, and what is better than what."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,17 +12,15 @@ from pcii.paired import Mean, mean_interval, paired_difference
 INTERVALS = "95 % interval of the mean by Student's t over seeds, shares clipped to [0, 1]; null for one seed"
 TABLE_1_METHOD = "three-step"
 TRUTHS = ("object", "pixel")
-SHARES = frozenset(
-    "iou precision recall f1 boundary_f photon_precision photon_recall claimed_share "
-    "bad_1px bad_3px coverage".split()
-)
+SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
+SHARES |= {"claimed_share", "bad_1px", "bad_3px", "coverage"}
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     """What evaluation.json holds: `groups`, one for each recipe, of datasets that differ in their seed alone.
 
-    A group's `results` have a row for each budget and method: means over seeds with their intervals, by kind of
-    truth as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`.
+    A group's `results` have a row for each budget and method: means over seeds with their intervals, by kind
+    of truth as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`.
     `paired` compares methods by the mean object IoU of the same datasets, `monotonic` lists where that
     falls from one budget to the next larger one by more than its interval explains, and `table1` says in
     how many seeds each object's entropy is lowest at its own plane.
@@ -158,8 +156,8 @@ def _falls(cells: Mapping[tuple[float | None, str], Mapping[str, Row]]) -> list[
     for method in sorted({method for _, method in cells}):
         for fewer, more in pairwise(cell for cell in cells if cell[1] == method):
             found = _compared(cells[more], cells[fewer])
-            interval = found and found["difference"]["interval"]
-            if interval and interval[1] < 0:
+            interval = None if found is None else found["difference"]["interval"]
+            if found is not None and interval is not None and interval[1] < 0:
                 entries.append({"method": method, "from": fewer[0], "to": more[0], **found})
     return entries
 
