@@ -5,17 +5,18 @@ inside the functions that need them. The imports below are eager because modules
 they are named for share names, and only an eager import leaves the function under that name.
 """
 
+__version__ = "0.1.0"
+
 from pcii.dataset import Dataset, open_dataset
 from pcii.demosaic import demosaic
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
+from pcii.evaluate import evaluate
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
 from pcii.segment import segment
 from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
-
-__version__ = "0.1.0"
 
 __all__ = [
     "CameraGrid",
@@ -30,6 +31,7 @@ __all__ = [
     "Views",
     "demosaic",
     "estimate_depth",
+    "evaluate",
     "open_dataset",
     "reconstruct",
     "reconstruct_each",
