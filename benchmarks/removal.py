@@ -1,0 +1,123 @@
+"""Removal of defocused points by every method: the scenes of corpus.toml, many seeds, many photon budgets.
+
+At full size this takes hours. Environment variables make it smaller or share it:
+
+BENCH_SEEDS    datasets of each scene, 20
+BENCH_BUDGETS  photons per view, "30 100 300 1000 3000"; 10000 photons are drawn and counted too
+BENCH_METHODS  methods by name, with commas between them; all
+BENCH_PART     i/n: only every n-th dataset from the i-th on, so that n processes share the work
+BENCH_OUT      where datasets and scores are kept, out/benchmark; what is there is not made again
+"""
+
+import os
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pcii.console import Stages
+from pcii.evaluate import evaluate, part_of
+from pcii.evaluation_tables import Table, markdown, overview, tables_of
+from pcii.measurements import recipe_of
+from pcii.store import MANIFEST, read_manifest
+from simgen.generate import generate
+from simgen.recipe import Recipe, load_recipe
+from simgen.schema import Strict, read_toml, validate
+from simgen.series import at_seeds, folder_of
+
+CORPUS = Path(__file__).with_name("corpus.toml")
+MOST_PHOTONS = 10_000
+
+
+class Entry(Strict):
+    """One scene of the corpus: the name of a recipe, and what the scene is for."""
+
+    recipe: str
+    half: Literal["train", "test"]
+    """Methods may be tuned on the one; figures that are told are of the other."""
+    kind: Literal["textured", "untextured", "cluttered", "depth", "empty", "paper"]
+
+
+class Corpus(Strict):
+    """The scenes that removal is measured on."""
+
+    scene: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class Work:
+    """One dataset to make and score."""
+
+    entry: Entry
+    recipe: Recipe
+    near: Path
+    folder: Path
+
+
+def load_corpus(path: Path = CORPUS) -> tuple[Entry, ...]:
+    """The scenes of a corpus file; `InputError` for one that is told wrongly."""
+    return validate(Corpus, read_toml(path), str(path)).scene
+
+
+def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int]) -> list[Work]:
+    """Every dataset, seed by seed, so that what is done early tells of all scenes."""
+    light = [f"photons.budget={MOST_PHOTONS}", f"photons.nested={budgets}"]
+    nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
+    series: list[list[Work]] = []
+    for entry in entries:
+        recipe, near = load_recipe(entry.recipe, [*light, *nothing_more, f"title={entry.recipe}"])
+        folder = out / "data" / entry.recipe
+        series.append([Work(entry, own, near, folder_of(folder, own)) for own in at_seeds(recipe, seeds)])
+    return [work for step in zip(*series, strict=True) for work in step]
+
+
+def table() -> Iterator[str]:
+    """Make and score what is missing, then tell all that is there, as Markdown."""
+    setting = os.environ.get
+    budgets = [int(text) for text in setting("BENCH_BUDGETS", "30 100 300 1000 3000").split()]
+    methods = [name.strip() for name in setting("BENCH_METHODS", "").split(",") if name.strip()]
+    out = Path(setting("BENCH_OUT", "out/benchmark"))
+    number, parts = part_of(setting("BENCH_PART", "1/1"))
+    works = work_list(load_corpus(), out, int(setting("BENCH_SEEDS", "20")), budgets)
+    own = [work for position, work in enumerate(works) if position % parts == number - 1]
+    with Stages() as progress:
+        for done, work in enumerate(own, start=1):
+            generate(work.recipe, work.near, work.folder)
+            progress("datasets", done, len(own))
+        folders = [work.folder for work in own]
+        evaluation = evaluate(folders, out / "scores", methods=methods, report=progress)
+    made = [work for work in works if (work.folder / MANIFEST).is_file()]
+    yield from report(evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in made})
+
+
+def report(evaluation: Mapping[str, Any], entry_of: Mapping[str, Entry]) -> Iterator[str]:
+    """The tables of an evaluation, line by line; `entry_of` tells which scene a group's recipe is."""
+    groups = evaluation["groups"]
+    yield f"removal of defocused points, {sum(group['datasets'] for group in groups)} datasets. In brackets:"
+    yield evaluation["interval"]
+    for shown in (overview(groups), by_half_and_kind(groups, entry_of)):
+        yield f"\n{shown.title}\n\n{markdown(shown)}"
+    for group in groups:
+        yield f"\n{group['title']}"
+        for shown in tables_of(group):
+            yield f"\n{shown.title}\n\n{markdown(shown)}"
+
+
+def by_half_and_kind(groups: list[dict[str, Any]], entry_of: Mapping[str, Entry]) -> Table:
+    """Mean over scenes of the mean object IoU, by half, kind and method; a column for each budget."""
+    found: dict[tuple[str, str, str], dict[float, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for group in groups:
+        entry = entry_of.get(group["recipe"])
+        for row in group["results"]:
+            if entry is not None and row.get("object", {}).get("iou"):
+                for kind in (entry.kind, "all"):
+                    cell = found[entry.half, kind, row["method"]][row["budget"]]
+                    cell.append(row["object"]["iou"]["mean"])
+    budgets = sorted({budget for cells in found.values() for budget in cells})
+    rows: list[tuple[str, ...]] = []
+    for names, cells in sorted(found.items()):
+        means = [f"{sum(cells[b]) / len(cells[b]):.3f}" if cells[b] else "–" for b in budgets]
+        rows.append((*names, str(max(len(values) for values in cells.values())), *means))
+    header = ("half", "kind", "method", "scenes", *(f"{budget:g}" for budget in budgets))
+    return Table("Mean IoU of scenes of a kind", header, tuple(rows), words=3)

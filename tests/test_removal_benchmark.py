@@ -1,0 +1,81 @@
+"""The benchmark of removal, but for its size: what it would make, and how it sums up."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.removal import Entry, by_half_and_kind, load_corpus, report, work_list
+from pcii.errors import InputError
+
+
+def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:
+    entries = load_corpus()
+    works = work_list(entries, tmp_path, 2, [30, 100])
+    assert len(works) == 2 * len(entries)
+    # Seed by seed: whoever stops early has every scene.
+    assert [work.entry for work in works[: len(entries)]] == list(entries)
+    for first, second in zip(works[: len(entries)], works[len(entries) :], strict=True):
+        assert second.recipe == first.recipe.model_copy(update={"seed": first.recipe.seed + 1})
+        assert first.recipe.photons.budget == 10_000
+        assert first.recipe.photons.nested == (30, 100)
+        assert first.recipe.products.radiance == "none"
+        assert first.recipe.title == first.entry.recipe
+        assert first.folder == tmp_path / "data" / first.entry.recipe / f"seed_{first.recipe.seed}"
+
+
+def test_a_corpus_that_is_told_wrongly_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "corpus.toml"
+    path.write_text('[[scene]]\nrecipe = "paper"\nhalf = "both"\nkind = "paper"\n')
+    with pytest.raises(InputError, match="half"):
+        load_corpus(path)
+
+
+def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict[str, Any]:
+    results = [
+        {
+            "budget": budget,
+            "method": method,
+            "seeds": 2,
+            "seconds": {"n": 2, "mean": 1.0, "interval": [0.5, 1.5]},
+            "object": {"iou": {"n": 2, "mean": mean, "interval": [mean - 0.25, mean + 0.25]}},
+            "pixel": {},
+            "planes": [],
+        }
+        for (budget, method), mean in ious.items()
+    ]
+    told = {"datasets": 2, "results": results, "paired": [], "monotonic": [], "table1": []}
+    return {"recipe": recipe, "title": title, "scene": title, **told}
+
+
+GROUPS = [
+    group("a", "balls", {(30.0, "m"): 0.25, (100.0, "m"): 0.5}),
+    group("b", "slats", {(30.0, "m"): 0.75, (100.0, "m"): 1.0}),
+    group("c", "stones", {(30.0, "m"): 0.5}),
+    group("d", "unknown", {(30.0, "m"): 0.0}),
+]
+ENTRIES = {
+    "a": Entry(recipe="balls", half="train", kind="textured"),
+    "b": Entry(recipe="slats", half="train", kind="cluttered"),
+    "c": Entry(recipe="stones", half="test", kind="textured"),
+}
+
+
+def test_means_by_half_and_kind_are_counted_by_hand() -> None:
+    table = by_half_and_kind(GROUPS, ENTRIES)
+    assert table.header == ("half", "kind", "method", "scenes", "30", "100")
+    assert table.rows == (
+        ("test", "all", "m", "1", "0.500", "–"),
+        ("test", "textured", "m", "1", "0.500", "–"),
+        ("train", "all", "m", "2", "0.500", "0.750"),
+        ("train", "cluttered", "m", "1", "0.750", "1.000"),
+        ("train", "textured", "m", "1", "0.250", "0.500"),
+    )
+
+
+def test_the_report_tells_every_scene() -> None:
+    text = "\n".join(report({"interval": "95 %", "groups": GROUPS}, ENTRIES))
+    assert "8 datasets" in text
+    for title in ("balls", "slats", "stones"):
+        assert f"| {title} | m |" in text
+    assert "0.250 (0.000 to 0.500)" in text
