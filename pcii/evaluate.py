@@ -80,10 +80,9 @@ def evaluate(
     own = [task for position, each in enumerate(tasks) if position % parts == number - 1 for task in each]
     left = [task for task in own if task.key not in done]
     warm: set[tuple[float | None, str]] = set()
-    for finished, task in enumerate(left):
-        report("scores", finished, len(left))
+    for finished, task in enumerate(left, start=1):
         append_row(folder, _measured(task, warm))
-    report("scores", len(left), len(left))
+        report("scores", finished, len(left))
     with all_rows(folder) as rows:
         there = {key_of(row) for row in rows}
         missing = sum(task.key not in there for each in tasks for task in each)
