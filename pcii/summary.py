@@ -113,11 +113,14 @@ def _figures(plane: Mapping[str, Any]) -> dict[str, float | None]:
     return {name: value for name, value in plane.items() if name not in ("z_mm", "object", "truth")}
 
 
-def _means(rows: Sequence[Mapping[str, float | None]]) -> dict[str, Any]:
-    """Mean and interval of each figure over the rows that have it; None where none has."""
+def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Mean and interval of each figure over the rows that have it, None where none has; of tables too."""
     means: dict[str, Any] = {}
     for name in dict.fromkeys(name for row in rows for name in row):
         known = [value for row in rows if (value := row.get(name)) is not None]
+        if known and isinstance(known[0], Mapping):
+            means[name] = _means(known)
+            continue
         bounds = (0.0, 1.0) if name in SHARES else (float("-inf"), float("inf"))
         means[name] = _told(mean_interval(known, bounds)) if known else None
     return means
