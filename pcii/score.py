@@ -12,7 +12,7 @@ from pcii.boundary import boundary_f, object_share
 from pcii.errors import InputError
 from pcii.geometry import blur_half_extent_px, disparity_spread_px, landing
 from pcii.statistics import entropy_bits, pooled_estimate, region_entropy_bits, section_window_px
-from pcii.types import CameraGrid, DepthMap, Score, Segmented, Truth
+from pcii.types import CameraGrid, DepthMap, PhotonTruth, Score, Segmented, Truth
 
 FOCUS_TOLERANCE_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
@@ -141,17 +141,21 @@ def mask_agreement(
 
 
 def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: str) -> dict[str, float | None]:
-    """Precision and recall of the photons that a mask keeps, against where each came from.
+    """Precision and recall of the photons that a method keeps, against where each came from.
 
-    A photon is kept if the voxel that it lands on in the section is claimed. It is rightly kept if
-    its object belongs to the plane ("object"), or if its first hit is in focus there ("pixel").
-    Photons that land outside the section do not count.
+    A photon is kept if `photon_in_focus` says so of its event or, without one, if the voxel that it lands
+    on in the section is claimed. It is rightly kept if its object belongs to the plane ("object"), or if
+    its first hit is in focus there ("pixel"). Photons that land outside the section do not count.
+    Raises `InputError` if `photon_in_focus` is of other events than the truth.
     """
     if truth is None or truth.photons is None:
         return {"photon_precision": None, "photon_recall": None}
     grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
     row, col, inside = landing(grid, photons, z0)
-    kept = focus.in_focus[plane][row[inside], col[inside]]
+    if focus.photon_in_focus is None:
+        kept = focus.in_focus[plane][row[inside], col[inside]]
+    else:
+        kept = _by_photon(focus.photon_in_focus[plane], photons)[inside]
     if kind == "object":
         own = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
         right = np.isin(photons.object_id[inside], own)
@@ -162,6 +166,18 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
         "photon_precision": both / int(kept.sum()) if kept.any() else None,
         "photon_recall": both / int(right.sum()) if right.any() else None,
     }
+
+
+def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
+    """What is said of each event (N,) for each of its photons: in the truth they are a run of one pixel."""
+    where = np.stack([photons.k, photons.l, photons.i, photons.j])
+    event = np.cumsum(np.any(np.diff(where, axis=1, prepend=-1), axis=0)) - 1
+    events = int(event[-1]) + 1 if event.size else 0
+    if by_event.size != events:
+        raise InputError(
+            f"photon_in_focus: tells of {by_event.size} events, and the truth's photons are of {events}"
+        )
+    return by_event[event]
 
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
