@@ -42,7 +42,9 @@ def _open(dataset: Path, budget: float | None) -> Dataset:
 
 
 @app.command
-def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) -> None:
+def run(
+    dataset: Path, *, out: Out, z_mm: Depths = (), method: tuple[str, ...] = (), budget: Budget = None
+) -> None:
     """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
 
     Example:  pcii run out/paper -o out/paper-results
@@ -55,11 +57,14 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) ->
         Folder for the results: new, empty, or that of earlier results of the same dataset.
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    method
+        A removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     """
     from pcii.run import run as run_all
+    from pcii.segment import DEFAULT_METHODS
 
     with Stages() as report:
-        outcome = run_all(_open(dataset, budget), out, z_mm, report)
+        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or DEFAULT_METHODS)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -142,7 +147,7 @@ def segment(
     *,
     out: Out,
     z_mm: Depths = (),
-    method: Literal["three-step", "likelihood"] = "likelihood",
+    method: str = "likelihood",
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
@@ -158,7 +163,8 @@ def segment(
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     method
-        The paper's three steps, or the Poisson likelihood.
+        three-step (the paper's), likelihood (Poisson), brightness, variance or shape-from-focus (to compare
+        with), or a method that an installed package brings.
     """
     from pcii.picture import mask_image, write_png
     from pcii.pipeline import planes_of

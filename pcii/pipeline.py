@@ -13,7 +13,7 @@ from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
 from pcii.score import score
-from pcii.segment import METHODS, segment
+from pcii.segment import DEFAULT_METHODS, find_method, segment
 from pcii.types import ArrayLike5D, DepthMap, Score, Sections, Segmented, Views, check_z_mm
 
 
@@ -32,16 +32,24 @@ class Outcome:
     timings_s: dict[str, float] = field(default_factory=dict)
 
 
-def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = silent) -> Outcome:
-    """Reconstruct sections, remove defocused points by every method, map depth, score.
+def analyse(
+    dataset: Dataset,
+    z_mm: Sequence[float] | None,
+    report: Report = silent,
+    methods: Sequence[str] = DEFAULT_METHODS,
+) -> Outcome:
+    """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
     `z_mm` defaults to the depths that the dataset's recipe names. Raises `InputError` where there
-    are none, or no counts.
+    are none, no counts, or no method of such a name.
     """
+    methods = tuple(dict.fromkeys(methods))
+    for method in methods:
+        find_method(method)  # a misspelt name is told before the work, not after
     seconds: dict[str, float] = {}
     z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
     counts = dataset.counts
-    total = 4 + len(METHODS)
+    total = 4 + len(methods)
     done = 0
 
     def finished(name: str, start: float) -> None:
@@ -59,7 +67,7 @@ def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = sil
     finished("sections", start)
 
     focus: list[Segmented] = []
-    for method in METHODS:
+    for method in methods:
         start = time.perf_counter()
         focus.append(segment(counts, z, method=method))
         finished(f"removal, {method}", start)
