@@ -19,11 +19,11 @@ NOISE = 0.5
 LEAST_CONTRAST_SIGMAS = 4.0
 """Noise alone, cut in two at its mean, gives halves whose means are 2 sqrt(2 / pi) = 1.6 sigma apart."""
 WINDOW_CELLS = 4
-PHOTONS_PER_VIEW = 5.0
+PHOTONS_PER_VIEW = 10.0
 LARGEST_CELL_PX = 8
 POISSON_QUANTILE = 0.999
 """The variance test passes what Poisson noise exceeds in one window of a thousand."""
-FOCUS_WINDOW = 4
+FOCUS_WINDOW = 6
 """Sharpness is summed over this many pooling windows along each axis."""
 
 
@@ -42,7 +42,7 @@ def variance(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
 
     Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point follows chi-square
     with V - 1 degrees of freedom if they all see one rate. A sample x is the photons of one view in a
-    square of even side, which holds each Bayer colour alike, large enough for about 5 of them where it
+    square of even side, which holds each Bayer colour alike, large enough for about 10 of them where it
     is bright. `steps` holds `bright` and `even`, the outcome of the test.
     """
     sections = reconstruct(counts, z_mm)
@@ -108,7 +108,7 @@ def _bright(image: np.ndarray) -> np.ndarray:
 
 
 def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
-    """Cell size at which a window of `WINDOW_CELLS` holds about 5 photons per view where it is bright."""
+    """Cell size at which a window of `WINDOW_CELLS` holds about 10 photons per view where it is bright."""
     if not bright.any():
         return LARGEST_CELL_PX
     per_pixel = float(pooled.mean(axis=-1)[bright].mean())

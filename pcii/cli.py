@@ -194,16 +194,22 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
     from pcii.errors import InputError
+    from pcii.pipeline import full_light_sections
     from pcii.score import score as compare
+    from pcii.types import check_z_mm
 
     data = _open(dataset, budget)
     if not out.is_dir():
         raise InputError(f"{out}: there is no such folder of results")
     results.claim(out, data)
-    focus = results.load_segmented(out, data)
-    if not focus:
-        raise InputError(f"{out}: holds no in-focus masks; make them with `pcii segment` or `pcii run`")
-    result = compare(focus, results.load_depth(out), data.truth, dataset=data.name)
+    focus, found = results.load_segmented(out, data), results.load_depth(out)
+    if not focus and found is None:
+        steps = "`pcii segment`, `pcii depth` or `pcii run`"
+        raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
+    z_mm = focus[0].z_mm if focus else data.analysis.get("z_mm")
+    knows = data.truth is not None and z_mm is not None
+    light = full_light_sections(data, check_z_mm(z_mm)) if knows else None
+    result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
     say(f"{results.save_score(out, result)}")
 
 

@@ -59,7 +59,7 @@ def analyse(
         report("analysis", done, total)
 
     start = time.perf_counter()
-    full_light = _full_light(dataset, z, report)
+    full_light = full_light_sections(dataset, z, report)
     finished("sections at full light", start)
 
     start = time.perf_counter()
@@ -77,7 +77,7 @@ def analyse(
     finished("depth", start)
 
     start = time.perf_counter()
-    result = score(focus, depth, dataset.truth, dataset=dataset.name)
+    result = score(focus, depth, dataset.truth, full_light=full_light, dataset=dataset.name)
     finished("score", start)
     return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
 
@@ -99,7 +99,8 @@ def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tup
     return 0.8 * float(z.min()), 1.25 * float(z.max())
 
 
-def _full_light(dataset: Dataset, z: np.ndarray, report: Report) -> Sections | None:
+def full_light_sections(dataset: Dataset, z: np.ndarray, report: Report = silent) -> Sections | None:
+    """Sections of the radiance at the depths z (Eq. 2); None if the dataset has none."""
     views = dataset.views
     if views is None:
         return None

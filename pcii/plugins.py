@@ -53,18 +53,18 @@ def load(point: EntryPoint) -> Method:
 
     def checked(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
         answer = remove(counts, z_mm)
-        fault = _fault(answer, point.name, counts, z_mm)
-        if fault:
-            raise InputError(f"{told} must return {fault}")
+        if not isinstance(answer, Segmented):
+            raise InputError(f"{told} must return a pcii.Segmented, not {type(answer).__name__}")
+        expected = _expected(answer, point.name, counts, z_mm)
+        if expected:
+            raise InputError(f"{told} must return {expected}")
         return answer
 
     return checked
 
 
-def _fault(answer: object, name: str, counts: PhotonCounts, z_mm: np.ndarray) -> str | None:
+def _expected(answer: Segmented, name: str, counts: PhotonCounts, z_mm: np.ndarray) -> str | None:
     """What the answer should have been, if it is not that."""
-    if not isinstance(answer, Segmented):
-        return f"a pcii.Segmented, not {type(answer).__name__}"
     if not np.array_equal(answer.z_mm, z_mm) or not np.array_equal(answer.sections.z_mm, z_mm):
         return f"masks and sections at the depths it was given, {z_mm.tolist()} mm"
     if answer.sections.grid != counts.grid or answer.sections.subpixel != 1:

@@ -322,12 +322,13 @@ class Truth:
 
 @dataclass(frozen=True)
 class Score:
-    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map."""
+    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map, bounds."""
 
     planes: tuple[Mapping[str, Any], ...]
     objects: tuple[Mapping[str, Any], ...]
-    depth: Mapping[str, float | None]
+    depth: Mapping[str, Any]
     dataset: str | None = None
+    bounds: Mapping[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""
@@ -336,4 +337,5 @@ class Score:
             "planes": [dict(row) for row in self.planes],
             "objects": [dict(row) for row in self.objects],
             "depth": dict(self.depth),
+            "bounds": dict(self.bounds),
         }
