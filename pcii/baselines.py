@@ -84,7 +84,7 @@ def sum_modified_laplacian(image: np.ndarray, step_px: int) -> np.ndarray:
     kernel = np.zeros(2 * step_px + 1)
     kernel[[0, step_px, -1]] = -1, 2, -1
     sharp = sum(np.abs(correlate1d(image, kernel, axis, mode="nearest")) for axis in (0, 1))
-    return uniform_filter(np.where(sharp > np.sqrt(6) * NOISE, sharp, 0.0), FOCUS_WINDOW * step_px)
+    return uniform_filter(np.where(sharp > np.sqrt(6) * NOISE, sharp, 0.0), FOCUS_WINDOW * step_px + 1)
 
 
 def _root_photons(sections: Sections, window_px: int) -> np.ndarray:

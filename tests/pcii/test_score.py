@@ -83,13 +83,10 @@ def test_a_perfect_answer_scores_one() -> None:
     for row in result.planes:
         assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
     assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
-    assert result.depth == {
-        "mae_mm": 0.0,
-        "median_mm": 0.0,
-        "bad_1px": 0.0,
-        "bad_3px": 0.0,
-        "coverage": 1.0,
-    }
+    for key in ("mae_mm", "median_mm", "mae_px", "median_px", "bad_1px", "bad_3px"):
+        assert result.depth[key] == 0.0
+    assert result.depth["coverage"] == 1.0
+    assert [row["iou_oracle"] for row in result.bounds["planes"]] == [1.0] * 4
 
 
 def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
@@ -115,13 +112,38 @@ def test_depth_errors_are_counted_in_pixels_of_total_spread() -> None:
     assert result.depth["bad_1px"] == 0.36
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
+    # Total spread is 9 x 250 / (0.0352 z) = 63920.45 / z px: less by 1.9334 and by 4.2121 px.
+    assert result.depth["mae_px"] == pytest.approx((18 * 1.9334 + 18 * 4.2121) / 100, abs=1e-4)
+    assert result.depth["median_px"] == 0.0
+
+
+def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
+    depth = DepthMap(*depth_of(truth()))
+    result = score(None, depth, truth(), grid=GRID)
+    assert result.planes == result.objects == ()
+    assert result.depth["coverage"] == 1.0
+    assert [row["name"] for row in result.bounds["objects"]] == ["near", "far"]
+    with pytest.raises(InputError, match=r"^grid: a depth map without masks"):
+        score([], depth, truth())
+
+
+def test_what_is_claimed_of_an_empty_dark_is_told() -> None:
+    masks = np.zeros((2, 24, 32), dtype=bool)
+    masks[1, :6, :8] = True  # 48 of 768 pixels
+    empty = Truth(np.full((24, 32), np.inf), np.zeros((24, 32), dtype=int), {})
+    rows = score(segmented(masks), None, empty).planes
+    assert [(row["z_mm"], row["claimed_share"], row["iou"]) for row in rows] == [
+        *[(540.0, 0.0, 1.0)] * 2,
+        *[(620.0, 1 / 16, 0.0)] * 2,
+    ]
 
 
 def test_without_truth_everything_unknown_is_none() -> None:
     result = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, None)
     assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)
     assert result.objects == ()
-    assert set(result.depth.values()) == {None}
+    assert all(set(v.values() if isinstance(v, dict) else [v]) == {None} for v in result.depth.values())
+    assert result.bounds == {"planes": [], "objects": []}
 
 
 def test_removal_lowers_the_entropy_of_the_section() -> None:
