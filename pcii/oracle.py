@@ -14,9 +14,12 @@ from pcii.geometry import blur_half_extent_px, disparity_spread_px, parallax_px
 from pcii.true_masks import FOCUS_TOLERANCE_PX, object_masks, objects_by_plane, pixel_masks
 from pcii.types import CameraGrid, Sections, Segmented, Truth
 
-TEXTURE_SIGMA_PX = 1.0
-"""Rates are smoothed by this before their gradient is taken: rendering noise is no texture."""
-AWAY_FROM_EDGES_PX = 5
+TEXTURE_SIGMA_PX = 0.5
+"""Rates are smoothed by this before their gradient is taken: enough to fill voxels that miss a colour.
+
+Natural texture has more gradient the closer one looks: with 1 px bounds are about half as large again.
+"""
+AWAY_FROM_EDGES_PX = 4
 """Three of these sigmas, one pixel of blur and one of the difference: no outline gets into the texture."""
 
 

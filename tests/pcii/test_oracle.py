@@ -115,7 +115,7 @@ def test_gradients_are_those_of_an_exponential_slope_whatever_the_coverage() -> 
     found = log_gradient_squared(rate * coverage, coverage, inside)
     # Colours by hand: photons share out as coverage x rate, and a central difference is sinh.
     light = (coverage * rate)[inside].sum(axis=0)
-    smooth = np.exp(np.array([0.1, 0.2, 0.0]) ** 2 / 2)  # a Gaussian of 1 px scales an exponential
+    smooth = np.exp(np.array([0.1, 0.2, 0.0]) ** 2 / 8)  # a Gaussian of 1/2 px scales an exponential
     light = light * smooth
     expected = light[:2] * np.sinh([0.1, 0.2]) ** 2 / light.sum()
     assert found == pytest.approx(tuple(expected), rel=1e-3)  # the filter ends at 4 sigma
