@@ -208,7 +208,8 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
     z_mm = focus[0].z_mm if focus else data.analysis.get("z_mm")
     knows = data.truth is not None and z_mm is not None
-    light = full_light_sections(data, check_z_mm(z_mm)) if knows else None
+    with Stages() as report:
+        light = full_light_sections(data, check_z_mm(z_mm), report) if knows else None
     result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
     say(f"{results.save_score(out, result)}")
 

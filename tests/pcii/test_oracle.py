@@ -97,6 +97,30 @@ def test_the_bound_is_one_over_the_root_of_a_numerical_fisher_information(grid: 
     assert depth_bound_px(grid, photons, squares) == pytest.approx(information**-0.5, rel=1e-5)
 
 
+def test_the_best_estimate_from_poisson_counts_reaches_the_bound_and_no_more() -> None:
+    grid, side, trials = unit_grid(1, 10, 16, 16), 16, 4000
+    places = (np.arange(10) - 4.5) / 9
+    x = np.arange(side) * (2 * np.pi / side)
+
+    def rates(u: float) -> np.ndarray:  # (views x columns); all 16 rows are alike and added up
+        moved = x - u * places[:, None] * (2 * np.pi / side)
+        return 16 * np.exp(0.9 * np.sin(2 * moved)).ravel()
+
+    slope = 0.9 * 2 * np.cos(2 * x) * (2 * np.pi / side)
+    weight = np.exp(0.9 * np.sin(2 * x))
+    squared = float((weight * slope**2).sum() / weight.sum())
+    bound = depth_bound_px(grid, rates(0).sum(), (squared, 0.0))
+    assert bound is not None
+    u = np.linspace(-6 * bound, 6 * bound, 61)
+    counts = np.random.default_rng(11).poisson(rates(0), (trials, 10 * side))
+    likelihood = counts @ np.log([rates(one) for one in u]).T  # the sums of the rates do not depend on u
+    best = likelihood.argmax(axis=1).clip(1, u.size - 2)
+    before, at, after = (likelihood[np.arange(trials), best + step] for step in (-1, 0, 1))
+    estimate = u[best] + (before - after) / (2 * (before - 2 * at + after)) * (u[1] - u[0])
+    # A standard deviation from n trials is known to 1 / sqrt(2 n); four of these. 1/12 for c is 10 % off.
+    assert estimate.std() == pytest.approx(bound, rel=4 / np.sqrt(2 * trials))
+
+
 def test_nothing_to_tell_depth_by_has_no_bound() -> None:
     grid = unit_grid(3, 3, 4, 4)
     assert depth_bound_px(grid, 0, (0.1, 0.1)) is None
