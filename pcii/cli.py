@@ -42,7 +42,9 @@ def _open(dataset: Path, budget: float | None) -> Dataset:
 
 
 @app.command
-def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) -> None:
+def run(
+    dataset: Path, *, out: Out, z_mm: Depths = (), method: tuple[str, ...] = (), budget: Budget = None
+) -> None:
     """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
 
     Example:  pcii run out/paper -o out/paper-results
@@ -55,11 +57,14 @@ def run(dataset: Path, *, out: Out, z_mm: Depths = (), budget: Budget = None) ->
         Folder for the results: new, empty, or that of earlier results of the same dataset.
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    method
+        A removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     """
     from pcii.run import run as run_all
+    from pcii.segment import DEFAULT_METHODS
 
     with Stages() as report:
-        outcome = run_all(_open(dataset, budget), out, z_mm, report)
+        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or DEFAULT_METHODS)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -142,7 +147,7 @@ def segment(
     *,
     out: Out,
     z_mm: Depths = (),
-    method: Literal["three-step", "likelihood"] = "likelihood",
+    method: str = "likelihood",
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
@@ -158,7 +163,8 @@ def segment(
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     method
-        The paper's three steps, or the Poisson likelihood.
+        three-step (the paper's), likelihood (Poisson), brightness, variance or shape-from-focus (to compare
+        with), or a method that an installed package brings.
     """
     from pcii.picture import mask_image, write_png
     from pcii.pipeline import planes_of
@@ -188,16 +194,23 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
     from pcii.errors import InputError
+    from pcii.pipeline import full_light_sections
     from pcii.score import score as compare
+    from pcii.types import check_z_mm
 
     data = _open(dataset, budget)
     if not out.is_dir():
         raise InputError(f"{out}: there is no such folder of results")
     results.claim(out, data)
-    focus = results.load_segmented(out, data)
-    if not focus:
-        raise InputError(f"{out}: holds no in-focus masks; make them with `pcii segment` or `pcii run`")
-    result = compare(focus, results.load_depth(out), data.truth, dataset=data.name)
+    focus, found = results.load_segmented(out, data), results.load_depth(out)
+    if not focus and found is None:
+        steps = "`pcii segment`, `pcii depth` or `pcii run`"
+        raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
+    z_mm = focus[0].z_mm if focus else data.analysis.get("z_mm")
+    knows = data.truth is not None and z_mm is not None
+    with Stages() as report:
+        light = full_light_sections(data, check_z_mm(z_mm), report) if knows else None
+    result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
     say(f"{results.save_score(out, result)}")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from pcii.console import Report, silent
 from pcii.dataset import Dataset, open_dataset
 from pcii.depth import estimate_depth
+from pcii.depth_score import depth_errors
 from pcii.errors import InputError
 from pcii.evaluation_report import write_evaluation
 from pcii.measurements import (
@@ -24,15 +25,16 @@ from pcii.measurements import (
     key_of,
 )
 from pcii.pipeline import depth_range_of, planes_of
-from pcii.score import depth_errors, score
-from pcii.segment import METHODS, segment
+from pcii.score import score
+from pcii.segment import methods as removals
+from pcii.segment import segment
 from pcii.store import MANIFEST, TRUTH
 from pcii.summary import summarise
 
 
 def known_methods() -> tuple[str, ...]:
     """Names of what can be evaluated: the methods of removal, and the depth map."""
-    return (*METHODS, DEPTH)
+    return (*removals(), DEPTH)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
 from pcii.score import score
-from pcii.segment import METHODS, segment
+from pcii.segment import DEFAULT_METHODS, find_method, segment
 from pcii.types import ArrayLike5D, DepthMap, Score, Sections, Segmented, Views, check_z_mm
 
 
@@ -32,16 +32,24 @@ class Outcome:
     timings_s: dict[str, float] = field(default_factory=dict)
 
 
-def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = silent) -> Outcome:
-    """Reconstruct sections, remove defocused points by every method, map depth, score.
+def analyse(
+    dataset: Dataset,
+    z_mm: Sequence[float] | None,
+    report: Report = silent,
+    methods: Sequence[str] = DEFAULT_METHODS,
+) -> Outcome:
+    """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
     `z_mm` defaults to the depths that the dataset's recipe names. Raises `InputError` where there
-    are none, or no counts.
+    are none, no counts, or no method of such a name.
     """
+    methods = tuple(dict.fromkeys(methods))
+    for method in methods:
+        find_method(method)  # a misspelt name is told before the work, not after
     seconds: dict[str, float] = {}
     z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
     counts = dataset.counts
-    total = 4 + len(METHODS)
+    total = 4 + len(methods)
     done = 0
 
     def finished(name: str, start: float) -> None:
@@ -51,7 +59,7 @@ def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = sil
         report("analysis", done, total)
 
     start = time.perf_counter()
-    full_light = _full_light(dataset, z, report)
+    full_light = full_light_sections(dataset, z, report)
     finished("sections at full light", start)
 
     start = time.perf_counter()
@@ -59,7 +67,7 @@ def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = sil
     finished("sections", start)
 
     focus: list[Segmented] = []
-    for method in METHODS:
+    for method in methods:
         start = time.perf_counter()
         focus.append(segment(counts, z, method=method))
         finished(f"removal, {method}", start)
@@ -69,7 +77,7 @@ def analyse(dataset: Dataset, z_mm: Sequence[float] | None, report: Report = sil
     finished("depth", start)
 
     start = time.perf_counter()
-    result = score(focus, depth, dataset.truth, dataset=dataset.name)
+    result = score(focus, depth, dataset.truth, full_light=full_light, dataset=dataset.name)
     finished("score", start)
     return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
 
@@ -91,7 +99,8 @@ def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tup
     return 0.8 * float(z.min()), 1.25 * float(z.max())
 
 
-def _full_light(dataset: Dataset, z: np.ndarray, report: Report) -> Sections | None:
+def full_light_sections(dataset: Dataset, z: np.ndarray, report: Report = silent) -> Sections | None:
+    """Sections of the radiance at the depths z (Eq. 2); None if the dataset has none."""
     views = dataset.views
     if views is None:
         return None

@@ -58,6 +58,9 @@ def _content(outcome: Outcome) -> dict[str, Any]:
         "depth_range": depth_range_of(dataset, outcome.sections.z_mm.tolist()),
         "z_mm": [f"{z:g}" for z in outcome.sections.z_mm],
         "score": outcome.score,
+        "iou_oracle": [row["iou_oracle"] for row in outcome.score.bounds["planes"]]
+        or [None] * len(outcome.score.planes),
+        "depth_bounds": [r for r in outcome.score.bounds["objects"] if r["depth_sigma_px"] is not None],
         "table1": _table1(outcome.score.objects),
         "table1_holds": table1_holds(outcome.score.objects, outcome.score.planes),
         "paper_table1": PAPER_TABLE_1 if outcome.sections.z_mm.tolist() == [540.0, 620.0] else (),

@@ -2,7 +2,7 @@
 
 results.json             which dataset it belongs to
 sections.zarr/           z_mm, counts, coverage
-segmented_<method>.zarr/ z_mm, in_focus
+segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
 score.json               as in `Score.to_dict`
 *.png, report.html       to look at
@@ -66,10 +66,14 @@ def save_sections(out: Path, sections: Sections) -> Path:
 
 
 def save_segmented(out: Path, focus: Segmented) -> Path:
-    """Write the in-focus masks of one method."""
+    """Write the in-focus masks of one method, and its photons in focus if it tells them."""
     path = out / f"segmented_{focus.method}.zarr"
     arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
-    write_arrays_safely(path, arrays, {"axes": "Z, H, W", "method": focus.method})
+    told = {"axes": "Z, H, W", "method": focus.method}
+    if focus.photon_in_focus is not None:
+        arrays["photon_in_focus"] = focus.photon_in_focus
+        told["photon_in_focus"] = "Z, events of the counts in (k, l, i, j) order"
+    write_arrays_safely(path, arrays, told)
     return path
 
 
@@ -93,7 +97,12 @@ def load_segmented(out: Path, dataset: Dataset) -> list[Segmented]:
         arrays = _read(path, ("z_mm", "in_focus"))
         sections = reconstruct(dataset.counts, arrays["z_mm"])
         method = path.stem.removeprefix("segmented_")
-        found.append(Segmented(arrays["z_mm"], arrays["in_focus"], method, sections))
+        photons = None
+        if (path / "photon_in_focus").is_dir():
+            photons = _read(path, ("photon_in_focus",))["photon_in_focus"]
+            if photons.shape[-1] != dataset.counts.events.n.size:
+                raise InputError(f"{path}: its photon_in_focus is of other counts; make it again")
+        found.append(Segmented(arrays["z_mm"], arrays["in_focus"], method, sections, photon_in_focus=photons))
     return found
 
 

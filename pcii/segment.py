@@ -1,9 +1,9 @@
 """Removal of defocused points: which points of each section are in focus there."""
 
-from collections.abc import Callable
-
 import numpy as np
 
+from pcii import plugins
+from pcii.baselines import brightness, shape_from_focus, variance
 from pcii.errors import InputError
 from pcii.foreground import SMALLEST_REGION_PX, outlined
 from pcii.likelihood import cells_to_pixels, focus_scores
@@ -20,9 +20,11 @@ FOCUS_SIGMA_PX = 20.0
 def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
-    `method` is "three-step" (Muniraj et al. 2017, Eqs. 7-9) or "likelihood". Neither is told how
-    many objects there are, their colours or their depths. Without photons nothing is in focus.
-    Raises `InputError` for a depth not above 0, an unknown method, or a single view.
+    `method` is one of `methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood", a simple
+    one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an installed
+    package. None is told how many objects there are, their colours or their depths. Without photons
+    nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a single view, or
+    a package's method that returns something else than it should.
 
     >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
     >>> focus.in_focus.shape                                  # doctest: +SKIP
@@ -30,9 +32,25 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     """
     z = check_z_mm(z_mm)
     check_depth_counts(counts)
-    if not isinstance(method, str) or method not in METHODS:
-        raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
-    return METHODS[method](counts, z)
+    return find_method(method)(counts, z)
+
+
+def methods() -> tuple[str, ...]:
+    """Names that `segment` knows: the built-in ones, then those of installed packages.
+
+    Raises `InputError` for a package whose method has a name that it may not have.
+    """
+    return (*METHODS, *plugins.registered(METHODS))
+
+
+def find_method(name: str) -> plugins.Method:
+    """The removal of this name; `InputError` that lists the known names if there is none."""
+    if not isinstance(name, str) or name not in METHODS:
+        brought = plugins.registered(METHODS)
+        if name not in brought:
+            raise InputError(f"method: no removal named {name!r}; use {', '.join((*METHODS, *brought))}")
+        return plugins.load(brought[name])
+    return METHODS[name]
 
 
 def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
@@ -58,7 +76,12 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     return Segmented(z_mm, in_focus, "likelihood", sections, steps)
 
 
-METHODS: dict[str, Callable[[PhotonCounts, np.ndarray], Segmented]] = {
+METHODS: dict[str, plugins.Method] = {
     "three-step": three_step,
     "likelihood": likelihood,
+    "brightness": brightness,
+    "variance": variance,
+    "shape-from-focus": shape_from_focus,
 }
+"""What is built in; the first two are what `pcii run` does unless told otherwise."""
+DEFAULT_METHODS = ("three-step", "likelihood")

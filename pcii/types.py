@@ -206,7 +206,9 @@ class Sections:
 class Segmented:
     """Which points of each section are in focus: `in_focus` (Z, H, W) bool.
 
-    `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at.
+    `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at. A method that decides
+    about single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
+    (`PhotonCounts.events`, in their order) come from what is in focus in each plane; else that is None.
     """
 
     z_mm: np.ndarray
@@ -214,11 +216,21 @@ class Segmented:
     method: str
     sections: Sections
     steps: Mapping[str, np.ndarray] = field(default_factory=dict)
+    photon_in_focus: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         expected = self.sections.counts.shape[:3]
         if self.in_focus.dtype != np.bool_ or self.in_focus.shape != expected:
-            raise InputError(f"in_focus: expected bool {expected}, got {self.in_focus.shape}")
+            raise InputError(
+                f"in_focus: expected bool {expected}, got {self.in_focus.dtype} {self.in_focus.shape}"
+            )
+        kept = self.photon_in_focus
+        if kept is not None:
+            if kept.dtype != np.bool_ or kept.ndim != 2 or kept.shape[0] != expected[0]:
+                raise InputError(
+                    f"photon_in_focus: expected bool ({expected[0]}, events), got {kept.dtype} {kept.shape}"
+                )
+            object.__setattr__(self, "photon_in_focus", read_only(kept))
         object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
 
@@ -310,12 +322,13 @@ class Truth:
 
 @dataclass(frozen=True)
 class Score:
-    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map."""
+    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map, bounds."""
 
     planes: tuple[Mapping[str, Any], ...]
     objects: tuple[Mapping[str, Any], ...]
-    depth: Mapping[str, float | None]
+    depth: Mapping[str, Any]
     dataset: str | None = None
+    bounds: Mapping[str, Any] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""
@@ -324,4 +337,5 @@ class Score:
             "planes": [dict(row) for row in self.planes],
             "objects": [dict(row) for row in self.objects],
             "depth": dict(self.depth),
+            "bounds": dict(self.bounds),
         }

@@ -36,16 +36,21 @@ def refusal(app: object, arguments: list[str], capsys: pytest.CaptureFixture[str
 
 def test_score_json_is_as_in_the_contract(results: Path) -> None:
     score = json.loads((results / "score.json").read_text())
-    assert list(score) == ["dataset", "planes", "objects", "depth"]
+    assert list(score) == ["dataset", "planes", "objects", "depth", "bounds"]
     keys = "z_mm method object truth iou precision recall f1 boundary_f photon_precision photon_recall"
     for row in score["planes"]:
-        assert list(row) == [*keys.split(), "entropy_before", "entropy_after"]
+        assert list(row) == [*keys.split(), "entropy_before", "entropy_after", "claimed_share"]
         assert row["truth"] in ("object", "pixel")
     assert {(row["z_mm"], row["method"]) for row in score["planes"]} == {
         (z, method) for z in (540.0, 620.0) for method in ("three-step", "likelihood")
     }
     assert [row["name"] for row in score["objects"]] == ["ball", "bird"]
-    assert list(score["depth"]) == ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
+    contract = ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
+    assert list(score["depth"]) == [*contract, "median_px", "mae_px", "hci", "hci_objects"]
+    said = [[row[key] for key in ("z_mm", "method", "truth")] for row in score["planes"]]
+    assert [[row[key] for key in ("z_mm", "method", "truth")] for row in score["bounds"]["planes"]] == said
+    # The objects are textured and 140 000 photons tell their depth to within a tenth of a pixel.
+    assert all(0 < row["depth_sigma_px"] < 0.1 for row in score["bounds"]["objects"])
 
 
 def test_table_1_holds_on_the_small_scene(results: Path) -> None:
@@ -89,7 +94,32 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     ]
     assert by_name[0] == by_name[1]
     assert one["depth"] == other["depth"]
+    assert one["bounds"]["objects"] == other["bounds"]["objects"]
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
+
+
+def test_a_depth_map_alone_is_scored(small_dataset: Path, results: Path, tmp_path: Path) -> None:
+    out, data = str(tmp_path / "depth"), str(small_dataset)
+    assert console.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
+    assert console.run(pcii_cli.app, ["score", data, out]) == 0
+    one, other = (json.loads((Path(d) / "score.json").read_text()) for d in (out, results))
+    assert one["planes"] == one["objects"] == []
+    assert one["depth"] == other["depth"]
+    assert one["bounds"]["objects"] == other["bounds"]["objects"]
+
+
+def test_run_takes_the_methods_it_is_told(
+    small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, data = tmp_path / "out", str(small_dataset)
+    asked = ["--method", "brightness", "--method", "shape-from-focus", "--method", "brightness"]
+    assert "no removal named 'sharp'; use three-step" in refusal(
+        pcii_cli.app, ["run", data, "--method", "sharp", "-o", str(out)], capsys
+    )
+    assert console.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
+    rows = json.loads((out / "score.json").read_text())["planes"]
+    assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
+    assert "shape-from-focus" in (out / "report.html").read_text()
 
 
 def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(

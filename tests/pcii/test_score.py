@@ -8,7 +8,7 @@ from pcii.geometry import blur_half_extent_px
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
 from pcii.score import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
-from pcii.types import CameraGrid, DepthMap, Segmented, Truth
+from pcii.types import CameraGrid, DepthMap, PhotonTruth, Segmented, Truth
 
 GRID = CameraGrid(rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=24, width=32)
 Z = np.array([540.0, 620.0])
@@ -83,13 +83,10 @@ def test_a_perfect_answer_scores_one() -> None:
     for row in result.planes:
         assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
     assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
-    assert result.depth == {
-        "mae_mm": 0.0,
-        "median_mm": 0.0,
-        "bad_1px": 0.0,
-        "bad_3px": 0.0,
-        "coverage": 1.0,
-    }
+    for key in ("mae_mm", "median_mm", "mae_px", "median_px", "bad_1px", "bad_3px"):
+        assert result.depth[key] == 0.0
+    assert result.depth["coverage"] == 1.0
+    assert [row["iou_oracle"] for row in result.bounds["planes"]] == [1.0] * 4
 
 
 def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
@@ -115,13 +112,38 @@ def test_depth_errors_are_counted_in_pixels_of_total_spread() -> None:
     assert result.depth["bad_1px"] == 0.36
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
+    # Total spread is 9 x 250 / (0.0352 z) = 63920.45 / z px: less by 1.9334 and by 4.2121 px.
+    assert result.depth["mae_px"] == pytest.approx((18 * 1.9334 + 18 * 4.2121) / 100, abs=1e-4)
+    assert result.depth["median_px"] == 0.0
+
+
+def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
+    depth = DepthMap(*depth_of(truth()))
+    result = score(None, depth, truth(), grid=GRID)
+    assert result.planes == result.objects == ()
+    assert result.depth["coverage"] == 1.0
+    assert [row["name"] for row in result.bounds["objects"]] == ["near", "far"]
+    with pytest.raises(InputError, match=r"^grid: a depth map without masks"):
+        score([], depth, truth())
+
+
+def test_what_is_claimed_of_an_empty_dark_is_told() -> None:
+    masks = np.zeros((2, 24, 32), dtype=bool)
+    masks[1, :6, :8] = True  # 48 of 768 pixels
+    empty = Truth(np.full((24, 32), np.inf), np.zeros((24, 32), dtype=int), {})
+    rows = score(segmented(masks), None, empty).planes
+    assert [(row["z_mm"], row["claimed_share"], row["iou"]) for row in rows] == [
+        *[(540.0, 0.0, 1.0)] * 2,
+        *[(620.0, 1 / 16, 0.0)] * 2,
+    ]
 
 
 def test_without_truth_everything_unknown_is_none() -> None:
     result = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, None)
     assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)
     assert result.objects == ()
-    assert set(result.depth.values()) == {None}
+    assert all(set(v.values() if isinstance(v, dict) else [v]) == {None} for v in result.depth.values())
+    assert result.bounds == {"planes": [], "objects": []}
 
 
 def test_removal_lowers_the_entropy_of_the_section() -> None:
@@ -137,3 +159,50 @@ def test_maps_of_another_size_are_refused() -> None:
     other = Truth(np.full((5, 5), np.inf), np.zeros((5, 5), dtype=int), {})
     with pytest.raises(InputError, match=r"truth"):
         score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, other)
+
+
+def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
+    """Precision and recall of four events of 3, 1, 2 and 1 photons; the third sent one photon of each kind.
+
+    They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
+    that a picture of 200 px is needed to see all of them land.
+    """
+    wide = CameraGrid(**{**vars(GRID), "height": 200, "width": 200})
+    i, j, n = np.array([100, 110, 120, 199]), np.array([100, 100, 100, 30]), np.array([3, 1, 2, 1])
+    zero = np.zeros(4, dtype=int)
+    counts = PhotonCounts.from_events(zero, zero, i, j, n, wide)
+    where = {"k": zero, "l": zero, "i": i, "j": j}
+    # The last photon lands left of the section and counts for nothing.
+    photons = PhotonTruth(
+        **{name: column.repeat(n) for name, column in where.items()},
+        object_id=np.array([1, 1, 1, 2, 1, 2, 1]),
+        z_mm=np.array([541.0, 541, 541, 625, 541, 625, 541]),
+    )
+    z = np.full((200, 200), np.inf)
+    ids = np.zeros((200, 200), dtype=np.int16)
+    z[0], ids[0], z[1], ids[1] = 541.0, 1, 625.0, 2
+    true = Truth(z, ids, {1: "near", 2: "far"}, photons)
+    masks = np.zeros((1, 200, 200), dtype=bool)
+    masks[0, 41, 41] = True  # where the event of three photons lands
+    said = None if kept is None else np.array([kept])
+    focus = Segmented(Z[:1], masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
+    rows = score(focus, None, true).planes
+    assert all(row["iou"] is not None for row in rows)
+    row = next(row for row in rows if row["truth"] == "pixel")
+    return row["photon_precision"], row["photon_recall"]
+
+
+def test_photons_count_once_each_and_by_the_mask_if_nothing_is_said_of_them() -> None:
+    # Of object 1 four photons land inside: three of the first event, one of the third.
+    assert photon_score(None) == (1.0, 3 / 4)
+
+
+def test_what_is_said_of_events_goes_before_the_mask() -> None:
+    assert photon_score([False, True, True, True]) == (1 / 3, 1 / 4)
+    assert photon_score([True, False, True, False]) == (4 / 5, 1.0)
+    assert photon_score([False] * 4) == (None, 0.0)
+
+
+def test_photons_of_other_events_are_refused() -> None:
+    with pytest.raises(InputError, match=r"^photon_in_focus: tells of 3 events, .* of 4$"):
+        photon_score([True] * 3)

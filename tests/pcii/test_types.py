@@ -139,6 +139,18 @@ def test_masks_that_do_not_fit_their_sections_are_refused():
             Segmented(np.ones(1), bad, "none", sections)
 
 
+def test_photons_in_focus_must_be_bool_with_a_row_per_plane():
+    grid = unit_grid(1, 1, 2, 2)
+    sections = Sections(grid, np.ones(1), np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2, 1)))
+    masks = np.zeros((1, 2, 2), dtype=bool)
+    for bad in (np.zeros((1, 5)), np.zeros((2, 5), dtype=bool), np.zeros(5, dtype=bool)):
+        with pytest.raises(InputError, match=r"^photon_in_focus: expected bool \(1, events\)"):
+            Segmented(np.ones(1), masks, "none", sections, photon_in_focus=bad)
+    kept = Segmented(np.ones(1), masks, "none", sections, photon_in_focus=np.ones((1, 5), dtype=bool))
+    assert kept.photon_in_focus is not None
+    assert not kept.photon_in_focus.flags.writeable
+
+
 def test_cleaned_keeps_what_is_in_focus_and_zeroes_the_rest():
     grid = unit_grid(1, 1, 1, 2)
     sections = Sections(grid, np.ones(1), np.array([[[[6], [8]]]]), np.full((1, 1, 2, 1), 2))
