@@ -10,7 +10,6 @@ from typing import Any
 from pcii.console import Report, silent
 from pcii.dataset import Dataset, open_dataset
 from pcii.depth import estimate_depth
-from pcii.depth_score import depth_errors
 from pcii.errors import InputError
 from pcii.evaluation_report import write_evaluation
 from pcii.measurements import (
@@ -170,9 +169,12 @@ def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
         "seconds": round(seconds, 4),
     }
     if task.method == DEPTH:
-        return row | {"depth": dict(depth_errors(data.grid, found, data.truth))}
+        return row | {"depth": dict(score(None, found, data.truth, grid=data.grid).depth)}
     result = score(found, None, data.truth)
-    planes = [{name: value for name, value in plane.items() if name != "method"} for plane in result.planes]
+    planes = [
+        {name: value for name, value in (known | plane).items() if name != "method"}
+        for plane, known in zip(result.planes, result.bounds["planes"], strict=True)
+    ]
     return row | {"planes": planes, "objects": [dict(thing) for thing in result.objects]}
 
 

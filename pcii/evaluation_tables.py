@@ -7,6 +7,7 @@ from typing import Any
 COLUMNS = (
     ("IoU", "object", "iou"),
     ("IoU, pixels", "pixel", "iou"),
+    ("oracle's IoU, pixels", "pixel", "iou_oracle"),
     ("boundary F", "object", "boundary_f"),
     ("claimed share", "object", "claimed_share"),
     ("photon precision", "object", "photon_precision"),

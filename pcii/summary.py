@@ -13,7 +13,8 @@ INTERVALS = "95 % interval of the mean by Student's t over seeds, shares clipped
 TABLE_1_METHOD = "three-step"
 TRUTHS = ("object", "pixel")
 SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
-SHARES |= {"claimed_share", "bad_1px", "bad_3px", "coverage"}
+SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage", "answered"}
+SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:

@@ -82,6 +82,9 @@ def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) ->
     rows = result_of(evaluation, OWN, "two rows")
     assert rows["object"]["iou"]["mean"] == pytest.approx(10 / 24 / 2)
     assert rows["planes"][1]["object"]["iou"]["mean"] == 0.0
+    assert rows["object"]["claimed_share"] == {"n": 3, "mean": 0.25, "interval": [0.25, 0.25]}
+    # Each object is flat and at its plane, so who knows the depths makes no mistake.
+    assert rows["pixel"]["iou_oracle"]["mean"] == 1.0
     # 96 photons in the last view and 20 + 6, 8, 7 in the first, of four views.
     assert told["photons_per_view"] == pytest.approx((96 + 20 + 7) / 4)
 
