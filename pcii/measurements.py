@@ -3,7 +3,6 @@
 A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice.
 """
 
-import fcntl
 import hashlib
 import json
 import os
@@ -71,6 +70,8 @@ def claim_rows(out: Path) -> None:
 @contextmanager
 def _locked(out: Path) -> Iterator[IO[bytes]]:
     """The file of rows, ready to be appended to, with all other processes kept out of it."""
+    import fcntl  # not everywhere, and only evaluations need it
+
     with (out / ROWS).open("a+b") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield file
