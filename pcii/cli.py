@@ -1,10 +1,9 @@
 """The `pcii` command."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Literal
 
-from cyclopts import App, Parameter, Token
+from cyclopts import App, Parameter
 
 from pcii import __version__, console, results
 from pcii.console import Stages, say
@@ -20,16 +19,7 @@ Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
 
 
-def _whole(_: object, tokens: Sequence[Token]) -> int:
-    """A whole number, and not one that would have to be rounded."""
-    text = tokens[0].value
-    try:
-        return int(text)
-    except ValueError:
-        raise ValueError(f"expected a whole number, got {text!r}") from None
-
-
-Subpixel = Annotated[int, Parameter(converter=_whole)]
+Subpixel = Annotated[int, Parameter(converter=console.whole)]
 Budget = Annotated[
     float | None,
     Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from pcii.errors import InputError
 
 if TYPE_CHECKING:
-    from cyclopts import App
+    from cyclopts import App, Token
     from rich.progress import Progress, TaskID
 
 LOG_EVERY_S = 10.0
@@ -52,6 +52,15 @@ def _fail(code: int, sentence: str) -> int:
         raise
     print(f"error: {sentence}", file=sys.stderr, flush=True)
     return code
+
+
+def whole(_: object, tokens: Sequence["Token"]) -> int:
+    """Converter of a parameter to a whole number, and not to one that would have to be rounded."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"expected a whole number, got {text!r}") from None
 
 
 def say(text: str) -> None:

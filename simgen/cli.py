@@ -153,7 +153,7 @@ def generate(
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    seeds: int | None = None,
+    seeds: Annotated[int | None, Parameter(converter=console.whole)] = None,
 ) -> None:
     """Make the dataset of a recipe; run again to resume.
 
@@ -174,8 +174,8 @@ def generate(
     set
         Override one value of the recipe, such as photons.budget=300; may be repeated.
     seeds
-        Make so many datasets, out/seed_<n>, for the recipe's seed and those that follow. Each is complete;
-        radiance is rendered anew for each, so set products.radiance=none where nothing looks at it.
+        Make so many datasets, in folders seed_7, seed_8, ... of OUT: for the recipe's seed and those that follow.
+        Each is complete; radiance is rendered anew for each, so set products.radiance=none if nothing needs it.
     """
     from simgen import backend
     from simgen.generate import generate as make

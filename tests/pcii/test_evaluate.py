@@ -318,6 +318,10 @@ def test_the_command_and_its_page(
     assert str(tmp_path) not in page
     assert "0.850 (0.726 to 0.974)" in page
     assert "as told: IoU is worse with 50 photons than with 20" in page
+    assert len(rows_of(out)) == 12
+    other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
+    assert console.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
+    assert len(rows_of(out)) == 14
     assert console.run(cli.app, [*command, "--part", "1:2"]) == 2
     assert "expected i/n such as 1/2" in capsys.readouterr().err
 

@@ -104,6 +104,15 @@ def test_a_count_of_seeds_that_makes_no_sense_is_refused(count: int) -> None:
         at_seeds(Recipe.model_validate(TINY_RECIPE), count)
 
 
+def test_half_a_seed_is_refused(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["generate", str(recipe_file), "-o", str(tmp_path / "out"), "--seeds", "2.5"]
+    assert console.run(cli.app, command) == 2
+    assert "expected a whole number, got '2.5'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_seeds_end_where_seeds_end() -> None:
     last = Recipe.model_validate(TINY_RECIPE | {"seed": 2**63 - 2})
     assert [own.seed for own in at_seeds(last, 2)] == [2**63 - 2, 2**63 - 1]
