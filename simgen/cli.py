@@ -174,8 +174,8 @@ def generate(
     set
         Override one value of the recipe, such as photons.budget=300; may be repeated.
     seeds
-        Make so many datasets, in folders seed_7, seed_8, ... of OUT: for the recipe's seed and those that follow.
-        Each is complete; radiance is rendered anew for each, so set products.radiance=none if nothing needs it.
+        Make so many datasets, in folders seed_7, seed_8, ... of OUT: of the recipe's seed and those that
+        follow. Each is whole; radiance is rendered for each, so leave it out where nothing needs it.
     """
     from simgen import backend
     from simgen.generate import generate as make
