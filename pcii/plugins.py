@@ -11,7 +11,7 @@ Nothing is looked up, and no such package imported, before a method is asked for
 
 import re
 from collections.abc import Callable, Collection
-from importlib.metadata import EntryPoint, entry_points
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,15 +19,20 @@ from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
 from pcii.types import Segmented
 
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
 GROUP = "pcii.methods"
 Method = Callable[[PhotonCounts, np.ndarray], Segmented]
 
 
-def registered(taken: Collection[str]) -> dict[str, EntryPoint]:
+def registered(taken: Collection[str]) -> dict[str, "EntryPoint"]:
     """Methods of installed packages by name, sorted.
 
     Raises `InputError` for a name that is `taken`, that two packages want, or that makes no file name.
     """
+    from importlib.metadata import entry_points
+
     found: dict[str, EntryPoint] = {}
     for point in sorted(entry_points(group=GROUP), key=lambda one: one.name):
         told = f"{GROUP}: {point.value} of {_package(point)}"
@@ -41,7 +46,7 @@ def registered(taken: Collection[str]) -> dict[str, EntryPoint]:
     return found
 
 
-def load(point: EntryPoint) -> Method:
+def load(point: "EntryPoint") -> Method:
     """The method, its answers checked; `InputError` if it cannot be imported or called."""
     told = f"method: {point.name!r} of {_package(point)}"
     try:
@@ -77,5 +82,5 @@ def _expected(answer: Segmented, name: str, counts: PhotonCounts, z_mm: np.ndarr
     return None
 
 
-def _package(point: EntryPoint) -> str:
+def _package(point: "EntryPoint") -> str:
     return f"the package {point.dist.name}" if point.dist else "a package"

@@ -48,6 +48,9 @@ def test_a_missing_answer_is_bad_and_left_out_of_means() -> None:
     assert nothing["badpix_001"] == nothing["badpix_007"] == 1.0
     assert nothing["mse_x100"] is nothing["q25_x100"] is None
     assert nothing["answered"] == 0.0
+    # So far away that no depth at all would be a good guess.
+    far = errors(np.full((40, 50), 0.005), np.full((40, 50), np.nan))
+    assert far["badpix_001"] == far["badpix_003"] == far["badpix_007"] == 1.0
 
 
 def test_only_pixels_where_something_is_hit_are_judged() -> None:

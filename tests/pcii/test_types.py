@@ -201,6 +201,7 @@ def test_a_score_keeps_the_spelling_of_its_file():
         "planes": [{"iou": 1.0}],
         "objects": [],
         "depth": {"mae_mm": None},
+        "bounds": {},
     }
 
 
