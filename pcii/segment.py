@@ -11,17 +11,21 @@ from pcii.photon_counts import PhotonCounts, check_depth_counts
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import pooled_estimate, section_window_px
-from pcii.three_step import three_step
+from pcii.three_step import ThreeStep
 from pcii.types import Segmented, check_z_mm
 
 FOCUS_SIGMA_PX = 20.0
 
 
-def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -> Segmented:
+Method = Callable[[PhotonCounts, np.ndarray], Segmented]
+
+
+def segment(counts: PhotonCounts, z_mm: object, *, method: str | Method = "likelihood") -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
-    `method` is "three-step" (Muniraj et al. 2017, Eqs. 7-9) or "likelihood". Neither is told how
-    many objects there are, their colours or their depths. Without photons nothing is in focus.
+    `method` is "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood", or anything that makes a
+    `Segmented` of counts and depths, such as `ThreeStep(entropy=False)`. Neither is told how many objects
+    there are, their colours or their depths. Without photons nothing is in focus.
     Raises `InputError` for a depth not above 0, an unknown method, or a single view.
 
     >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
@@ -30,6 +34,8 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     """
     z = check_z_mm(z_mm)
     check_depth_counts(counts)
+    if callable(method):
+        return method(counts, z)
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no removal named {method!r}; use {' or '.join(METHODS)}")
     return METHODS[method](counts, z)
@@ -58,7 +64,7 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     return Segmented(z_mm, in_focus, "likelihood", sections, steps)
 
 
-METHODS: dict[str, Callable[[PhotonCounts, np.ndarray], Segmented]] = {
-    "three-step": three_step,
+METHODS: dict[str, Method] = {
+    "three-step": ThreeStep(),
     "likelihood": likelihood,
 }
