@@ -76,7 +76,7 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     """
     if not mask.any():
         return mask
-    return ~_large_pieces(~_large_pieces(mask, smallest_px), smallest_px)
+    return ~large_pieces(~large_pieces(mask, smallest_px), smallest_px)
 
 
 def connected_pieces(mask: np.ndarray) -> np.ndarray:
@@ -88,7 +88,8 @@ def connected_pieces(mask: np.ndarray) -> np.ndarray:
     return pieces
 
 
-def _large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+def large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+    """The mask without connected pieces of fewer than `smallest_px` pixels."""
     pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px
     keep[0] = False

@@ -15,7 +15,14 @@ import numpy as np
 
 from pcii.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.errors import InputError
-from pcii.foreground import EDGE_SMOOTHING_PX, SMALLEST_REGION_PX, brightness, outlined, roberts_magnitude
+from pcii.foreground import (
+    EDGE_SMOOTHING_PX,
+    SMALLEST_REGION_PX,
+    brightness,
+    large_pieces,
+    outlined,
+    roberts_magnitude,
+)
 from pcii.geometry import disparity_spread_px
 from pcii.photon_counts import PhotonCounts
 from pcii.pieces import pieces_along_ridges
@@ -33,7 +40,7 @@ from pcii.statistics import (
 from pcii.types import CameraGrid, Sections, Segmented
 
 WINDOW_CELLS = 4
-PHOTONS_PER_SAMPLE = 5.0
+PHOTONS_PER_SAMPLE = 10.0
 LARGEST_CELL_PX = 8
 """Eq. 7 pools over 4 x 4 cells, wide enough for about 5 photons per view where the photons are."""
 SIGMAS = 3.0
@@ -149,17 +156,19 @@ def adaptive_threshold(
     non-zero Poisson samples of the same mean, plus `SIGMAS` times the sampling error of a variance, about
     var sqrt(2 / (n - 1)) for n samples, plus what the section changes over the shifts that a surface in
     focus may have: up to `tolerance_px` either way and the rounding to whole pixels, each uniform. Where
-    there are fewer than `FEWEST_SAMPLES` the step does not object.
+    there are fewer than `FEWEST_SAMPLES` the step does not object, nor to less than a window of cells.
     """
     samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
     limit = _threshold(samples, cell_px, tolerance_px)
     known = samples.number >= FEWEST_SAMPLES
+    # One window above T is chance: there are many, and the cells around share its samples.
+    rejected = large_pieces(known & (samples.variance > limit), WINDOW_CELLS**2)
     maps = {
         "mean": samples.mean.astype(np.float32),
         "variance": samples.variance.astype(np.float32),
         "threshold": limit.astype(np.float32),
         "answered": known,
-        "kept": ~known | (samples.variance <= limit),
+        "kept": ~rejected,
     }
     return {name: cells_to_pixels(cells, cell_px, counts.grid) for name, cells in maps.items()}
 
