@@ -46,7 +46,7 @@ def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.n
     what exceeds it by `BRIGHT_SIGMAS` and is no mere skirt of something brighter nearby. Lengths in pixels
     are `subpixel` times as many voxels.
     """
-    from scipy.ndimage import gaussian_filter, maximum_filter
+    from scipy.ndimage import gaussian_filter, maximum_filter, uniform_filter
     from skimage.segmentation import watershed
 
     above = (bright - np.quantile(bright, 0.2)) / 0.5
@@ -54,7 +54,9 @@ def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.n
     markers = np.zeros(bright.shape, dtype=np.int32)
     markers[above < DARK_SIGMAS] = 1
     markers[(above > BRIGHT_SIGMAS) & (above > SKIRT_SHARE * nearby)] = 2
-    return watershed(gaussian_filter(edges, EDGE_SMOOTHING_PX * subpixel), markers) == 2
+    # Roberts' cross belongs to corners: the mean of a pixel's four corners belongs to the pixel.
+    steepness = gaussian_filter(uniform_filter(edges, 2), EDGE_SMOOTHING_PX * subpixel)
+    return watershed(steepness, markers) == 2
 
 
 def outlined(

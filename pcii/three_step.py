@@ -140,7 +140,7 @@ class ThreeStep:
         samples = _samples(sections, plane, window_px)
         if M > 1:
             finer = reconstruct(counts, z_mm, subpixel=M)
-            window = 2 * (window_px * M // 2) + 1
+            window = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
             pooled, samples = pooled_estimate(finer, window)[0], _samples(finer, 0, window)
         if not self.boundary:
             return pooled.any(axis=-1)
@@ -207,9 +207,10 @@ def _edges(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
 
 
 def _smoothed(edges: np.ndarray) -> np.ndarray:
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, uniform_filter
 
-    return gaussian_filter(edges, EDGE_SMOOTHING_PX, axes=(1, 2))
+    # As for outlines: from corners to pixels.
+    return gaussian_filter(uniform_filter(edges, 2, axes=(1, 2)), EDGE_SMOOTHING_PX, axes=(1, 2))
 
 
 def _half_of_each_pixel(fine: np.ndarray, M: int) -> np.ndarray:
