@@ -13,6 +13,7 @@ from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
 from pcii.segment import segment
+from pcii.three_step import ThreeStep
 from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
 
 __version__ = "0.1.0"
@@ -26,6 +27,7 @@ __all__ = [
     "Score",
     "Sections",
     "Segmented",
+    "ThreeStep",
     "Truth",
     "Views",
     "demosaic",

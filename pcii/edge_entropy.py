@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.pieces import cheapest_planes
 
-BORDER_BITS = 0.03
+BORDER_BITS = 0.1
 """What must be gained per window along a border between regions of different planes."""
 
 
