@@ -31,9 +31,9 @@ def edge_entropies(edges: np.ndarray, regions: np.ndarray, margin_px: int) -> np
         if box is None:  # a tile without light has no region
             continue
         rows, cols = (slice(max(s.start - margin_px, 0), s.stop + margin_px) for s in box)
-        grown = maximum_filter(regions[rows, cols] == number, 2 * margin_px + 1)
-        total = energy[:, rows, cols][:, grown].sum(axis=1)
-        own = information[:, rows, cols][:, grown].sum(axis=1)
+        grown = np.asarray(maximum_filter(regions[rows, cols] == number, 2 * margin_px + 1), dtype=bool)
+        total = energy[:, rows, cols].sum(axis=(1, 2), where=grown)
+        own = information[:, rows, cols].sum(axis=(1, 2), where=grown)
         nats = np.log(np.maximum(total, 1e-300)) - own / np.maximum(total, 1e-300)
         entropies[number] = np.where(total > 0, nats, np.log(grown.sum())) / np.log(2)
     return entropies

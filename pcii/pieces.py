@@ -22,7 +22,9 @@ def pieces_along_ridges(bright: np.ndarray, edges: np.ndarray, smallest_px: floa
 
     if not bright.any():
         return np.zeros(bright.shape, dtype=np.int32)
-    basins = watershed(edges, mask=bright)
+    # Each bright part has a lowest point of its own, whatever is around it.
+    walled = np.pad(np.where(bright, edges, np.inf), 1, constant_values=np.inf)
+    basins = watershed(walled, mask=np.pad(bright, 1))[1:-1, 1:-1]
     areas = np.bincount(basins.ravel()).tolist()
     parent = list(range(len(areas)))
     tree = _Merging(basins, edges, areas.copy())
@@ -36,7 +38,9 @@ def pieces_along_ridges(bright: np.ndarray, edges: np.ndarray, smallest_px: floa
     return numbers.astype(np.int32)[basins]
 
 
-def cheapest_planes(pieces: np.ndarray, edges: np.ndarray, cost: np.ndarray, border_cost: float) -> np.ndarray:
+def cheapest_planes(
+    pieces: np.ndarray, edges: np.ndarray, cost: np.ndarray, border_cost: float
+) -> np.ndarray:
     """The plane (index) of each piece (N,), int64, that costs least together with the borders between them.
 
     `cost` (N, P) is what a piece costs at a plane, row 0 unused; a border between pieces of different
@@ -76,9 +80,7 @@ class _Merging:
             self.queue.append((height / length, a, b))
         heapq.heapify(self.queue)
 
-    def weakest_first(
-        self, may_merge: Callable[[float, float], bool]
-    ) -> Iterator[tuple[int, int, int, int]]:
+    def weakest_first(self, may_merge: Callable[[float, float], bool]) -> Iterator[tuple[int, int, int, int]]:
         """Merge across the border of the least mean height whose two areas may merge, over and over.
 
         Gives both pieces, the number of what they become, and the length of the border in pixel pairs.

@@ -94,21 +94,26 @@ class ThreeStep:
         sections = reconstruct(counts, compared)
         own = range(z_mm.size)
         cell_px = _cell_px(sections)
-        first = [adaptive_threshold(counts, z, cell_px, _tolerance_px(counts.grid, z, compared)) for z in z_mm]
+        first = [
+            adaptive_threshold(counts, z, cell_px, _tolerance_px(counts.grid, z, compared)) for z in z_mm
+        ]
         steps = {name: np.stack([maps[name] for maps in first]) for name in first[0]}
 
         window_px = section_window_px(sections)
         pooled = pooled_estimate(sections, window_px)
         edges = np.stack([_edges(plane, _samples(sections, p, window_px)) for p, plane in enumerate(pooled)])
         smooth = _smoothed(edges)
-        fine = np.stack([self._bright(counts, z, pooled[p], sections, p, window_px) for p, z in enumerate(z_mm)])
+        fine = np.stack(
+            [self._bright(counts, z, pooled[p], sections, p, window_px) for p, z in enumerate(z_mm)]
+        )
         bright = _half_of_each_pixel(fine, self.subpixel)
+        anywhere: np.ndarray = np.logical_or.reduce(bright)
         margin = int(LARGEST_BLUR_PX)
         if self.boundary:
             ridges = smooth[: z_mm.size].max(axis=0)
-            regions = pieces_along_ridges(bright.any(axis=0), ridges, margin**2)
+            regions = pieces_along_ridges(anywhere, ridges, margin**2)
         else:
-            ridges, regions = None, _tiles(bright.any(axis=0), 2 * margin)
+            ridges, regions = None, _tiles(anywhere, 2 * margin)
         steps |= {"edges": edges[: z_mm.size], "bright": bright, "regions": _for_each(regions, own)}
 
         kept = np.ones_like(bright)
@@ -143,7 +148,7 @@ class ThreeStep:
             window = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
             pooled, samples = pooled_estimate(finer, window)[0], _samples(finer, 0, window)
         if not self.boundary:
-            return pooled.any(axis=-1)
+            return pooled.max(axis=-1) > 0
         return outlined(pooled, samples, SMALLEST_REGION_PX, M)[1]
 
 
