@@ -52,9 +52,14 @@ def photons_around_a_photon(sections: Sections) -> float:
 
     That is sum K (K - 1) / sum K, which Poisson noise does not bias; 0 without photons.
     """
-    total = sections.counts.sum(axis=-1, dtype=np.float64)
-    photons = total.sum()
-    return float((total * (total - 1)).sum() / photons) if photons > 0 else 0.0
+    photons = squares = 0.0
+    for plane in sections.counts:
+        total = plane[..., 0].astype(np.float64)
+        for colour in range(1, plane.shape[-1]):  # a sum over a last axis of three would take longer
+            total += plane[..., colour]
+        photons += float(total.sum())
+        squares += float(np.vdot(total, total))
+    return squares / photons - 1 if photons > 0 else 0.0
 
 
 def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
