@@ -16,6 +16,7 @@ from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
 from pcii.segment import segment
+from pcii.three_step import ThreeStep
 from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "Score",
     "Sections",
     "Segmented",
+    "ThreeStep",
     "Truth",
     "Views",
     "demosaic",

@@ -20,6 +20,7 @@ Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
 
 
 Subpixel = Annotated[int, Parameter(converter=console.whole)]
+Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
 Budget = Annotated[
     float | None,
     Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),
@@ -138,11 +139,15 @@ def segment(
     out: Out,
     z_mm: Depths = (),
     method: str = "likelihood",
+    without: Without = (),
+    subpixel: Subpixel = 1,
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
 
     Example:  pcii segment out/paper --z-mm 540 --method three-step -o out/removed
+
+    Example:  pcii segment out/paper --method three-step --without entropy --subpixel 2 -o out/removed
 
     Parameters
     ----------
@@ -155,17 +160,30 @@ def segment(
     method
         three-step (the paper's), likelihood (Poisson), brightness, variance or shape-from-focus (to compare
         with), or a method that an installed package brings.
+    without
+        Leave out one of the three steps; repeat for more.
+    subpixel
+        Find the outlines of the three steps on this many voxels per pixel and axis.
     """
+    from pcii.errors import InputError
     from pcii.picture import mask_image, write_png
     from pcii.pipeline import planes_of
+    from pcii.segment import find_method
     from pcii.segment import segment as remove
+    from pcii.three_step import ThreeStep
 
+    if method != "three-step" and (without or subpixel != 1):
+        option = "--without" if without else "--subpixel"
+        raise InputError(f"{option}: is for --method three-step, not {method}")
+    chosen = find_method(method)
+    if method == "three-step":
+        chosen = ThreeStep(subpixel, **dict.fromkeys(without, False))
     data = _open(dataset, budget)
-    focus = remove(data.counts, planes_of(data, z_mm), method=method)
+    focus = remove(data.counts, planes_of(data, z_mm), method=chosen)
     results.claim(out, data)
     say(f"{results.save_segmented(out, focus)}")
     for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
-        path = out / f"in_focus_{method}_{z:g}mm.png"
+        path = out / f"in_focus_{focus.method}_{z:g}mm.png"
         write_png(path, mask_image(mask))
         say(f"{path}: {mask.mean():.2%} of the section in focus")
 

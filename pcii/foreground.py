@@ -37,32 +37,38 @@ def brightness(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
     return np.sqrt(pooled.mean(axis=-1) * samples_per_window)
 
 
-def foreground(bright: np.ndarray, edges: np.ndarray) -> np.ndarray:
+def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.ndarray:
     """What stands out of the dark, (H, W) bool; its outline runs along the ridges of `edges`.
 
     `bright` is from `brightness`, `edges` the Roberts magnitude of it. Pixels that are surely dark
     and pixels that are surely not are flooded along the edges until they meet (watershed). The dark
     is the lower quintile of the picture; its noise on the square-root scale is 1/2. Surely bright is
-    what exceeds it by `BRIGHT_SIGMAS` and is no mere skirt of something brighter nearby.
+    what exceeds it by `BRIGHT_SIGMAS` and is no mere skirt of something brighter nearby. Lengths in pixels
+    are `subpixel` times as many voxels.
     """
-    from scipy.ndimage import gaussian_filter, maximum_filter
+    from scipy.ndimage import gaussian_filter, maximum_filter, uniform_filter
     from skimage.segmentation import watershed
 
     above = (bright - np.quantile(bright, 0.2)) / 0.5
-    nearby = maximum_filter(above, NEARBY_PX)
+    nearby = maximum_filter(above, NEARBY_PX * subpixel)
     markers = np.zeros(bright.shape, dtype=np.int32)
     markers[above < DARK_SIGMAS] = 1
     markers[(above > BRIGHT_SIGMAS) & (above > SKIRT_SHARE * nearby)] = 2
-    return watershed(gaussian_filter(edges, EDGE_SMOOTHING_PX), markers) == 2
+    # Roberts' cross belongs to corners: the mean of a pixel's four corners belongs to the pixel.
+    steepness = gaussian_filter(uniform_filter(edges, 2), EDGE_SMOOTHING_PX * subpixel)
+    return watershed(steepness, markers) == 2
 
 
 def outlined(
-    pooled: np.ndarray, samples_per_window: float, smallest_px: int
+    pooled: np.ndarray, samples_per_window: float, smallest_px: int, subpixel: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Roberts magnitude of one pooled section (H, W, C), and what stands out in it, both (H, W)."""
+    """Roberts magnitude of one pooled section (H, W, C), and what stands out in it, both (H, W).
+
+    With `subpixel` = M these are of voxels that are M times finer; `smallest_px` still counts pixels.
+    """
     bright = brightness(pooled, samples_per_window)
     edges = roberts_magnitude(bright)
-    return edges, without_specks(foreground(bright, edges), smallest_px)
+    return edges, without_specks(foreground(bright, edges, subpixel), smallest_px * subpixel**2)
 
 
 def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
@@ -72,7 +78,7 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     """
     if not mask.any():
         return mask
-    return ~_large_pieces(~_large_pieces(mask, smallest_px), smallest_px)
+    return ~large_pieces(~large_pieces(mask, smallest_px), smallest_px)
 
 
 def connected_pieces(mask: np.ndarray) -> np.ndarray:
@@ -84,7 +90,8 @@ def connected_pieces(mask: np.ndarray) -> np.ndarray:
     return pieces
 
 
-def _large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+def large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+    """The mask without connected pieces of fewer than `smallest_px` pixels."""
     pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px
     keep[0] = False

@@ -13,7 +13,7 @@ from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
 from pcii.score import score
-from pcii.segment import DEFAULT_METHODS, find_method, segment
+from pcii.segment import DEFAULT_METHODS, segment
 from pcii.types import ArrayLike5D, DepthMap, Score, Sections, Segmented, Views, check_z_mm
 
 
@@ -44,8 +44,6 @@ def analyse(
     are none, no counts, or no method of such a name.
     """
     methods = tuple(dict.fromkeys(methods))
-    for method in methods:
-        find_method(method)  # a misspelt name is told before the work, not after
     seconds: dict[str, float] = {}
     z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
     counts = dataset.counts

@@ -13,20 +13,21 @@ PROBE_STEPS_PX = (-28.0, -14.0, 14.0, 28.0)
 """Distance of the probes from their plane, in px of total disparity spread; half of it is blur."""
 
 
-def with_probes(grid: CameraGrid, z_mm: np.ndarray) -> np.ndarray:
+def with_probes(grid: CameraGrid, z_mm: np.ndarray, *, clear_px: float = 7.0) -> np.ndarray:
     """The requested depths (Z,), then the probes around them, float64.
 
-    A probe nearer than half a probe step to a requested plane or to another probe is left out, and
-    so is one beyond infinity.
+    A probe less than `clear_px` of spread from a requested plane is left out, one less than half a probe
+    step from another probe, and one beyond infinity.
     """
     unit = float(disparity_spread_px(grid, 1.0))
     if unit == 0:  # a single camera has no disparity, so nothing tells depths apart
         return z_mm
-    spreads = list(unit / z_mm)
+    requested, probes = unit / z_mm, []
     apart = min(abs(step) for step in PROBE_STEPS_PX) / 2
-    for spread in unit / z_mm:
+    for spread in requested:
         for step in PROBE_STEPS_PX:
             probe = spread + step
-            if probe > 0 and all(abs(probe - other) > apart for other in spreads):
-                spreads.append(probe)
-    return unit / np.array(spreads)
+            clear = np.all(np.abs(probe - requested) > clear_px - 1e-9)  # rounding of the sum
+            if probe > 0 and clear and all(abs(probe - other) > apart for other in probes):
+                probes.append(probe)
+    return unit / np.array([*requested, *probes])

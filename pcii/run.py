@@ -6,9 +6,9 @@ from pathlib import Path
 from pcii import results
 from pcii.console import Report, silent
 from pcii.dataset import Dataset
-from pcii.pipeline import Outcome, analyse
+from pcii.pipeline import Outcome, analyse, planes_of
 from pcii.report import write_report
-from pcii.segment import DEFAULT_METHODS
+from pcii.segment import DEFAULT_METHODS, find_method
 
 
 def run(
@@ -18,7 +18,13 @@ def run(
     report: Report = silent,
     methods: Sequence[str] = DEFAULT_METHODS,
 ) -> Outcome:
-    """Analyse `dataset` and write everything into `out`; `InputError` if `out` holds something else."""
+    """Analyse `dataset` and write everything into `out`.
+
+    Raises `InputError` if `out` holds something else, and like `analyse`.
+    """
+    for method in methods:  # a misspelt name is told before the work, and leaves no folder behind
+        find_method(method)
+    planes_of(dataset, z_mm)
     results.claim(out, dataset)
     outcome = analyse(dataset, z_mm, report, methods)
     results.save_sections(out, outcome.sections)

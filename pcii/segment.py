@@ -11,20 +11,21 @@ from pcii.photon_counts import PhotonCounts, check_depth_counts
 from pcii.planes import with_probes
 from pcii.reconstruct import reconstruct
 from pcii.statistics import pooled_estimate, section_window_px
-from pcii.three_step import three_step
+from pcii.three_step import ThreeStep
 from pcii.types import Segmented, check_z_mm
 
 FOCUS_SIGMA_PX = 20.0
 
 
-def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -> Segmented:
+def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
     `method` is one of `methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood", a simple
     one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an installed
-    package. None is told how many objects there are, their colours or their depths. Without photons
-    nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a single view, or
-    a package's method that returns something else than it should.
+    package; or anything that makes a `Segmented` of counts and depths, such as `ThreeStep(entropy=False)`.
+    None is told how many objects there are, their colours or their depths. Without photons nothing is in
+    focus. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a package's
+    method that returns something else than it should.
 
     >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
     >>> focus.in_focus.shape                                  # doctest: +SKIP
@@ -32,6 +33,8 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str = "likelihood") -
     """
     z = check_z_mm(z_mm)
     check_depth_counts(counts)
+    if callable(method):
+        return method(counts, z)
     return find_method(method)(counts, z)
 
 
@@ -77,7 +80,7 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
 
 
 METHODS: dict[str, plugins.Method] = {
-    "three-step": three_step,
+    "three-step": ThreeStep(),
     "likelihood": likelihood,
     "brightness": brightness,
     "variance": variance,

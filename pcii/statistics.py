@@ -40,14 +40,26 @@ def entropy_bits(values: np.ndarray, top: float) -> float:
 def section_window_px(sections: Sections) -> int:
     """Odd side of the square over which sections are pooled before edges and entropies are taken.
 
-    It holds about 64 photons where the photons are: a relative noise of 1/8. Where that is, is told by
-    the mean rate seen by a photon, sum K (K - 1) / sum K, which Poisson noise does not bias.
+    It holds about 64 photons where the photons are: a relative noise of 1/8.
     """
-    total = sections.counts.sum(axis=-1, dtype=np.float64)
-    photons = total.sum()
-    rate = (total * (total - 1)).sum() / photons if photons > 0 else 0.0
+    rate = photons_around_a_photon(sections)
     side = np.sqrt(PHOTONS_PER_WINDOW / rate) if rate > 0 else LARGEST_WINDOW_PX
     return int(np.clip(2 * np.floor(side / 2) + 1, SMALLEST_WINDOW_PX, LARGEST_WINDOW_PX))
+
+
+def photons_around_a_photon(sections: Sections) -> float:
+    """How many photons a voxel holds where the photons are, over all colours: the rate that a photon sees.
+
+    That is sum K (K - 1) / sum K, which Poisson noise does not bias; 0 without photons.
+    """
+    photons = squares = 0.0
+    for plane in sections.counts:
+        total = plane[..., 0].astype(np.float64)
+        for colour in range(1, plane.shape[-1]):  # a sum over a last axis of three would take longer
+            total += plane[..., colour]
+        photons += float(total.sum())
+        squares += float(np.vdot(total, total))
+    return squares / photons - 1 if photons > 0 else 0.0
 
 
 def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:

@@ -116,10 +116,28 @@ def test_run_takes_the_methods_it_is_told(
     assert "no removal named 'sharp'; use three-step" in refusal(
         pcii_cli.app, ["run", data, "--method", "sharp", "-o", str(out)], capsys
     )
+    assert "z_mm" in refusal(pcii_cli.app, ["run", data, "--z-mm", "-1", "-o", str(out)], capsys)
+    assert not out.exists()
     assert console.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
     rows = json.loads((out / "score.json").read_text())["planes"]
     assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
     assert "shape-from-focus" in (out / "report.html").read_text()
+
+
+def test_steps_are_left_out_and_results_named_so(
+    small_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    command = ["segment", str(small_dataset), "--z-mm", "540", "-o", str(tmp_path / "out")]
+    steps = [*command, "--method", "three-step", "--without", "entropy", "--without", "threshold"]
+    assert console.run(pcii_cli.app, [*steps, "--subpixel", "2"]) == 0
+    name = "three-step-subpixel-2-without-threshold-without-entropy"
+    assert (tmp_path / "out" / f"segmented_{name}.zarr").is_dir()
+    assert (tmp_path / "out" / f"in_focus_{name}_540mm.png").is_file()
+    capsys.readouterr()
+    for option in (["--without", "entropy"], ["--subpixel", "2"]):
+        assert f"{option[0]}: is for --method three-step" in refusal(
+            pcii_cli.app, [*command, *option], capsys
+        )
 
 
 def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
