@@ -1,173 +1,149 @@
-"""Focus from the Poisson likelihood: where do the photons say that the surface is?
+"""Removal of defocused points by likelihood: what is in focus at each plane, down to a few photons a pixel.
 
-Let K be the count at a voxel of the section at z and V its coverage. If the surface is at z, all
-samples of the voxel share one rate, and the profile log-likelihood over a window is the sum of
-K log(K / V) - K. Maximising it over z is minimising the entropy of where the photons land, Eq. 9 of
-Muniraj et al. 2017 with the right statistics. From it we take what a flat patch of the same mean
-would give, so that the score of a patch without texture has mean 0 and a known spread.
+1. The section at each depth predicts where photons land; what it predicts better than a blurred one would
+   is evidence of focus (`pcii.focus`), summed over windows that stop at the edges that the section shows.
+2. Each cell of 4 px takes the requested plane that has most of it, with a cost for every change (`best_labels`).
+3. Connected pieces of what is bright are judged as wholes: a piece without evidence of its own joins its
+   neighbour, and one that a depth far from every plane explains better is defocused (`pcii.regions`).
+4. Where several remain they are compared photon by photon: what does each of their depths predict of it that
+   the others do not? Light of a defocused object is explained by its own plane, instead of being outvoted.
+5. Each region is outlined to the pixel at its own depth (`pcii.outline`).
 
-References: Muniraj et al. 2017 for Eq. 9; the identity of likelihood and entropy follows from
-setting each voxel's rate to its maximum-likelihood value K / V.
+Nothing is told about the number of objects, their colours or their depths, and nothing is claimed without
+evidence. Muniraj et al. 2017 ask for the same masks; their three steps are in `pcii.three_step`.
 """
 
-from functools import cache
+from collections.abc import Sequence
 
 import numpy as np
 
-from pcii import statistics
-from pcii.geometry import landing
+from pcii.focus import Predictions, best_labels, depth_of_spread_mm, focus_of, predictions_of, windowed
+from pcii.geometry import disparity_spread_px, nearest_shifts_px
+from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
-from pcii.reconstruct import coverage_of
+from pcii.reconstruct import reconstruct
+from pcii.regions import Planes, Region, bright_cells, regions_of, settled
+from pcii.types import CameraGrid, Segmented
 
-BLOCK_PX = 2
-"""Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
+SEARCH_STEP_PX = 2.0
+SEARCHED_PX = 30.0
+"""Depths are searched this far beyond the planes, in px of total disparity spread: there is evidence of what
+is defocused, too."""
+NEAR_PX = 4.5
+FOCUS_PX = 10.0
+"""A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
+seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
+STEP_NATS, JUMP_NATS = 0.05, 0.8
+DUELS = 2
+DUEL_NATS = 20.0
+DUEL_CELLS = 25
+"""Regions that are compared photon by photon have this much evidence and this many cells."""
+VIEWS_PER_AXIS = 4
+"""Expected light is averaged over 4 x 4 cameras of the grid, its corners among them."""
 
-Single pixels are not. At depths where all shifts are even a colour falls on every fourth voxel only,
-where photons have four times as many partners, and textured patches would be drawn to such depths.
-"""
-CELL_PX = 4
-"""Scores are kept on cells of 4 x 4 pixels: windows are far larger."""
-BLOCKS = CELL_PX // BLOCK_PX
-LARGEST_RATE = 64.0
-"""Above this rate the expectation for a flat patch follows its asymptotic form."""
 
+def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+    """In-focus masks (Z, H, W) at the depths `z_mm` (Z,), and which photons came from there.
 
-def focus_scores(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> np.ndarray:
-    """Log-likelihood ratio of depth z against a flat patch, (Z, H / 4, W / 4) float64, in nats.
-
-    Summed over the colours and over a Gaussian window of `sigma_px` (weight 1 at its centre), on
-    cells of 4 x 4 pixels; H and W are rounded up to whole cells.
+    `steps` holds `evidence`, the gain of each plane in nats over a window (Z, H, W) float32; `bright`,
+    what is not dark (H, W repeated); `region`, the numbers of regions that are in focus.
     """
-    return np.stack([_plane_score(counts, depth, sigma_px) for depth in z_mm])
+    grid = counts.grid
+    sections = reconstruct(counts, z_mm)
+    own_spread, which = np.unique(disparity_spread_px(grid, z_mm), return_inverse=True)
+    planes = searched_planes(own_spread)
+    focus = focus_of(counts, planes.spread_px)
+    close = np.flatnonzero(planes.away_px <= NEAR_PX)
+    evidence = windowed(focus.gain[close], focus.photons[close])
+    label = best_labels(evidence, STEP_NATS * np.diff(planes.spread_px[close]) / SEARCH_STEP_PX, JUMP_NATS)
+    photons = focus.photons[close].sum(axis=1)
+    bright = bright_cells(np.take_along_axis(photons, label[None], axis=0)[0])
+    plane = settled(planes.nearest[close][label], bright, focus, planes)
+    numbers, regions = regions_of(plane, bright, focus, planes)
+    for _ in range(DUELS):
+        plane = duelled(counts, plane, regions)
+        numbers, regions = regions_of(plane, bright, focus, planes)
+    masks = np.zeros((own_spread.size, grid.height, grid.width), dtype=bool)
+    for region in regions:
+        if region.is_there:
+            _outline_region(counts, region, numbers, masks[region.plane])
+    best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
+    first = [int(np.flatnonzero(which == p)[0]) for p in range(own_spread.size)]
+    in_focus = np.zeros((len(z_mm), grid.height, grid.width), dtype=bool)
+    in_focus[first] = masks  # a depth that was asked for twice is answered once
+    steps = {
+        "evidence": np.stack([_on_pixels(best[p], grid) for p in which]),
+        "bright": np.stack([_on_pixels(bright, grid)] * len(z_mm)),
+        "region": np.stack([_on_pixels(numbers, grid)] * len(z_mm)),
+    }
+    return Segmented(z_mm, in_focus, "likelihood", sections, steps)
 
 
-def flat_deviation(counts: PhotonCounts, z_mm: float, *, sigma_px: float) -> np.ndarray:
-    """Standard deviation that `focus_scores` has over a flat patch, (H / 4, W / 4) float64, in nats.
-
-    The patch has the mean that the counts have around each cell in the section at z.
-    """
-    from scipy.ndimage import gaussian_filter
-
-    sigma = sigma_px / CELL_PX
-    variance = np.zeros(cell_shape(counts))
-    for photons in _block_counts(counts, z_mm):
-        rate = gaussian_filter(_sum_on_cells(photons), sigma, mode="constant") / BLOCKS**2
-        variance += np.interp(rate, *_noise_table())
-    # The squares of weights that are 1 at the centre sum to pi sigma^2 cells.
-    return np.sqrt(np.pi * sigma**2 * BLOCKS**2 * variance)
+def searched_planes(own_spread_px: np.ndarray) -> Planes:
+    """The planes' own depths, and others in steps of 2 px of total spread around and between them."""
+    low = max(SEARCH_STEP_PX, float(own_spread_px.min()) - SEARCHED_PX)
+    between = np.arange(low, float(own_spread_px.max()) + SEARCHED_PX, SEARCH_STEP_PX)
+    apart = np.abs(between[:, None] - own_spread_px[None]).min(axis=1)
+    spread = np.sort(np.concatenate([own_spread_px, between[apart >= SEARCH_STEP_PX / 2]]))
+    away = np.abs(spread[:, None] - own_spread_px[None])
+    return Planes(spread, np.argmin(away, axis=1), away.min(axis=1), NEAR_PX, FOCUS_PX)
 
 
-def photons_nearby(counts: PhotonCounts, z_mm: np.ndarray, *, sigma_px: float) -> np.ndarray:
-    """Photons of all colours in a Gaussian window (weight 1 at its centre), (Z, H / 4, W / 4)."""
-    from scipy.ndimage import gaussian_filter
-
-    sigma = sigma_px / CELL_PX
-    planes = (_sum_on_cells(_block_counts(counts, depth).sum(axis=0)) for depth in z_mm)
-    smooth = (gaussian_filter(plane, sigma, mode="constant") for plane in planes)
-    return np.stack([2 * np.pi * sigma**2 * plane for plane in smooth])
-
-
-def _plane_score(counts: PhotonCounts, z_mm: float, sigma_px: float) -> np.ndarray:
-    from scipy.ndimage import gaussian_filter
-    from scipy.special import xlogy
-
-    K = _block_counts(counts, z_mm)
-    V = _block_coverage(counts, z_mm)
-    occupied = np.nonzero(K)
-    information = np.zeros(K.shape)
-    information[occupied] = K[occupied] * np.log(K[occupied] / V[occupied])
-    sigma = sigma_px / CELL_PX
-    score = np.zeros((K.shape[1] // BLOCKS, K.shape[2] // BLOCKS))
-    for colour in range(counts.channel_count):
-        own, photons, samples = (
-            gaussian_filter(_sum_on_cells(values[colour]), sigma, mode="constant")
-            for values in (information, K, V)
-        )
-        rate = photons / np.maximum(samples, 1e-9)
-        # The window's own mean coverage: near borders some of the window is covered less or not at all.
-        blocks = gaussian_filter(_sum_on_cells((V[colour] > 0).astype(np.float64)), sigma, mode="constant")
-        coverage = samples / np.maximum(blocks, 1e-9)
-        score += own - blocks * (flat_information(rate * coverage) - xlogy(rate * coverage, coverage))
-    # The filter's weights sum to 1; with weight 1 at the centre they sum to 2 pi sigma^2.
-    return 2 * np.pi * sigma**2 * score
+def duelled(counts: PhotonCounts, plane: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
+    """The planes (h, w) of cells after the regions' own depths were compared photon by photon."""
+    strong = [r for r in regions if r.gain_nats > DUEL_NATS and r.cells >= DUEL_CELLS]
+    labels = sorted({(region.spread_px, region.plane) for region in strong})
+    if len({own for _, own in labels}) < 2:
+        return plane
+    focus, seen = predictions_of(counts, np.array([spread for spread, _ in labels]))
+    gain = _duel(counts, focus.spread_px, seen)
+    # Any change costs the same: these labels are in no order.
+    cost = np.full(len(labels) - 1, JUMP_NATS)
+    best = best_labels(windowed(gain, focus.photons), cost, JUMP_NATS)
+    return np.array([own for _, own in labels])[best]
 
 
-def _block_counts(counts: PhotonCounts, z_mm: float) -> np.ndarray:
-    """Photons of the section at z by colour and block, (C, blocks, blocks) float64."""
-    events = counts.events
-    row, col, inside = landing(counts.grid, events, z_mm)
-    height, width = (n * BLOCKS for n in cell_shape(counts))
-    block = (row[inside] // BLOCK_PX) * width + col[inside] // BLOCK_PX
-    flat = counts.event_colours[inside] * (height * width) + block
-    size = counts.channel_count * height * width
-    return np.bincount(flat, events.n[inside], minlength=size).reshape(-1, height, width)
+def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.ndarray:
+    """Nats that each depth gains over all of them together (S, h, w)."""
+    from pcii import focus_kernels as kernels
+
+    grid = counts.grid
+    shifts = [nearest_shifts_px(grid, z) for z in depth_of_spread_mm(grid, spread_px)]
+    rows, cols = (
+        np.floor(np.stack(axis)[:, _some(size)] / kernels.CELL_PX + 0.5).astype(np.int64)
+        for axis, size in zip(zip(*shifts, strict=True), (grid.rows, grid.cols), strict=True)
+    )
+    S, h, w = seen.expected.shape
+    views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)
+    kernels.views_of_planes(seen.expected, rows, cols, 1 / S, views)
+    rate = np.maximum(seen.rate, np.float32(1e-9))
+    # Where a depth lands outside the section it has no say.
+    inside = seen.cell >= 0
+    together = np.where(inside, rate, 0).sum(axis=0) / np.maximum(inside.sum(axis=0), 1)
+    gain = np.zeros_like(seen.expected)
+    n = counts.events.n.astype(np.float32)
+    kernels.duel_planes(views, seen.expected, rows, cols, rate, seen.cell, together, n, gain)
+    return gain
 
 
-def _block_coverage(counts: PhotonCounts, z_mm: float) -> np.ndarray:
-    """Samples of the section at z by colour and block, (C, blocks, blocks) float64."""
-    coverage = np.moveaxis(coverage_of(counts.grid, counts.cfa, counts.channel_count, z_mm, 1), -1, 0)
-    _, H, W = coverage.shape
-    height, width = (n * CELL_PX for n in cell_shape(counts))
-    whole = np.pad(coverage, ((0, 0), (0, height - H), (0, width - W)))
-    pairs = whole.reshape(-1, height // BLOCK_PX, BLOCK_PX, width // BLOCK_PX, BLOCK_PX)
-    return pairs.sum(axis=(2, 4), dtype=np.float64)
+def _some(cameras: int) -> np.ndarray:
+    return np.unique(np.linspace(0, cameras - 1, VIEWS_PER_AXIS).round().astype(int))
 
 
-def _sum_on_cells(blocks: np.ndarray) -> np.ndarray:
-    height, width = blocks.shape[0] // BLOCKS, blocks.shape[1] // BLOCKS
-    return blocks.reshape(height, BLOCKS, width, BLOCKS).sum(axis=(1, 3))
+def _outline_region(counts: PhotonCounts, region: Region, numbers: np.ndarray, mask: np.ndarray) -> None:
+    """Add a region (its cells have its number) to the plane's mask (H, W)."""
+    grid = counts.grid
+    on_pixels = _on_pixels(numbers, grid)
+    start = on_pixels == region.number
+    box = box_around(start)
+    section = reconstruct(counts, depth_of_spread_mm(grid, np.array([region.spread_px])))
+    taken = (on_pixels > 0) & ~start
+    photons, samples = (part[0][box].astype(np.float32) for part in (section.counts, section.coverage))
+    mask[box] |= outlined(photons, samples, start[box], taken[box])
 
 
-def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
-    """Cells of the coarse grid, (H / 4, W / 4) rounded up."""
-    return -(-counts.grid.height // CELL_PX), -(-counts.grid.width // CELL_PX)
+def _on_pixels(cells: np.ndarray, grid: CameraGrid) -> np.ndarray:
+    from pcii import focus_kernels as kernels
+    from pcii.statistics import cells_to_pixels
 
-
-def cells_to_pixels(cells: np.ndarray, counts: PhotonCounts) -> np.ndarray:
-    """Values on cells (H / 4, W / 4) as values on pixels (H, W), each cell constant."""
-    return statistics.cells_to_pixels(cells, CELL_PX, counts.grid)
-
-
-def flat_information(rate: np.ndarray) -> np.ndarray:
-    """E[K log K] of a Poisson variable K with this mean: the information of a flat patch, in nats."""
-    rates, values = _information_table()
-    inside = np.interp(rate, rates, values)
-    # Expanding K log K about the mean: r log r + 1/2 + 1 / (12 r), good to 3e-5 from 64 on.
-    large = np.maximum(rate, LARGEST_RATE)
-    asymptotic = large * np.log(large) + 0.5 + 1 / (12 * large)
-    return np.where(rate < LARGEST_RATE, inside, asymptotic)
-
-
-@cache
-def _poisson_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rates (R,), counts (N,) and probabilities (R, N) of a Poisson variable."""
-    from scipy.special import gammaln, xlogy
-
-    rates = np.linspace(0, np.sqrt(LARGEST_RATE), 4096) ** 2
-    k = np.arange(0.0, LARGEST_RATE + 14 * np.sqrt(LARGEST_RATE))
-    return rates, k, np.exp(xlogy(k, rates[:, None]) - rates[:, None] - gammaln(k + 1))
-
-
-@cache
-def _information_table() -> tuple[np.ndarray, np.ndarray]:
-    from scipy.special import xlogy
-
-    rates, k, probability = _poisson_table()
-    return rates, probability @ xlogy(k, k)
-
-
-@cache
-def _noise_table() -> tuple[np.ndarray, np.ndarray]:
-    """Variance of K log K about its regression on K: the mean is fitted, so that part does not count.
-
-    It tends to 1/2, the variance of half a chi-square variable.
-    """
-    from scipy.special import xlogy
-
-    rates, k, probability = _poisson_table()
-    value = xlogy(k, k)
-    mean = probability @ value
-    variance = probability @ value**2 - mean**2
-    covariance = probability @ (value * k) - mean * rates
-    residual = variance - covariance**2 / np.maximum(rates, 1e-12)
-    return rates, np.maximum(residual, 0.0)
+    return cells_to_pixels(cells, kernels.CELL_PX, grid)

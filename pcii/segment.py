@@ -1,20 +1,12 @@
 """Removal of defocused points: which points of each section are in focus there."""
 
-import numpy as np
-
 from pcii import plugins
 from pcii.baselines import brightness, shape_from_focus, variance
 from pcii.errors import InputError
-from pcii.foreground import SMALLEST_REGION_PX, outlined
-from pcii.likelihood import cells_to_pixels, focus_scores
+from pcii.likelihood import likelihood
 from pcii.photon_counts import PhotonCounts, check_depth_counts
-from pcii.planes import with_probes
-from pcii.reconstruct import reconstruct
-from pcii.statistics import pooled_estimate, section_window_px
 from pcii.three_step import ThreeStep
 from pcii.types import Segmented, check_z_mm
-
-FOCUS_SIGMA_PX = 20.0
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
@@ -54,29 +46,6 @@ def find_method(name: str) -> plugins.Method:
             raise InputError(f"method: no removal named {name!r}; use {', '.join((*METHODS, *brought))}")
         return plugins.load(brought[name])
     return METHODS[name]
-
-
-def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
-    """A point is in focus at z if it is bright there and no other depth explains its photons better.
-
-    `steps` holds `score` (the log-likelihood ratio in nats) and `bright`.
-    """
-    sections = reconstruct(counts, z_mm)
-    compared = with_probes(counts.grid, z_mm)
-    scores = focus_scores(counts, compared, sigma_px=FOCUS_SIGMA_PX)
-    best = cells_to_pixels(np.argmax(scores, axis=0), counts)
-    window_px = section_window_px(sections)
-    pooled = pooled_estimate(sections, window_px)
-    masks = []
-    for plane, coverage in zip(pooled, sections.coverage, strict=True):
-        samples = window_px**2 * float(coverage.mean()) * plane.shape[-1]
-        masks.append(outlined(plane, samples, SMALLEST_REGION_PX)[1])
-    in_focus = np.stack([mask & (best == plane) for plane, mask in enumerate(masks)])
-    steps = {
-        "score": np.stack([cells_to_pixels(score, counts) for score in scores[: z_mm.size]]),
-        "bright": np.stack(masks),
-    }
-    return Segmented(z_mm, in_focus, "likelihood", sections, steps)
 
 
 METHODS: dict[str, plugins.Method] = {

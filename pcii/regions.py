@@ -1,0 +1,181 @@
+"""Regions of one plane, and whether the light says that they are there.
+
+A region is a connected piece of what is bright and has one label. Its evidence is summed over it and the
+dark around it, where a blurred outline would show. A piece that its neighbour's plane explains as well is
+its neighbour's; a region that some depth far from every plane explains better is defocused.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.focus import Focus
+
+HALO_CELLS = 4
+"""Evidence of an outline lies up to 16 px outside it."""
+OUTLINE_NATS = 0.5
+"""A border between pieces must earn this much for each cell of its length, and `SURE_NATS` in all."""
+SURE_NATS = 10.0
+"""Of chance e^10: once in 20 000 times."""
+PHOTONS_TO_SEE = 30.0
+BRIGHT_SIGMAS = 6.0
+BRIGHT_SHARE = 0.1
+"""Bright is what exceeds the dark by 6 standard deviations and by a tenth of what a photon typically sees."""
+DARK_SHARE = 0.25
+"""If even the darkest fifth of the picture is as bright as this, nothing in it is the dark around things."""
+SMALLEST_CELLS = 6
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Region:
+    """A piece of a plane: its cells are `number` in the map; the depth where it gains most, and how much."""
+
+    number: int
+    plane: int
+    cells: int
+    spread_px: float
+    gain_nats: float
+    is_there: bool
+
+
+@dataclass(frozen=True)
+class Planes:
+    """Which of the searched depths count as which plane.
+
+    `nearest` (Z,) is the plane (P,) that each searched spread is closest to, `away_px` (Z,) how far in px of
+    total spread. Within `near_px` a depth is the plane's, within `far_px` still in its focus.
+    """
+
+    spread_px: np.ndarray
+    nearest: np.ndarray
+    away_px: np.ndarray
+    near_px: float
+    far_px: float
+
+    def close_to(self, plane: int) -> np.ndarray:
+        """Which searched depths are the plane's, (Z,) bool."""
+        return (self.nearest == plane) & (self.away_px <= self.near_px)
+
+    def within(self, plane: int) -> np.ndarray:
+        """Which are in its focus, (Z,) bool."""
+        return (self.nearest == plane) & (self.away_px <= self.far_px)
+
+
+def bright_cells(photons: np.ndarray) -> np.ndarray:
+    """What is not the dark around things, (h, w) bool, from photons by cell in focus."""
+    from scipy.ndimage import gaussian_filter
+
+    total = float(photons.sum())
+    if total == 0:
+        return np.zeros(photons.shape, dtype=bool)
+    # The mean that a photon sees, which Poisson noise does not bias.
+    typical = max(float((photons.astype(np.float64) * (photons - 1)).sum()) / total, 0.05)
+    cells = float(np.clip(np.sqrt(PHOTONS_TO_SEE / (4 * np.pi * typical)), 1.0, 4.0))
+    smooth = gaussian_filter(photons, cells)
+    dark = float(np.quantile(smooth, 0.2))
+    if dark > DARK_SHARE * typical:
+        return np.ones(photons.shape, dtype=bool)
+    noise = np.sqrt(max(dark, 0.02) / (4 * np.pi * cells**2))
+    return smooth > max(dark + BRIGHT_SIGMAS * noise, dark + BRIGHT_SHARE * (typical - dark))
+
+
+def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes) -> np.ndarray:
+    """The planes (h, w) of cells, -1 for none, after pieces without evidence of their own joined others."""
+    plane = plane.copy()
+    for _ in range(ROUNDS):
+        moved = 0
+        for own in np.unique(plane[bright]):
+            for box, piece in _pieces(bright & (plane == own)):
+                moved += _join(plane, bright, focus, planes, int(own), box, piece)
+        if not moved:
+            break
+    return plane
+
+
+def _join(
+    plane: np.ndarray,
+    bright: np.ndarray,
+    focus: Focus,
+    planes: Planes,
+    own: int,
+    box: tuple[slice, slice],
+    piece: np.ndarray,
+) -> bool:
+    """Give a piece to the neighbour it borders on most, unless it gains enough by its own plane."""
+    from scipy.ndimage import binary_dilation
+
+    ring = binary_dilation(piece) & ~piece & bright[box]
+    if not ring.any():
+        return False
+    names, numbers = np.unique(plane[box][ring], return_counts=True)
+    other = int(names[np.argmax(numbers)])
+    evidence = _evidence(focus, box, piece, bright)
+    gain = evidence[_depths(planes, own)].max() - evidence[_depths(planes, other)].max()
+    if gain >= OUTLINE_NATS * int(ring.sum()) + SURE_NATS:
+        return False
+    plane[box][piece] = other
+    return True
+
+
+def _depths(planes: Planes, plane: int) -> np.ndarray:
+    """The searched depths that speak for a plane; for none (-1), those in the focus of no plane."""
+    return planes.close_to(plane) if plane >= 0 else planes.away_px > planes.far_px
+
+
+def regions_of(
+    plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes
+) -> tuple[np.ndarray, list[Region]]:
+    """A map (h, w) int64 of the regions' numbers, 0 outside, and the regions."""
+    numbers = np.zeros(plane.shape, np.int64)
+    found: list[Region] = []
+    nowhere = planes.away_px > planes.far_px
+    for own in np.unique(plane[bright]):
+        for box, piece in _pieces(bright & (plane == own)):
+            if piece.sum() < SMALLEST_CELLS:
+                continue
+            evidence = _evidence(focus, box, piece, bright)
+            own_depths = planes.within(int(own)) if own >= 0 else nowhere
+            best = int(np.argmax(np.where(own_depths, evidence, -np.inf)))
+            elsewhere = evidence[nowhere].max() if nowhere.any() else -np.inf
+            is_there = own >= 0 and evidence[best] > SURE_NATS and evidence[~nowhere].max() >= elsewhere
+            number = len(found) + 1
+            numbers[box][piece] = number
+            if not is_there and elsewhere > evidence[best]:
+                best = int(np.argmax(np.where(nowhere, evidence, -np.inf)))
+            found.append(
+                Region(
+                    number,
+                    int(own) if is_there else -1,
+                    int(piece.sum()),
+                    float(planes.spread_px[best]),
+                    float(evidence[best]),
+                    bool(is_there),
+                )
+            )
+    return numbers, found
+
+
+def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
+    """Connected pieces of a mask: a box with room for the halo, and the piece in it."""
+    from scipy.ndimage import find_objects, label
+
+    numbers = np.zeros(mask.shape, np.int32)
+    label(mask, output=numbers)
+    found = []
+    for number, place in enumerate(find_objects(numbers), start=1):
+        room = HALO_CELLS + 2
+        box = (
+            slice(max(place[0].start - room, 0), place[0].stop + room),
+            slice(max(place[1].start - room, 0), place[1].stop + room),
+        )
+        found.append((box, numbers[box] == number))
+    return found
+
+
+def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray) -> np.ndarray:
+    """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
+    from scipy.ndimage import binary_dilation
+
+    around = binary_dilation(piece, iterations=HALO_CELLS) & (~bright[box] | piece)
+    return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)
