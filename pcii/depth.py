@@ -12,7 +12,7 @@ from pcii.statistics import cells_to_pixels
 from pcii.types import DepthMap, check_z_mm
 
 PLANE_STEP_PX = 2.0
-"""Planes differ by so much in total disparity spread: 1 px of blur, finer than a pixel nothing can be told."""
+"""Planes differ by so much in total disparity spread: 1 px of blur."""
 MOST_PLANES = 1000
 STEP_NATS, JUMP_NATS = 0.002, 0.08
 """What a change of depth from cell to cell must earn, per plane and at most; less than between objects."""

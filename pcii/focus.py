@@ -4,8 +4,8 @@ If the surface is at depth z, all views' samples of a voxel of the section at z 
 predicts where photons land; at a wrong depth it is blurred and predicts worse. The rate of each photon's own
 pixel and colour is estimated from all other photons, at several scales at once, and compared with what a
 blurred section would say. The sum of log ratios, less the photons that are expected more, is a gain in
-log-likelihood in nats. A photon takes no part in its own prediction, so where there is nothing to see the gain
-is below 0 on average, and e^gain exceeds x by chance about once in x times.
+log-likelihood in nats. A photon takes no part in its own prediction, so where there is nothing to see the
+gain is below 0 on average, and e^gain exceeds x by chance about once in x times.
 
 Setting each voxel's rate to its own maximum-likelihood value instead, and comparing depths, is minimising
 the entropy of where photons land: Eq. 9 of Muniraj et al. 2017 with the right statistics.
@@ -33,7 +33,7 @@ PICTURE_CELLS = 1.0
 class Focus:
     """What sections at `spread_px` (Z,) gain over blurred ones, on cells of 4 x 4 pixels.
 
-    `gain` (Z, H / 4, W / 4) float32 in nats, `photons` (Z, C, H / 4, W / 4) float32 by colour; sizes rounded up.
+    `gain` (Z, H / 4, W / 4) float32 in nats, `photons` (Z, C, H / 4, W / 4) float32 by colour.
     """
 
     spread_px: np.ndarray

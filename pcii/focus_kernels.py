@@ -191,7 +191,6 @@ def _plane(
     if cell.size:
         cell[:] = own_cells
 
-    every_site = sites.sum()
     for a in range(h):
         for b in range(w):
             samples = 0.0
@@ -242,8 +241,8 @@ def focus_planes(
 
     Events (N,) with their `colour` and number `n`; whole shifts `rows` (Z, K) and `cols` (Z, L); `size` of
     the film in px; `sites` (C,) of each colour in a block. `gain` (Z, H, W) and `photons` (Z, C, H, W) by
-    cell. If they are not empty: `predicted` (Z, N), the rate of each event's pixel by all other events; its `cell` (Z, N),
-    -1 outside; `expected` (Z, H, W) photons in each cell.
+    cell. If they are not empty: `predicted` (Z, N), the rate of each event's pixel by all other events; its
+    `cell` (Z, N), -1 outside; `expected` (Z, H, W) photons in each cell.
     """
     for plane in nb.prange(rows.shape[0]):
         _plane(
@@ -282,7 +281,7 @@ def windows_within_edges(
     """`near` (Z, H, W) plus its weighted means over wide windows that stop at edges: `result`, overwritten.
 
     `picture` (Z, C, H, W) is what each plane shows; a step in it of more than `noise` lengthens the way to
-    the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira 2011, two passes.
+    the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira 2011.
     """
     Z, H, W = near.shape
     for z in nb.prange(Z):

@@ -2,7 +2,7 @@
 
 1. The section at each depth predicts where photons land; what it predicts better than a blurred one would
    is evidence of focus (`pcii.focus`), summed over windows that stop at the edges that the section shows.
-2. Each cell of 4 px takes the requested plane that has most of it, with a cost for every change (`best_labels`).
+2. Each cell of 4 px takes the requested plane that has most of it, and every change costs (`best_labels`).
 3. Connected pieces of what is bright are judged as wholes: a piece without evidence of its own joins its
    neighbour, and one that a depth far from every plane explains better is defocused (`pcii.regions`).
 4. Where several remain they are compared photon by photon: what does each of their depths predict of it that

@@ -25,9 +25,7 @@ SMALLEST_REGION_PX = 100
 MARGIN_PX = 40
 
 
-def outlined(
-    photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken: np.ndarray
-) -> np.ndarray:
+def outlined(photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken: np.ndarray) -> np.ndarray:
     """The region (H, W) bool that `start` (H, W) grows or shrinks to; nothing of `taken` (H, W).
 
     `photons` and `samples` (H, W, C) are the counts and the coverage of the section at the region's depth.
@@ -79,7 +77,8 @@ def _local_rate(K: np.ndarray, V: np.ndarray, where: np.ndarray, width_px: float
     """Photons per sample around each pixel, from the pixels of `where`; far from them their mean."""
     from scipy.ndimage import gaussian_filter
 
-    photons, samples = (gaussian_filter(np.where(where, part, 0).astype(np.float32), width_px) for part in (K, V))
+    own = (np.where(where, part, 0).astype(np.float32) for part in (K, V))
+    photons, samples = (gaussian_filter(part, width_px) for part in own)
     mean = float(K[where].sum()) / max(float(V[where].sum()), 1.0)
     prior = np.float32(1e-3 * max(float(V.mean()), 1e-6))
     return (photons + np.float32(mean) * prior) / (samples + prior)
