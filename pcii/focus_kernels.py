@@ -413,7 +413,7 @@ def duel_planes(
                 result[z, at // W, at % W] += n[e] * math.log(predicted[z, e] / together[e])
 
 
-@compiled
+@helper
 def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside: np.ndarray) -> None:
     """The mask that gains most, less `length_cost` per px of its outline: relaxed to [0, 1] in `inside`.
 
@@ -425,19 +425,19 @@ def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside:
     across = np.zeros((H, W), np.float32)
     down = np.zeros((H, W), np.float32)
     step = 0.35  # 8 step^2 < 1
-    for i in nb.prange(H):
+    for i in range(H):
         for j in range(W):
             inside[i, j] = 1.0 if gain[i, j] > 0 else 0.0
             ahead[i, j] = inside[i, j]
     for _ in range(iterations):
-        for i in nb.prange(H):
+        for i in range(H):
             for j in range(W):
                 x = across[i, j] + (step * (ahead[i, j + 1] - ahead[i, j]) if j + 1 < W else 0.0)
                 y = down[i, j] + (step * (ahead[i + 1, j] - ahead[i, j]) if i + 1 < H else 0.0)
                 size = max(1.0, math.sqrt(x * x + y * y) / length_cost)
                 across[i, j] = x / size
                 down[i, j] = y / size
-        for i in nb.prange(H):
+        for i in range(H):
             for j in range(W):
                 flow = across[i, j] + down[i, j]
                 if j > 0:

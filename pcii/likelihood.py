@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pcii.focus import Predictions, best_labels, depth_of_spread_mm, focus_of, predictions_of, windowed
-from pcii.geometry import disparity_spread_px, nearest_shifts_px
+from pcii.geometry import disparity_spread_px, landing, nearest_shifts_px
 from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
@@ -33,7 +33,7 @@ NEAR_PX = 4.5
 FOCUS_PX = 10.0
 """A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
-STEP_NATS, JUMP_NATS = 0.05, 0.8
+STEP_NATS, JUMP_NATS = 0.05, 0.2
 DUELS = 2
 DUEL_NATS = 20.0
 DUEL_CELLS = 25
@@ -61,22 +61,24 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     plane = settled(planes.nearest[close][label], bright, focus, planes)
     numbers, regions = regions_of(plane, bright, focus, planes)
     for _ in range(DUELS):
-        plane = duelled(counts, plane, regions)
+        plane = duelled(counts, plane, regions, own_spread)
         numbers, regions = regions_of(plane, bright, focus, planes)
-    masks = np.zeros((own_spread.size, grid.height, grid.width), dtype=bool)
-    for region in regions:
-        if region.is_there:
-            _outline_region(counts, region, numbers, masks[region.plane])
+    masks, belongs = _outlines(counts, regions, numbers, own_spread.size)
+    # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
+    own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
     best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
     first = [int(np.flatnonzero(which == p)[0]) for p in range(own_spread.size)]
     in_focus = np.zeros((len(z_mm), grid.height, grid.width), dtype=bool)
-    in_focus[first] = masks  # a depth that was asked for twice is answered once
+    photon_in_focus = np.zeros((len(z_mm), own.size), dtype=bool)
+    for plane_number, place in enumerate(first):  # a depth that was asked for twice is answered once
+        in_focus[place] = masks[plane_number]
+        photon_in_focus[place] = own == plane_number
     steps = {
         "evidence": np.stack([_on_pixels(best[p], grid) for p in which]),
         "bright": np.stack([_on_pixels(bright, grid)] * len(z_mm)),
         "region": np.stack([_on_pixels(numbers, grid)] * len(z_mm)),
     }
-    return Segmented(z_mm, in_focus, "likelihood", sections, steps)
+    return Segmented(z_mm, in_focus, "likelihood", sections, steps, photon_in_focus)
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
@@ -89,10 +91,16 @@ def searched_planes(own_spread_px: np.ndarray) -> Planes:
     return Planes(spread, np.argmin(away, axis=1), away.min(axis=1), NEAR_PX, FOCUS_PX)
 
 
-def duelled(counts: PhotonCounts, plane: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
+def duelled(
+    counts: PhotonCounts, plane: np.ndarray, regions: Sequence[Region], own_spread_px: np.ndarray
+) -> np.ndarray:
     """The planes (h, w) of cells after the regions' own depths were compared photon by photon."""
     strong = [r for r in regions if r.gain_nats > DUEL_NATS and r.cells >= DUEL_CELLS]
-    labels = sorted({(region.spread_px, region.plane) for region in strong})
+    if not strong:
+        return plane
+    named = {region.plane for region in strong}
+    idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
+    labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
     if len({own for _, own in labels}) < 2:
         return plane
     focus, seen = predictions_of(counts, np.array([spread for spread, _ in labels]))
@@ -130,16 +138,42 @@ def _some(cameras: int) -> np.ndarray:
     return np.unique(np.linspace(0, cameras - 1, VIEWS_PER_AXIS).round().astype(int))
 
 
-def _outline_region(counts: PhotonCounts, region: Region, numbers: np.ndarray, mask: np.ndarray) -> None:
-    """Add a region (its cells have its number) to the plane's mask (H, W)."""
+def _outlines(
+    counts: PhotonCounts, regions: Sequence[Region], numbers: np.ndarray, planes: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Masks (P, H, W) of the planes' regions to the pixel, and which events (P, N) land in them."""
     grid = counts.grid
     on_pixels = _on_pixels(numbers, grid)
-    start = on_pixels == region.number
-    box = box_around(start)
-    section = reconstruct(counts, depth_of_spread_mm(grid, np.array([region.spread_px])))
-    taken = (on_pixels > 0) & ~start
-    photons, samples = (part[0][box].astype(np.float32) for part in (section.counts, section.coverage))
-    mask[box] |= outlined(photons, samples, start[box], taken[box])
+    masks = np.zeros((planes, grid.height, grid.width), dtype=bool)
+    belongs = np.zeros((planes, counts.events.n.size), dtype=bool)
+    for spread in sorted({region.spread_px for region in regions if region.is_there}):
+        z_mm = depth_of_spread_mm(grid, np.array([spread]))
+        section = reconstruct(counts, z_mm)
+        row, col, inside = landing(grid, counts.events, float(z_mm[0]))
+        for region in regions:
+            if not region.is_there or region.spread_px != spread:
+                continue
+            start = on_pixels == region.number
+            box = box_around(start)
+            taken = ((on_pixels > 0) & ~start)[box]
+            _close_frame(taken, box, grid)
+            photons, samples = (
+                part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
+            )
+            mask = np.zeros((grid.height, grid.width), dtype=bool)
+            mask[box] = outlined(photons, samples, start[box], taken)
+            masks[region.plane] |= mask
+            belongs[region.plane, inside] |= mask[row[inside], col[inside]]
+    return masks, belongs
+
+
+def _close_frame(taken: np.ndarray, box: tuple[slice, slice], grid: CameraGrid) -> None:
+    """The box's frame is nobody's, but where it is the film's: filling the box would save outline."""
+    rows, cols = box
+    taken[0] |= rows.start > 0
+    taken[-1] |= rows.stop < grid.height
+    taken[:, 0] |= cols.start > 0
+    taken[:, -1] |= cols.stop < grid.width
 
 
 def _on_pixels(cells: np.ndarray, grid: CameraGrid) -> np.ndarray:

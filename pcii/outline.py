@@ -15,7 +15,7 @@ ITERATIONS = 150
 ROUNDS = 3
 PHOTONS_PER_RATE = 100.0
 NARROWEST_PX, WIDEST_PX = 4.0, 24.0
-LEAST_INSIDE, LEAST_OUTSIDE = 0.08, 0.01
+LEAST_INSIDE, LEAST_OUTSIDE = 0.05, 0.01
 """Rates inside are at least this share of the region's mean, which shadows are, and rates around it too, else
 where no photon happened to land anything would be more likely than darkness."""
 LARGEST_BIN_PX = 8
@@ -47,9 +47,10 @@ def outlined(photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken:
 def box_around(mask: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns of a mask that is not empty, with a margin."""
     rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    H, W = mask.shape
     return (
-        slice(max(int(rows[0]) - MARGIN_PX, 0), int(rows[-1]) + 1 + MARGIN_PX),
-        slice(max(int(cols[0]) - MARGIN_PX, 0), int(cols[-1]) + 1 + MARGIN_PX),
+        slice(max(int(rows[0]) - MARGIN_PX, 0), min(int(rows[-1]) + 1 + MARGIN_PX, H)),
+        slice(max(int(cols[0]) - MARGIN_PX, 0), min(int(cols[-1]) + 1 + MARGIN_PX, W)),
     )
 
 
@@ -59,7 +60,7 @@ def _gain(
     """Nats that each pixel gains by being inside, (H, W) float32; -50 where it cannot be."""
     from scipy.ndimage import binary_dilation
 
-    outside = ~taken & ~binary_dilation(region, iterations=2)
+    outside = ~(taken | np.asarray(binary_dilation(region, iterations=2), dtype=bool))
     outer_px = max(inner_px, 10.0)
     gain = np.zeros(region.shape, np.float32)
     for c in range(photons.shape[-1]):
@@ -110,7 +111,7 @@ def _tidied(region: np.ndarray, taken: np.ndarray) -> np.ndarray:
     holes = np.asarray(binary_fill_holes(region)) & ~region & ~taken
     numbers = np.zeros(region.shape, np.int32)
     label(holes, output=numbers)
-    small = np.bincount(numbers.ravel()) < LARGEST_HOLE * np.count_nonzero(region)
+    small = np.asarray(np.bincount(numbers.ravel()) < LARGEST_HOLE * np.count_nonzero(region))
     small[0] = False
     region = region | small[numbers]
     label(region, output=numbers)

@@ -84,11 +84,17 @@ def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes)
     """The planes (h, w) of cells, -1 for none, after pieces without evidence of their own joined others."""
     plane = plane.copy()
     for _ in range(ROUNDS):
-        moved = 0
-        for own in np.unique(plane[bright]):
-            for box, piece in _pieces(bright & (plane == own)):
-                moved += _join(plane, bright, focus, planes, int(own), box, piece)
-        if not moved:
+        pieces = [
+            (int(piece.sum()), int(own), box, piece)
+            for own in np.unique(plane[bright])
+            for box, piece in _pieces(bright & (plane == own))
+        ]
+        size = np.zeros(plane.shape, np.int64)
+        for cells, _, box, piece in pieces:
+            size[box][piece] = cells
+        pieces.sort(key=lambda found: found[0])
+        moved = [_join(plane, bright, size, focus, planes, own, box, piece) for _, own, box, piece in pieces]
+        if not any(moved):
             break
     return plane
 
@@ -96,16 +102,17 @@ def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes)
 def _join(
     plane: np.ndarray,
     bright: np.ndarray,
+    size: np.ndarray,
     focus: Focus,
     planes: Planes,
     own: int,
     box: tuple[slice, slice],
     piece: np.ndarray,
 ) -> bool:
-    """Give a piece to the neighbour it borders on most, unless it gains enough by its own plane."""
+    """Give a piece to the larger neighbour it borders on most, unless it gains enough by its own plane."""
     from scipy.ndimage import binary_dilation
 
-    ring = binary_dilation(piece) & ~piece & bright[box]
+    ring = binary_dilation(piece) & ~piece & bright[box] & (size[box] > piece.sum()) & (plane[box] != own)
     if not ring.any():
         return False
     names, numbers = np.unique(plane[box][ring], return_counts=True)
@@ -177,5 +184,5 @@ def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright:
     """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
     from scipy.ndimage import binary_dilation
 
-    around = binary_dilation(piece, iterations=HALO_CELLS) & (~bright[box] | piece)
+    around = np.asarray(binary_dilation(piece, iterations=HALO_CELLS), dtype=bool) & (~bright[box] | piece)
     return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)
