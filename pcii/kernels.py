@@ -6,6 +6,12 @@ code is kept beside these files, or in the user's cache where that is not writab
 compiled once per machine.
 """
 
+import os
+
+# Threads that spin while they wait slow everything down where other programs use the machine; asleep they
+# cost some microseconds a loop. It is read when the compiler is loaded; who has set it is heard.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
 import numba as nb
 import numpy as np
 

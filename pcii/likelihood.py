@@ -67,24 +67,19 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
     own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
     best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
-    first = [int(np.flatnonzero(which == p)[0]) for p in range(own_spread.size)]
-    in_focus = np.zeros((len(z_mm), grid.height, grid.width), dtype=bool)
-    photon_in_focus = np.zeros((len(z_mm), own.size), dtype=bool)
-    for plane_number, place in enumerate(first):  # a depth that was asked for twice is answered once
-        in_focus[place] = masks[plane_number]
-        photon_in_focus[place] = own == plane_number
     steps = {
         "evidence": np.stack([_on_pixels(best[p], grid) for p in which]),
         "bright": np.stack([_on_pixels(bright, grid)] * len(z_mm)),
         "region": np.stack([_on_pixels(numbers, grid)] * len(z_mm)),
     }
-    return Segmented(z_mm, in_focus, "likelihood", sections, steps, photon_in_focus)
+    return Segmented(z_mm, masks[which], "likelihood", sections, steps, own == which[:, None])
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
-    """The planes' own depths, and others in steps of 2 px of total spread around and between them."""
-    low = max(SEARCH_STEP_PX, float(own_spread_px.min()) - SEARCHED_PX)
-    between = np.arange(low, float(own_spread_px.max()) + SEARCHED_PX, SEARCH_STEP_PX)
+    """The planes' own depths, and others in steps of 2 px of total spread up to 30 px around each."""
+    steps = np.arange(-SEARCHED_PX, SEARCHED_PX + SEARCH_STEP_PX, SEARCH_STEP_PX)
+    between = np.unique(np.round((own_spread_px[:, None] + steps) / SEARCH_STEP_PX)) * SEARCH_STEP_PX
+    between = between[between >= SEARCH_STEP_PX]
     apart = np.abs(between[:, None] - own_spread_px[None]).min(axis=1)
     spread = np.sort(np.concatenate([own_spread_px, between[apart >= SEARCH_STEP_PX / 2]]))
     away = np.abs(spread[:, None] - own_spread_px[None])
