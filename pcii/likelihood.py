@@ -61,7 +61,7 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     plane = settled(planes.nearest[close][label], bright, focus, planes)
     numbers, regions = regions_of(plane, bright, focus, planes)
     for _ in range(DUELS):
-        plane = duelled(counts, plane, regions, own_spread)
+        plane = duelled(counts, plane, bright, (numbers, regions), own_spread)
         numbers, regions = regions_of(plane, bright, focus, planes)
     masks, belongs = _outlines(counts, regions, numbers, own_spread.size)
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
@@ -87,23 +87,44 @@ def searched_planes(own_spread_px: np.ndarray) -> Planes:
 
 
 def duelled(
-    counts: PhotonCounts, plane: np.ndarray, regions: Sequence[Region], own_spread_px: np.ndarray
+    counts: PhotonCounts,
+    plane: np.ndarray,
+    bright: np.ndarray,
+    found: tuple[np.ndarray, list[Region]],
+    own_spread_px: np.ndarray,
 ) -> np.ndarray:
-    """The planes (h, w) of cells after the regions' own depths were compared photon by photon."""
+    """The planes (h, w) of cells after depths were compared photon by photon where regions touch.
+
+    Compared are the depths of regions, and of requested planes that have none. A thing by itself in the dark
+    has been judged as a whole: of a round one each depth explains a part, and none is to have it.
+    """
+    numbers, regions = found
     strong = [r for r in regions if r.gain_nats > DUEL_NATS and r.cells >= DUEL_CELLS]
-    if not strong:
+    touching = _where_planes_touch(bright, numbers, strong)
+    if not touching.any():
         return plane
     named = {region.plane for region in strong}
     idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
     labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
-    if len({own for _, own in labels}) < 2:
-        return plane
     focus, seen = predictions_of(counts, np.array([spread for spread, _ in labels]))
     gain = _duel(counts, focus.spread_px, seen)
     # Any change costs the same: these labels are in no order.
     cost = np.full(len(labels) - 1, JUMP_NATS)
     best = best_labels(windowed(gain, focus.photons), cost, JUMP_NATS)
-    return np.array([own for _, own in labels])[best]
+    return np.where(touching, np.array([own for _, own in labels])[best], plane)
+
+
+def _where_planes_touch(bright: np.ndarray, numbers: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
+    """Connected pieces of what is bright that hold regions of several planes, (h, w) bool."""
+    from scipy.ndimage import label
+
+    pieces = np.zeros(bright.shape, np.int32)
+    label(bright, output=pieces)
+    planes_of: dict[int, set[int]] = {}
+    for region in regions:
+        piece = int(pieces[numbers == region.number][0])
+        planes_of.setdefault(piece, set()).add(region.plane)
+    return np.isin(pieces, [piece for piece, own in planes_of.items() if len(own) > 1])
 
 
 def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.ndarray:
