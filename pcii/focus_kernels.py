@@ -22,6 +22,8 @@ SCALES = 5
 """Rates are smoothed over 2, 4, 8, 16 and 32 px and their mean taken: texture may be of any scale."""
 COLOUR_SCALE = 3
 """What is finer than 16 px is estimated from all colours together, and shared out as they are around it."""
+COLOUR_PRIOR = 0.3
+"""Photons that are thought to be of each colour in proportion to its sites: one photon tells no colour."""
 BASE_SCALE = 4
 """What a plane that shows nothing of its own would predict: the rate smoothed over 32 px."""
 BASE_SHARE = 0.05
@@ -71,10 +73,12 @@ def _halved(values: np.ndarray) -> np.ndarray:
 
 
 @helper
-def _between(place: float) -> tuple[int, float, float]:
+def _between(place: float, size: int) -> tuple[int, float, float]:
     """Cell centre below a place (in cells), the share of the next, and what an event there gives itself."""
     low = math.floor(place - 0.5)
     share = place - 0.5 - low
+    if low < 0 or low + 1 >= size:  # beside the frame both centres are the same
+        return low, share, CENTRE
     own = CENTRE * (1 - share) + SIDE * share if share < 0.5 else CENTRE * share + SIDE * (1 - share)
     return low, share, own
 
@@ -91,11 +95,21 @@ def _at(values: np.ndarray, c: int, low_i: int, share_i: float, low_j: int, shar
 
 
 @helper
+def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
+    """First and last row (or column) + 1 of the blocks that a shifted view covers as a whole.
+
+    Blocks that it covers in part are left out: there it would bring more of one colour than of another.
+    """
+    first, last = max(0, shift), min(size, size + shift)
+    return first + first % BLOCK_PX, last - last % BLOCK_PX
+
+
+@helper
 def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
-    """How many camera rows (or columns) see each block row (or column), (1, blocks)."""
+    """How many camera rows (or columns) see each block row (or column), (blocks,)."""
     seen = np.zeros(blocks, np.float32)
     for camera in range(shifts.size):
-        first, last = max(0, shifts[camera]), min(size, size + shifts[camera])
+        first, last = _whole_blocks(shifts[camera], size)
         for place in range(first, last):
             seen[place // BLOCK_PX] += 1.0 / BLOCK_PX
     return seen
@@ -128,7 +142,9 @@ def _plane(
     counts = np.zeros((C, 2 * h, 2 * w), np.float32)
     for e in range(k.size):
         row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-        if 0 <= row < H and 0 <= col < W:
+        top, bottom = _whole_blocks(rows[k[e]], H)
+        left, right = _whole_blocks(cols[l[e]], W)
+        if top <= row < bottom and left <= col < right:
             counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e]
             own_cells[e] = (row // CELL_PX) * w + col // CELL_PX
         else:
@@ -156,29 +172,24 @@ def _plane(
             continue
         c = colour[e]
         row, col = i[e] + rows[k[e]] + 0.5, j[e] + cols[l[e]] + 0.5
-        width = float(BLOCK_PX << COLOUR_SCALE)
-        low_i, share_i, own_i = _between(row / width)
-        low_j, share_j, own_j = _between(col / width)
-        own = own_i * own_j
-        around = _at(light[COLOUR_SCALE], 0, low_i, share_i, low_j, share_j) - own
-        same = _at(coloured[COLOUR_SCALE], c, low_i, share_i, low_j, share_j) - own
-        share = (max(same, 0.0) + 0.3 * share_of_site[c]) / (max(around, 0.0) + 0.3)
+        share = 1.0
         mean = 0.0
         base = 0.0
-        for scale in range(SCALES):
+        for reverse in range(SCALES):
+            scale = SCALES - 1 - reverse
             if scale == 0:  # a block is its own best estimate: nothing between centres
                 low_i, share_i, own_i = int(row) // BLOCK_PX, 0.0, CENTRE
                 low_j, share_j, own_j = int(col) // BLOCK_PX, 0.0, CENTRE
             else:
                 width = float(BLOCK_PX << scale)
-                low_i, share_i, own_i = _between(row / width)
-                low_j, share_j, own_j = _between(col / width)
+                low_i, share_i, own_i = _between(row / width, light[scale].shape[1])
+                low_j, share_j, own_j = _between(col / width, light[scale].shape[2])
             samples = _at(seen[scale], 0, low_i, share_i, low_j, share_j) * sites[c]
-            if scale < COLOUR_SCALE:
-                others = (_at(light[scale], 0, low_i, share_i, low_j, share_j) - own_i * own_j) * share
-            else:
-                others = _at(coloured[scale], c, low_i, share_i, low_j, share_j) - own_i * own_j
-            rate = max(others, 0.0) / max(samples, 1e-6)
+            others = max(_at(light[scale], 0, low_i, share_i, low_j, share_j) - own_i * own_j, 0.0)
+            if scale >= COLOUR_SCALE:
+                same = max(_at(coloured[scale], c, low_i, share_i, low_j, share_j) - own_i * own_j, 0.0)
+                share = (same + COLOUR_PRIOR * share_of_site[c]) / (others + COLOUR_PRIOR)
+            rate = others * share / max(samples, 1e-6)
             mean += rate / SCALES
             if scale == BASE_SCALE:
                 base = max(rate, 1e-12)
@@ -207,8 +218,8 @@ def _plane(
                 continue
             for scale in range(1, SCALES):
                 width = float(BLOCK_PX << scale)
-                low_i, share_i, _ = _between((a + 0.5) * CELL_PX / width)
-                low_j, share_j, _ = _between((b + 0.5) * CELL_PX / width)
+                low_i, share_i, _ = _between((a + 0.5) * CELL_PX / width, light[scale].shape[1])
+                low_j, share_j, _ = _between((b + 0.5) * CELL_PX / width, light[scale].shape[2])
                 there = _at(seen[scale], 0, low_i, share_i, low_j, share_j)
                 rate = _at(light[scale], 0, low_i, share_i, low_j, share_j) / max(there, 1e-6)
                 mean += rate / SCALES

@@ -22,7 +22,7 @@ from pcii.geometry import disparity_spread_px, landing, nearest_shifts_px
 from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
-from pcii.regions import Planes, Region, bright_cells, regions_of, settled
+from pcii.regions import SURE_NATS, Planes, Region, bright_cells, regions_of, settled
 from pcii.types import CameraGrid, Segmented
 
 SEARCH_STEP_PX = 2.0
@@ -159,7 +159,9 @@ def _outlines(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Masks (P, H, W) of the planes' regions to the pixel, and which events (P, N) land in them."""
     grid = counts.grid
-    on_pixels = _on_pixels(numbers, grid)
+    # What nothing speaks for is free to be taken; what is defocused is not.
+    firm = [0, *(region.number for region in regions if region.gain_nats > SURE_NATS)]
+    on_pixels = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
     masks = np.zeros((planes, grid.height, grid.width), dtype=bool)
     belongs = np.zeros((planes, counts.events.n.size), dtype=bool)
     for spread in sorted({region.spread_px for region in regions if region.is_there}):

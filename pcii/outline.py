@@ -14,7 +14,7 @@ and it must pay for noise."""
 ITERATIONS = 150
 ROUNDS = 3
 PHOTONS_PER_RATE = 100.0
-NARROWEST_PX, WIDEST_PX = 4.0, 24.0
+NARROWEST_PX, WIDEST_PX = 2.0, 24.0
 LEAST_INSIDE, LEAST_OUTSIDE = 0.05, 0.01
 """Rates inside are at least this share of the region's mean, which shadows are, and rates around it too, else
 where no photon happened to land anything would be more likely than darkness."""
@@ -22,7 +22,13 @@ LARGEST_BIN_PX = 8
 LARGEST_HOLE = 0.05
 """Holes of less than this share of a region are dark paint."""
 SMALLEST_REGION_PX = 100
+SPILL, SPILL_PHOTONS = 0.2, 6.0
+"""Views are shifted by whole pixels and so bring light of the inside beside it: if this share is expected there,
+an outline lies where half of the light is left. Below 6 photons a pixel noise misplaces it more than that,
+and more contrast between inside and outside helps more."""
 MARGIN_PX = 40
+AWAY_PX, FIRST_AWAY_PX = 2, 8
+"""What is farther from a region is surely around it; at first, when its outline is known to cells only."""
 
 
 def outlined(photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken: np.ndarray) -> np.ndarray:
@@ -36,8 +42,10 @@ def outlined(photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken:
     inner = float(np.clip(np.sqrt(PHOTONS_PER_RATE / (4 * np.pi * rate)), NARROWEST_PX, WIDEST_PX))
     bin_px = int(np.clip(round(np.sqrt(1 / rate)), 1, LARGEST_BIN_PX))
     region = start
-    for _ in range(ROUNDS):
-        gain = _gain(photons, samples, region, taken, inner)
+    for round_ in range(ROUNDS):
+        # The start may be too small, so that what is right beside it is the region's own light.
+        away_px = FIRST_AWAY_PX if round_ == 0 else AWAY_PX
+        gain = _gain(photons, samples, region, taken, inner, away_px)
         region = _least_outline(gain, bin_px) & ~taken
         if not region.any():
             return region
@@ -55,13 +63,20 @@ def box_around(mask: np.ndarray) -> tuple[slice, slice]:
 
 
 def _gain(
-    photons: np.ndarray, samples: np.ndarray, region: np.ndarray, taken: np.ndarray, inner_px: float
+    photons: np.ndarray,
+    samples: np.ndarray,
+    region: np.ndarray,
+    taken: np.ndarray,
+    inner_px: float,
+    away_px: int,
 ) -> np.ndarray:
     """Nats that each pixel gains by being inside, (H, W) float32; -50 where it cannot be."""
     from scipy.ndimage import binary_dilation
 
-    outside = ~(taken | np.asarray(binary_dilation(region, iterations=2), dtype=bool))
+    outside = ~(taken | np.asarray(binary_dilation(region, iterations=away_px), dtype=bool))
     outer_px = max(inner_px, 10.0)
+    rate = float(photons.sum(axis=-1)[region].mean())
+    spill = SPILL * min(1.0, rate / SPILL_PHOTONS)
     gain = np.zeros(region.shape, np.float32)
     for c in range(photons.shape[-1]):
         K, V = photons[..., c], samples[..., c]
@@ -70,6 +85,7 @@ def _gain(
         inside_rate = np.maximum(_local_rate(K, V, region, inner_px), max(LEAST_INSIDE * whole, 1e-12))
         least = max(LEAST_OUTSIDE * whole, around, 1e-12)
         outside_rate = np.maximum(_local_rate(K, V, outside, outer_px), least)
+        outside_rate = np.maximum(outside_rate, spill * inside_rate)
         gain += K * np.log(inside_rate / outside_rate) - V * (inside_rate - outside_rate)
     return np.where(taken, np.float32(-50), gain)
 

@@ -20,9 +20,13 @@ SURE_NATS = 10.0
 PHOTONS_TO_SEE = 30.0
 BRIGHT_SIGMAS = 6.0
 BRIGHT_SHARE = 0.1
-"""Bright is what exceeds the dark by 6 standard deviations and by a tenth of what a photon typically sees."""
+SKIRT_CELLS = 17
+"""Bright is what exceeds the dark by 6 standard deviations and by a tenth of the brightest within 32 px, of
+which it may be a blurred skirt."""
 DARK_SHARE = 0.25
 """If even the darkest fifth of the picture is as bright as this, nothing in it is the dark around things."""
+OWN_OPINION_CELLS = 25
+"""A piece of less than 20 x 20 px within something larger is narrower than the windows that put it there."""
 SMALLEST_CELLS = 6
 ROUNDS = 3
 
@@ -64,7 +68,7 @@ class Planes:
 
 def bright_cells(photons: np.ndarray) -> np.ndarray:
     """What is not the dark around things, (h, w) bool, from photons by cell in focus."""
-    from scipy.ndimage import gaussian_filter
+    from scipy.ndimage import gaussian_filter, maximum_filter
 
     total = float(photons.sum())
     if total == 0:
@@ -77,7 +81,8 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     if dark > DARK_SHARE * typical:
         return np.ones(photons.shape, dtype=bool)
     noise = np.sqrt(max(dark, 0.02) / (4 * np.pi * cells**2))
-    return smooth > max(dark + BRIGHT_SIGMAS * noise, dark + BRIGHT_SHARE * (typical - dark))
+    nearby = maximum_filter(smooth, SKIRT_CELLS)
+    return smooth > dark + np.maximum(BRIGHT_SIGMAS * noise, BRIGHT_SHARE * (nearby - dark))
 
 
 def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes) -> np.ndarray:
@@ -119,7 +124,7 @@ def _join(
     other = int(names[np.argmax(numbers)])
     evidence = _evidence(focus, box, piece, bright)
     gain = evidence[_depths(planes, own)].max() - evidence[_depths(planes, other)].max()
-    if gain >= OUTLINE_NATS * int(ring.sum()) + SURE_NATS:
+    if piece.sum() >= OWN_OPINION_CELLS and gain >= OUTLINE_NATS * int(ring.sum()) + SURE_NATS:
         return False
     plane[box][piece] = other
     return True
