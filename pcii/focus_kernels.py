@@ -109,7 +109,7 @@ def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
     """How many camera rows (or columns) see each block row (or column), (blocks,)."""
     seen = np.zeros(blocks, np.float32)
     for camera in range(shifts.size):
-        first, last = _whole_blocks(shifts[camera], size)
+        first, last = _whole_blocks(int(shifts[camera]), size)
         for place in range(first, last):
             seen[place // BLOCK_PX] += 1.0 / BLOCK_PX
     return seen
@@ -142,8 +142,8 @@ def _plane(
     counts = np.zeros((C, 2 * h, 2 * w), np.float32)
     for e in range(k.size):
         row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-        top, bottom = _whole_blocks(rows[k[e]], H)
-        left, right = _whole_blocks(cols[l[e]], W)
+        top, bottom = _whole_blocks(int(rows[k[e]]), H)
+        left, right = _whole_blocks(int(cols[l[e]]), W)
         if top <= row < bottom and left <= col < right:
             counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e]
             own_cells[e] = (row // CELL_PX) * w + col // CELL_PX
