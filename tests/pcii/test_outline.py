@@ -24,11 +24,11 @@ def solved(gain: np.ndarray, length_cost: float, iterations: int = 1000) -> np.n
     return inside
 
 
-@pytest.mark.parametrize("shape", [(3, 4), (4, 3), (1, 9), (9, 1), (2, 5)])
+@pytest.mark.parametrize("shape", [(3, 3), (2, 5), (1, 9), (9, 1)])
 @pytest.mark.parametrize("length_cost", [0.3, 1.0, 3.0])
 def test_no_mask_has_a_better_outline(shape, length_cost):
     every = np.array(list(itertools.product((0, 1), repeat=math.prod(shape)))).reshape(-1, *shape)
-    for seed in range(3):
+    for seed in range(2):
         gain = np.random.default_rng(seed).normal(size=shape)
         least = energies(every, gain, length_cost).min()
         inside = solved(gain, length_cost)

@@ -52,6 +52,14 @@ def test_what_is_bright_is_the_object_and_not_the_dark(rate):
     assert not bright[far].any()
 
 
+def test_one_lamp_is_bright_and_the_dark_around_it_is_not():
+    photons = np.random.default_rng(2).poisson(0.05, SHAPE).astype(np.float32)
+    photons[25, 35] = 1000.0
+    bright = bright_cells(photons)
+    assert bright[25, 35]
+    assert not bright[:, :25].any()  # more than twice the widest smoothing away
+
+
 def test_one_lamp_does_not_put_out_the_rest():
     # A lamp of a cell, a thousand times as bright as an object that holds most of the light.
     here = box(8, 10, 12, 16)
