@@ -428,16 +428,15 @@ def impulse(height: int, width: int, row: int, col: int) -> np.ndarray:
     return gain
 
 
-def test_the_nearest_window_has_the_weight_1_at_its_own_cell():
-    # An edge all around a cell of its own, so that the wider windows see it alone: 1 + 2 + 4 + 8, or
-    # nothing of it at the cell beside, which the nearest window still reaches.
-    response = windowed(impulse(161, 161, 80, 80), np.zeros((1, 1, 161, 161), np.float32))[0]
-    wider = sum(
-        width / WINDOW_CELLS * exponential_twin(near_twin(impulse(41, 41, 20, 20)[0]), width)[20, 20]
-        for width in WIDER_CELLS[:1]
-    )
-    # What the two widest windows add there is 4 / (4 + s^2) s / 2 of Gaussians: 0.24 and 0.12.
-    assert response[80, 80] == pytest.approx(1 + wider + 0.24 + 0.12, abs=0.3)
+def test_a_cell_that_edges_cut_off_stands_for_its_wide_windows_too():
+    # Around a peak of light every step is an edge, so that each wide window holds one cell. The nearest has
+    # the weight 1 at its own cell, and exp(-1/8) at the next; the others weigh 2, 4 and 8.
+    photons = 1e9 * impulse(41, 41, 20, 20)[None]
+    response = windowed(impulse(41, 41, 20, 20), photons)[0]
+    weight = 1 + sum(WIDER_CELLS) / WINDOW_CELLS
+    # The Gaussian that is cut has lost 1e-4 of its weight on either axis, for which it is made up.
+    assert response[20, 20] == pytest.approx(weight, rel=1e-3)
+    assert response[20, 21] == pytest.approx(math.exp(-1 / 8) * weight, rel=1e-3)
 
 
 def test_each_cell_is_counted_as_often_as_the_weight_of_windows_says():
