@@ -1,6 +1,8 @@
+import math
+
 import numpy as np
 import pytest
-from twins import intersection_over_union, unit_grid
+from twins import bayer_photons, intersection_over_union, patch_views, unit_grid
 
 from pcii.errors import InputError
 from pcii.foreground import roberts_magnitude, without_specks
@@ -108,6 +110,68 @@ def test_an_unknown_method_is_refused_with_the_known_ones(two_squares):
 def test_a_depth_that_cannot_be_is_refused(two_squares, method, bad):
     with pytest.raises(InputError, match=r"^z_mm: "):
         segment(two_squares.counts, bad, method=method)
+
+
+RADIUS_PX = 24
+DISC_GRID = unit_grid(9, 9, 168, 168)  # spread 8 / z: discs of the disparities 3 and 5 are 16 px apart
+
+
+def disc_mask(row: int, col: int) -> np.ndarray:
+    i, j = np.mgrid[: DISC_GRID.height, : DISC_GRID.width]
+    return np.hypot(i - row, j - col) <= RADIUS_PX
+
+
+def plain_discs(*discs: tuple[int, int, int], per_view: float, seed: int = 0) -> PhotonCounts:
+    """White discs at (row, column, disparity) before a hundredth of their light."""
+    patch = np.hypot(*(np.mgrid[: 2 * RADIUS_PX + 1, : 2 * RADIUS_PX + 1] - RADIUS_PX)) <= RADIUS_PX
+    white = np.repeat(patch[..., None].astype(float), 3, axis=2)
+    rates = np.full((*DISC_GRID.shape_KLHW, 3), 0.01)
+    for row, col, disparity in discs:
+        rates += patch_views(white, row - RADIUS_PX, col - RADIUS_PX, disparity, DISC_GRID)
+    rates *= 3 * per_view * DISC_GRID.view_count / rates.sum()  # a pixel sees one colour of three
+    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), DISC_GRID, cfa="GRBG")
+
+
+def test_plain_discs_are_found_at_their_depths_and_better_with_more_light():
+    places = ((50, 52, 3), (118, 116, 5))
+    masks = [disc_mask(row, col) for row, col, _ in places]
+    found = []
+    for per_view in (30, 300, 3000):
+        focus = segment(plain_discs(*places, per_view=per_view), [1 / 3, 1 / 5], method="likelihood")
+        found.append([intersection_over_union(focus.in_focus[p], masks[p]) for p in (0, 1)])
+        # At 30 photons a view one lands in every second pixel of the discs; an outline that is 1 px off
+        # all along loses 2 / 24.
+        assert min(found[-1]) > 1 - 2 / RADIUS_PX
+    # Ten pixels more or less are chance: 1 in 15 of those along the outline.
+    assert np.all(np.diff(found, axis=0) > -10 / (math.pi * RADIUS_PX**2))
+
+
+@pytest.mark.parametrize("per_view", [30, 300])
+@pytest.mark.parametrize("asked", [3, 5])
+def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
+    place = (82, 84, 8 - asked)
+    counts = plain_discs(place, per_view=per_view)
+    focus = segment(counts, [1 / asked, 1 / (8 - asked)], method="likelihood")
+    assert not focus.in_focus[0].any()
+    assert intersection_over_union(focus.in_focus[1], disc_mask(*place[:2])) > 1 - 2 / RADIUS_PX
+    assert not segment(counts, [1 / asked], method="likelihood").in_focus.any()
+
+
+@pytest.mark.parametrize("rate", [0.001, 0.02, 0.3])
+def test_a_flat_film_is_never_claimed(rate):
+    grid = unit_grid(7, 7, 160, 144)
+    for seed in range(2):
+        film = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
+        focus = segment(PhotonCounts.from_dense(film, grid, cfa="GRBG"), [1 / 2, 1 / 5], method="likelihood")
+        assert not focus.in_focus.any()
+
+
+def test_a_depth_that_is_asked_for_twice_is_answered_once(two_squares):
+    first, second = two_squares.z_mm
+    twice = segment(two_squares.counts, [first, second, first], method="likelihood")
+    once = segment(two_squares.counts, [first, second], method="likelihood")
+    np.testing.assert_array_equal(twice.in_focus[:2], once.in_focus)
+    assert not twice.in_focus[2].any()
 
 
 def test_probes_stand_14_and_28_px_of_spread_around_a_plane():

@@ -1,0 +1,133 @@
+import numpy as np
+import pytest
+
+from pcii.focus import Focus
+from pcii.regions import HALO_CELLS, SMALLEST_CELLS, SURE_NATS, Planes, bright_cells, regions_of, settled
+
+SHAPE = (30, 40)
+# Two planes, at 20 and 40 px of spread, among five searched depths.
+SPREAD_PX = np.array([10.0, 20.0, 30.0, 40.0, 60.0])
+PLANES = Planes(
+    spread_px=SPREAD_PX,
+    nearest=np.array([0, 0, 0, 1, 1]),
+    away_px=np.array([10.5, 0.0, 10.5, 0.0, 20.0]),
+    near_px=4.5,
+    far_px=10.0,
+)
+FIRST, BETWEEN, SECOND = 1, 2, 3
+
+
+def box(top: int, left: int, height: int, width: int) -> np.ndarray:
+    mask = np.zeros(SHAPE, dtype=bool)
+    mask[top : top + height, left : left + width] = True
+    return mask
+
+
+def focus_with(*gains: tuple[int, np.ndarray, float]) -> Focus:
+    """Evidence that is 0 but for (depth, where, nats in all)."""
+    gain = np.zeros((SPREAD_PX.size, *SHAPE), np.float32)
+    for depth, where, nats in gains:
+        gain[depth][where] += nats / where.sum()
+    return Focus(SPREAD_PX, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
+
+
+def test_without_photons_nothing_is_bright():
+    assert not bright_cells(np.zeros(SHAPE, np.float32)).any()
+
+
+@pytest.mark.parametrize("rate", [0.3, 3.0, 100.0])
+def test_a_flat_film_has_no_dark_around_things(rate):
+    assert bright_cells(np.random.default_rng(0).poisson(rate, SHAPE).astype(np.float32)).all()
+
+
+@pytest.mark.parametrize("rate", [3.0, 100.0])
+def test_what_is_bright_is_the_object_and_not_the_dark(rate):
+    here = box(8, 10, 12, 16)
+    photons = np.random.default_rng(1).poisson(np.where(here, rate, rate / 100)).astype(np.float32)
+    bright = bright_cells(photons)
+    assert bright[here].all()
+    # Smoothing is by at most 4 cells, and it is bright down to a tenth: within 8 cells of it.
+    far = np.ones(SHAPE, dtype=bool)
+    far[:28, 2:34] = False
+    assert not bright[far].any()
+
+
+def test_one_lamp_is_bright_and_the_dark_around_it_is_not():
+    photons = np.random.default_rng(2).poisson(0.05, SHAPE).astype(np.float32)
+    photons[25, 35] = 1000.0
+    bright = bright_cells(photons)
+    assert bright[25, 35]
+    assert not bright[:, :25].any()  # more than twice the widest smoothing away
+
+
+def test_one_lamp_does_not_put_out_the_rest():
+    # A lamp of a cell, a thousand times as bright as an object that holds most of the light.
+    here = box(8, 10, 12, 16)
+    photons = np.where(here, 20.0, 0.0).astype(np.float32)
+    photons[25, 35] = 1000.0
+    bright = bright_cells(np.random.default_rng(2).poisson(photons).astype(np.float32))
+    assert bright[25, 35]
+    assert bright[here].mean() > 0.9
+
+
+def test_a_weak_piece_joins_its_neighbour():
+    large, small = box(5, 5, 12, 12), box(5, 17, 3, 2)
+    plane = np.where(small, 1, 0)
+    focus = focus_with((FIRST, large, 300.0), (SECOND, small, 3.0))
+    result = settled(plane, large | small, focus, PLANES)
+    assert (result[large | small] == 0).all()
+    assert (plane[small] == 1).all()  # what was given is left as it was
+
+
+def test_a_strong_piece_stays():
+    large, small = box(5, 5, 12, 12), box(5, 17, 3, 2)
+    plane = np.where(small, 1, 0)
+    # Beyond half a nat for each cell of its border, and what is sure.
+    focus = focus_with((FIRST, large, 300.0), (SECOND, small, SURE_NATS + 20.0))
+    result = settled(plane, large | small, focus, PLANES)
+    np.testing.assert_array_equal(result[large | small], plane[large | small])
+
+
+def test_a_piece_on_its_own_joins_nothing():
+    one, other = box(5, 5, 6, 6), box(5, 20, 6, 6)
+    plane = np.where(other, 1, 0)
+    result = settled(plane, one | other, focus_with(), PLANES)
+    np.testing.assert_array_equal(result[one | other], plane[one | other])
+
+
+def test_a_region_is_at_the_depth_that_gains_most_with_the_dark_around_it():
+    piece = box(10, 10, 6, 6)
+    around = box(10 - HALO_CELLS, 12, 1, 2)  # its outline shows in the dark
+    too_far = box(10 - HALO_CELLS - 1, 12, 1, 2)
+    focus = focus_with((FIRST, piece, 15.0), (FIRST, around, 7.0), (FIRST, too_far, 900.0))
+    numbers, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    np.testing.assert_array_equal(numbers, piece)
+    assert (region.number, region.plane, region.cells, region.spread_px) == (1, 0, 36, 20.0)
+    assert region.gain_nats == pytest.approx(22.0, rel=1e-5)  # sums of single precision
+    assert region.is_there
+
+
+@pytest.mark.parametrize("depth", [0, BETWEEN, 4])
+def test_a_region_that_another_depth_explains_better_is_not_there(depth):
+    piece = box(10, 10, 6, 6)
+    focus = focus_with((FIRST, piece, 40.0), (depth, piece, 50.0))
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    assert not region.is_there
+    assert region.plane == -1
+    assert region.spread_px == SPREAD_PX[depth]
+
+
+@pytest.mark.parametrize(("nats", "is_there"), [(SURE_NATS - 1, False), (SURE_NATS + 1, True)])
+def test_a_region_without_sure_evidence_is_not_there(nats, is_there):
+    piece = box(10, 10, 6, 6)
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus_with((FIRST, piece, nats)), PLANES)
+    assert region.is_there == is_there
+
+
+def test_pieces_are_numbered_and_specks_left_out():
+    one, other, speck = box(3, 3, 5, 5), box(3, 20, 5, 5), box(20, 20, 1, SMALLEST_CELLS - 1)
+    focus = focus_with((FIRST, one, 50.0), (SECOND, other, 50.0), (FIRST, speck, 50.0))
+    plane = np.where(other, 1, 0)
+    numbers, regions = regions_of(plane, one | other | speck, focus, PLANES)
+    assert [region.plane for region in regions] == [0, 1]
+    np.testing.assert_array_equal(numbers, one + 2 * other)
