@@ -16,8 +16,10 @@ PLANE_STEP_PX = 2.0
 MOST_PLANES = 1000
 STEP_NATS, JUMP_NATS = 0.002, 0.08
 """What a change of depth from cell to cell must earn, per plane and at most; less than between objects."""
-SIGNIFICANT_NATS = 10.0
-"""The best of a hundred planes gains as much over a flat patch by chance once in 200 times."""
+SIGNIFICANT_NATS = 20.0
+DENSE_PHOTONS = 5.0
+"""Of a flat film less than 1 part in 200 is answered if 20 nats are asked for where photons are scarce, and
+three times as many from 5 photons per pixel on: a window counts evidence several times, and so its noise."""
 FEWEST_PHOTONS = 10.0
 NEARBY_CELLS = 1.0
 """Fewer photons than this within about 10 px of a point: its neighbours' depth is not its own."""
@@ -37,6 +39,8 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
+    from pcii.focus_kernels import CELL_PX
+
     if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
     near, far = check_z_mm(z_range_mm)
@@ -57,12 +61,13 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     depth = np.clip(depth_of_spread_mm(grid, _refined(spread, evidence, best)), near, far)
     confidence = _posterior_near(evidence, best)
     at_best = np.take_along_axis(evidence, best[None], axis=0)[0]
-    abstains = (at_best < SIGNIFICANT_NATS) | (_photons_nearby(focus, best) < FEWEST_PHOTONS)
+    photons = _photons_nearby(focus, best)
+    per_px = photons / (2 * np.pi * NEARBY_CELLS**2 * CELL_PX**2)
+    significant = SIGNIFICANT_NATS * (1 + 2 * np.minimum(per_px / DENSE_PHOTONS, 1))
+    abstains = (at_best < significant) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
-    from pcii.focus_kernels import CELL_PX
-
     return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))
 
 

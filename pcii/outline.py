@@ -23,9 +23,9 @@ LARGEST_HOLE = 0.05
 """Holes of less than this share of a region are dark paint."""
 SMALLEST_REGION_PX = 100
 SPILL, SPILL_PHOTONS = 0.2, 6.0
-"""Views are shifted by whole pixels and so bring light of the inside beside it: if this share is expected there,
-an outline lies where half of the light is left. Below 6 photons a pixel noise misplaces it more than that,
-and more contrast between inside and outside helps more."""
+"""Views are shifted by whole pixels and so bring light of the inside beside it: if this share is expected
+there, an outline lies where half of the light is left. Below 6 photons a pixel noise misplaces it more than
+that, and more contrast between inside and outside helps more."""
 MARGIN_PX = 40
 AWAY_PX, FIRST_AWAY_PX = 2, 8
 """What is farther from a region is surely around it; at first, when its outline is known to cells only."""

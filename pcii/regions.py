@@ -23,6 +23,8 @@ BRIGHT_SHARE = 0.1
 SKIRT_CELLS = 17
 """Bright is what exceeds the dark by 6 standard deviations and by a tenth of the brightest within 32 px, of
 which it may be a blurred skirt."""
+STRAY_SHARE = 0.1
+"""Nor is it much darker than what half of the photons come from, which single photons in the dark are."""
 DARK_SHARE = 0.25
 """If even the darkest fifth of the picture is as bright as this, nothing in it is the dark around things."""
 OWN_OPINION_CELLS = 25
@@ -82,7 +84,11 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
         return np.ones(photons.shape, dtype=bool)
     noise = np.sqrt(max(dark, 0.02) / (4 * np.pi * cells**2))
     nearby = maximum_filter(smooth, SKIRT_CELLS)
-    return smooth > dark + np.maximum(BRIGHT_SIGMAS * noise, BRIGHT_SHARE * (nearby - dark))
+    # Half of the photons come from where it is at least this bright: a lamp does not put out the rest.
+    order = np.argsort(smooth, axis=None)
+    half = float(smooth.ravel()[order[np.searchsorted(np.cumsum(photons.ravel()[order]), total / 2)]])
+    least = max(BRIGHT_SIGMAS * noise, STRAY_SHARE * (half - dark))
+    return smooth > dark + np.maximum(least, BRIGHT_SHARE * (nearby - dark))
 
 
 def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes) -> np.ndarray:

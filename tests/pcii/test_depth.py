@@ -97,7 +97,7 @@ def flat_share(rate: float, films: int) -> float:
 # From 0.2 to 50 photons in each pixel of a section.
 @pytest.mark.parametrize("rate", [0.004, 0.02, 0.1, 1.0])
 def test_a_flat_film_has_no_depth(rate):
-    # The significance asked for is exceeded by chance once in 200 times.
+    # What the significance that is asked for was chosen for.
     assert flat_share(rate, films=4) <= 1 / 200
 
 

@@ -55,10 +55,15 @@ def views_along(shifts: list[int], size: int, blocks: int, width_px: int) -> lis
     """Pairs of pixels and cameras in each block of an axis, in blocks of 2."""
     seen = [0.0] * blocks
     for shift in shifts:
-        for pixel in range(size):
-            if 0 <= pixel + shift < size:
-                seen[(pixel + shift) // width_px] += 1 / 2
+        for place in range(size):
+            if covered(place, shift, size):
+                seen[place // width_px] += 1 / 2
     return seen
+
+
+def covered(place: int, shift: int, size: int) -> bool:
+    """Whether a shifted view covers all of the block of 2 px that a place is in."""
+    return all(0 <= px < size and 0 <= px - shift < size for px in (place // 2 * 2, place // 2 * 2 + 1))
 
 
 def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) -> Twin:
@@ -81,7 +86,7 @@ def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) 
     photons = []
     for k, l, i, j, n in zip(*(getattr(counts.events, name) for name in "klijn"), strict=True):
         row, col = int(i) + shift[0][k], int(j) + shift[1][l]
-        inside = 0 <= row < H and 0 <= col < W
+        inside = covered(row, shift[0][k], H) and covered(col, shift[1][l], W)
         photons.append((row, col, colour_of(int(i), int(j), counts.cfa), int(n), inside))
 
     def light(scale: int, y: float, x: float, colour: int | None, without: int | None) -> float:
@@ -105,11 +110,12 @@ def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) 
         if not inside:
             continue
         y, x = row + 0.5, col + 0.5
-        share = (light(3, y, x, c, e) + 0.3 * sites[c] / sum(sites)) / (light(3, y, x, None, e) + 0.3)
         rates = []
         for scale in range(5):
-            own = light(scale, y, x, None, e) * share if scale < 3 else light(scale, y, x, c, e)
-            rates.append(own / (samples(scale, y, x) * sites[c]))
+            # One photon tells no colour: 0.3 are thought to be of each in proportion to its sites.
+            wide, around = max(scale, 3), light(max(scale, 3), y, x, None, e)
+            share = (light(wide, y, x, c, e) + 0.3 * sites[c] / sum(sites)) / (around + 0.3)
+            rates.append(light(scale, y, x, None, e) * share / (samples(scale, y, x) * sites[c]))
         base = max(rates[4], 1e-12)
         rate[e] = 0.95 * sum(rates) / 5 + 0.05 * base
         cell[e] = (row // 4) * w + col // 4

@@ -80,12 +80,19 @@ def test_a_weak_piece_joins_its_neighbour():
 
 
 def test_a_strong_piece_stays():
-    large, small = box(5, 5, 12, 12), box(5, 17, 3, 2)
+    large, small = box(5, 5, 12, 12), box(5, 17, 9, 3)
     plane = np.where(small, 1, 0)
     # Beyond half a nat for each cell of its border, and what is sure.
     focus = focus_with((FIRST, large, 300.0), (SECOND, small, SURE_NATS + 20.0))
     result = settled(plane, large | small, focus, PLANES)
     np.testing.assert_array_equal(result[large | small], plane[large | small])
+
+
+def test_a_piece_narrower_than_the_windows_has_no_opinion():
+    large, small = box(5, 5, 12, 12), box(5, 17, 4, 4)
+    focus = focus_with((FIRST, large, 300.0), (SECOND, small, 1000.0))
+    result = settled(np.where(small, 1, 0), large | small, focus, PLANES)
+    assert (result[large | small] == 0).all()
 
 
 def test_a_piece_on_its_own_joins_nothing():
