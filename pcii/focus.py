@@ -5,7 +5,8 @@ predicts where photons land; at a wrong depth it is blurred and predicts worse. 
 pixel and colour is estimated from all other photons, at several scales at once, and compared with what a
 blurred section would say. The sum of log ratios, less the photons that are expected more, is a gain in
 log-likelihood in nats. A photon takes no part in its own prediction, so where there is nothing to see the
-gain is below 0 on average, and e^gain exceeds x by chance about once in x times.
+gain is below 0 on average, and e^gain exceeds x by chance about once in x times (simulated; up to some 2
+photons per pixel and view, beyond which more often).
 
 Setting each voxel's rate to its own maximum-likelihood value instead, and comparing depths, is minimising
 the entropy of where photons land: Eq. 9 of Muniraj et al. 2017 with the right statistics.
