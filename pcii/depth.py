@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.focus import Focus, best_labels, depth_of_spread_mm, focus_of, windowed
-from pcii.geometry import depths_of_equal_spread_mm, disparity_spread_px
+from pcii.focus import Focus, best_labels, focus_of, windowed
+from pcii.geometry import depth_of_spread_mm, depths_of_equal_spread_mm, disparity_spread_px
 from pcii.photon_counts import PhotonCounts, check_depth_counts
 from pcii.statistics import cells_to_pixels
 from pcii.types import DepthMap, check_z_mm

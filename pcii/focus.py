@@ -12,22 +12,25 @@ Setting each voxel's rate to its own maximum-likelihood value instead, and compa
 the entropy of where photons land: Eq. 9 of Muniraj et al. 2017 with the right statistics.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from pcii.bayer import colour_cells
-from pcii.geometry import disparity_spread_px, nearest_shifts_px
+from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
-from pcii.types import CameraGrid
 
 WINDOW_CELLS = 2.0
 WIDER_CELLS = (4.0, 8.0, 16.0)
 """Gaussian windows; those beyond the first weigh as 1 / width, so that evidence nearby counts more, and where
 there is none, as inside a plain object, its outline decides."""
+WINDOW_WEIGHT = 2 * np.pi * WINDOW_CELLS**2 * (1 + sum(WIDER_CELLS) / WINDOW_CELLS)
+"""How often `windowed` counts each cell in all: a nat of real evidence is so many there."""
 EDGE_STIFFNESS = 10.0
 PICTURE_CELLS = 1.0
 """What a section shows is smoothed by this before its edges are looked for."""
+SWEEPS = 3
 
 
 @dataclass(frozen=True)
@@ -55,11 +58,6 @@ class Predictions:
     expected: np.ndarray
 
 
-def depth_of_spread_mm(grid: CameraGrid, spread_px: np.ndarray) -> np.ndarray:
-    """Depths in mm at which the total parallax over the longer axis of the grid is `spread_px`."""
-    return float(disparity_spread_px(grid, 1.0)) / np.asarray(spread_px, dtype=np.float64)
-
-
 def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
     """Cells of the coarse grid, (H / 4, W / 4) rounded up."""
     from pcii.focus_kernels import CELL_PX
@@ -79,20 +77,26 @@ def predictions_of(counts: PhotonCounts, spread_px: np.ndarray) -> tuple[Focus, 
 
 def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[Focus, Predictions]:
     from pcii import focus_kernels as kernels
+    from pcii.kernels import threads
 
     grid, events = counts.grid, counts.events
-    shifts = [nearest_shifts_px(grid, z) for z in depth_of_spread_mm(grid, spread_px)]
-    rows, cols = (np.stack(axis).astype(np.int32) for axis in zip(*shifts, strict=True))
+    rows, cols = whole_shifts_px(grid, spread_px)
     sites = np.bincount(colour_cells(counts.cfa).ravel(), minlength=counts.channel_count).astype(np.float64)
-    Z, C, (h, w) = len(shifts), counts.channel_count, cell_shape(counts)
+    Z, C, (h, w) = len(rows), counts.channel_count, cell_shape(counts)
     gain, photons = np.zeros((Z, h, w), np.float32), np.zeros((Z, C, h, w), np.float32)
     # What nobody asked for has no size, and is left out.
     rate, cell = (np.zeros((Z, events.n.size * keep), kind) for kind in (np.float32, np.int32))
     expected = np.zeros((Z, h * keep, w * keep), np.float32)
-    kernels.focus_planes(
-        events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32),
-        rows, cols, (grid.height, grid.width), sites, gain, photons, rate, cell, expected,
-    )  # fmt: skip
+    where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
+    film = grid.height, grid.width
+
+    def look(z: int) -> None:
+        kernels.focus_plane(
+            *where, rows[z], cols[z], film, sites, gain[z], photons[z], rate[z], cell[z], expected[z]
+        )
+
+    with ThreadPoolExecutor(threads()) as pool:
+        list(pool.map(look, range(Z)))
     return Focus(np.asarray(spread_px, dtype=np.float64), gain, photons), Predictions(rate, cell, expected)
 
 
@@ -104,7 +108,7 @@ def windowed(gain: np.ndarray, photons: np.ndarray) -> np.ndarray:
     """
     from scipy.ndimage import gaussian_filter
 
-    from pcii import focus_kernels as kernels
+    from pcii import label_kernels as kernels
 
     blur = (0, WINDOW_CELLS, WINDOW_CELLS)
     near = gaussian_filter(gain, blur, mode="constant") * np.float32(2 * np.pi * WINDOW_CELLS**2)
@@ -120,17 +124,13 @@ def windowed(gain: np.ndarray, photons: np.ndarray) -> np.ndarray:
     return result
 
 
-WINDOW_WEIGHT = 2 * np.pi * WINDOW_CELLS**2 * (1 + sum(WIDER_CELLS) / WINDOW_CELLS)
-"""How often `windowed` counts each cell in all: a nat of real evidence is so many there."""
-
-
 def best_labels(evidence: np.ndarray, step_nats: np.ndarray, jump_nats: float) -> np.ndarray:
     """Label (h, w) int64 of each cell: most evidence (Z, h, w), least change from cell to cell.
 
     Belief propagation with costs that grow by `step_nats` (Z - 1,) from label to label up to `jump_nats`,
     both as nats of real evidence per px of outline. Deterministic.
     """
-    from pcii import focus_kernels as kernels
+    from pcii import label_kernels as kernels
 
     cost = np.ascontiguousarray(np.moveaxis(-evidence, 0, -1), dtype=np.float32)
     if cost.shape[-1] == 1:
@@ -141,6 +141,3 @@ def best_labels(evidence: np.ndarray, step_nats: np.ndarray, jump_nats: float) -
         for direction in range(4):
             kernels.pass_messages(cost, messages, direction, steps, jump_nats * WINDOW_WEIGHT)
     return np.argmin(cost + messages.sum(axis=0), axis=-1)
-
-
-SWEEPS = 3

@@ -1,6 +1,6 @@
-"""Compiled loops of the likelihood method: evidence of focus, its windows, labels and outlines.
+"""Compiled loops over photons and planes: what a plane predicts of photons, and which of several does best.
 
-Axes: Z planes or labels, C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
+Axes: Z planes, C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
 
 import math
@@ -116,7 +116,7 @@ def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
 
 
 @helper
-def _plane(
+def focus_plane(
     k: np.ndarray,
     l: np.ndarray,
     i: np.ndarray,
@@ -133,7 +133,13 @@ def _plane(
     cell: np.ndarray,
     expected: np.ndarray,
 ) -> None:
-    """One plane of `focus_planes`."""
+    """What a plane predicts better than a blurred picture would: all outputs from zeros. One thread's part.
+
+    Events (N,) with their `colour` and number `n`; whole shifts `rows` (K,) and `cols` (L,); `size` of the
+    film in px; `sites` (C,) of each colour in a block. `gain` (H, W) and `photons` (C, H, W) by cell. If they
+    are not empty: `predicted` (N,), the rate of each event's pixel by all other events; its `cell` (N,), -1
+    outside; `expected` (H, W) photons in each cell.
+    """
     H, W = size
     h, w = gain.shape
     C = sites.size
@@ -231,143 +237,6 @@ def _plane(
 
 
 @compiled
-def focus_planes(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    size: tuple[int, int],
-    sites: np.ndarray,
-    gain: np.ndarray,
-    photons: np.ndarray,
-    predicted: np.ndarray,
-    cell: np.ndarray,
-    expected: np.ndarray,
-) -> None:
-    """What each plane predicts better than a blurred picture would: all outputs from zeros.
-
-    Events (N,) with their `colour` and number `n`; whole shifts `rows` (Z, K) and `cols` (Z, L); `size` of
-    the film in px; `sites` (C,) of each colour in a block. `gain` (Z, H, W) and `photons` (Z, C, H, W) by
-    cell. If they are not empty: `predicted` (Z, N), the rate of each event's pixel by all other events; its
-    `cell` (Z, N), -1 outside; `expected` (Z, H, W) photons in each cell.
-    """
-    for plane in nb.prange(rows.shape[0]):
-        _plane(
-            k, l, i, j, colour, n, rows[plane], cols[plane], size, sites, gain[plane], photons[plane],
-            predicted[plane], cell[plane], expected[plane],
-        )  # fmt: skip
-
-
-@helper
-def _recursive_mean(values: np.ndarray, left: np.ndarray, up: np.ndarray) -> None:
-    """Exponential means along rows, then columns, there and back; weights (H, W) to the cell before."""
-    H, W = values.shape
-    for i in range(H):
-        for j in range(1, W):
-            values[i, j] += left[i, j] * (values[i, j - 1] - values[i, j])
-        for j in range(W - 2, -1, -1):
-            values[i, j] += left[i, j + 1] * (values[i, j + 1] - values[i, j])
-    for i in range(1, H):
-        for j in range(W):
-            values[i, j] += up[i, j] * (values[i - 1, j] - values[i, j])
-    for i in range(H - 2, -1, -1):
-        for j in range(W):
-            values[i, j] += up[i + 1, j] * (values[i + 1, j] - values[i, j])
-
-
-@compiled
-def windows_within_edges(
-    near: np.ndarray,
-    picture: np.ndarray,
-    noise: float,
-    stiffness: float,
-    scales: np.ndarray,
-    weights: np.ndarray,
-    result: np.ndarray,
-) -> None:
-    """`near` (Z, H, W) plus its weighted means over wide windows that stop at edges: `result`, overwritten.
-
-    `picture` (Z, C, H, W) is what each plane shows; a step in it of more than `noise` lengthens the way to
-    the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira 2011.
-    """
-    Z, H, W = near.shape
-    for z in nb.prange(Z):
-        way = np.ones((2, H, W), np.float32)
-        for i in range(H):
-            for j in range(W):
-                across = 0.0
-                down = 0.0
-                for c in range(picture.shape[1]):
-                    if j > 0:
-                        across += (picture[z, c, i, j] - picture[z, c, i, j - 1]) ** 2
-                    if i > 0:
-                        down += (picture[z, c, i, j] - picture[z, c, i - 1, j]) ** 2
-                way[0, i, j] += stiffness * max(math.sqrt(across) / noise - 1, 0.0) ** 2
-                way[1, i, j] += stiffness * max(math.sqrt(down) / noise - 1, 0.0) ** 2
-        left = np.empty((H, W), np.float32)
-        up = np.empty((H, W), np.float32)
-        result[z] = near[z]
-        for scale in range(scales.size):
-            mean = near[z].copy()
-            for turn in range(2):
-                length = scales[scale] * math.sqrt(3.0) * 2.0 ** (1 - turn) / math.sqrt(15.0)
-                for i in range(H):
-                    for j in range(W):
-                        left[i, j] = math.exp(-math.sqrt(2.0) / length * way[0, i, j])
-                        up[i, j] = math.exp(-math.sqrt(2.0) / length * way[1, i, j])
-                _recursive_mean(mean, left, up)
-            for i in range(H):
-                for j in range(W):
-                    result[z, i, j] += weights[scale] * mean[i, j]
-
-
-@helper
-def _passed_on(message: np.ndarray, steps: np.ndarray, jump: float) -> None:
-    """The least cost of each label given the neighbour's costs: some per step, at most `jump`."""
-    top = message.min() + jump
-    low = message.min()
-    for z in range(1, message.size):
-        message[z] = min(message[z], message[z - 1] + steps[z - 1])
-    for z in range(message.size - 2, -1, -1):
-        message[z] = min(message[z], message[z + 1] + steps[z])
-    for z in range(message.size):
-        message[z] = min(message[z], top) - low
-
-
-@compiled
-def pass_messages(
-    cost: np.ndarray, messages: np.ndarray, direction: int, steps: np.ndarray, jump: float
-) -> None:
-    """One sweep of belief propagation: costs (H, W, Z), messages (4, H, W, Z) from left, right, above, below.
-
-    The way to the next label costs `steps` (Z - 1,), and at most `jump`. Lines are independent.
-    """
-    H, W, Z = cost.shape
-    sideways = direction < 2
-    opposite = direction + 1 if direction % 2 == 0 else direction - 1
-    for number in nb.prange(H if sideways else W):
-        line = np.int64(number)
-        length = W if sideways else H
-        message = np.zeros(Z, np.float32)
-        for step in range(length):
-            at = step if direction % 2 == 0 else length - 1 - step
-            i, j = (line, at) if sideways else (at, line)
-            for z in range(Z):
-                messages[direction, i, j, z] = message[z]
-            for z in range(Z):
-                total = cost[i, j, z]
-                for other in range(4):
-                    if other != opposite:
-                        total += messages[other, i, j, z]
-                message[z] = total
-            _passed_on(message, steps, jump)
-
-
-@compiled
 def views_of_planes(
     expected: np.ndarray, rows: np.ndarray, cols: np.ndarray, weight: float, views: np.ndarray
 ) -> None:
@@ -422,39 +291,3 @@ def duel_planes(
             at = cell[z, e]
             if at >= 0:
                 result[z, at // W, at % W] += n[e] * math.log(predicted[z, e] / together[e])
-
-
-@helper
-def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside: np.ndarray) -> None:
-    """The mask that gains most, less `length_cost` per px of its outline: relaxed to [0, 1] in `inside`.
-
-    Minimises length_cost TV(u) - sum gain u over 0 <= u <= 1 for a picture (H, W) by the primal-dual steps
-    of Chambolle and Pock 2011; thresholding u anywhere gives a best mask (Chan, Esedoglu and Nikolova 2006).
-    """
-    H, W = gain.shape
-    ahead = np.empty((H, W), np.float32)
-    across = np.zeros((H, W), np.float32)
-    down = np.zeros((H, W), np.float32)
-    step = 0.35  # 8 step^2 < 1
-    for i in range(H):
-        for j in range(W):
-            inside[i, j] = 1.0 if gain[i, j] > 0 else 0.0
-            ahead[i, j] = inside[i, j]
-    for _ in range(iterations):
-        for i in range(H):
-            for j in range(W):
-                x = across[i, j] + (step * (ahead[i, j + 1] - ahead[i, j]) if j + 1 < W else 0.0)
-                y = down[i, j] + (step * (ahead[i + 1, j] - ahead[i, j]) if i + 1 < H else 0.0)
-                size = max(1.0, math.sqrt(x * x + y * y) / length_cost)
-                across[i, j] = x / size
-                down[i, j] = y / size
-        for i in range(H):
-            for j in range(W):
-                flow = across[i, j] + down[i, j]
-                if j > 0:
-                    flow -= across[i, j - 1]
-                if i > 0:
-                    flow -= down[i - 1, j]
-                new = min(max(inside[i, j] + step * (flow + gain[i, j]), 0.0), 1.0)
-                ahead[i, j] = 2 * new - inside[i, j]
-                inside[i, j] = new

@@ -90,7 +90,7 @@ def connected_pieces(mask: np.ndarray) -> np.ndarray:
     return pieces
 
 
-def large_pieces(mask: np.ndarray, smallest_px: int) -> np.ndarray:
+def large_pieces(mask: np.ndarray, smallest_px: float) -> np.ndarray:
     """The mask without connected pieces of fewer than `smallest_px` pixels."""
     pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px

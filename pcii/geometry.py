@@ -116,6 +116,18 @@ def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float
     return np.abs(spread) / 2
 
 
+def depth_of_spread_mm(grid: CameraGrid, spread_px: np.ndarray) -> np.ndarray:
+    """Depths in mm at which the total parallax over the longer axis of the grid is `spread_px`."""
+    return float(disparity_spread_px(grid, 1.0)) / np.asarray(spread_px, dtype=np.float64)
+
+
+def whole_shifts_px(grid: CameraGrid, spread_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`nearest_shifts_px` at total spreads (Z,): rows (Z, K) and columns (Z, L), int32."""
+    shifts = [nearest_shifts_px(grid, z) for z in depth_of_spread_mm(grid, spread_px)]
+    rows, cols = (np.stack(axis).astype(np.int32) for axis in zip(*shifts, strict=True))
+    return rows, cols
+
+
 def depths_of_equal_spread_mm(
     grid: CameraGrid, z_near_mm: float, z_far_mm: float, step_px: float
 ) -> np.ndarray:
@@ -125,5 +137,4 @@ def depths_of_equal_spread_mm(
     """
     near, far = disparity_spread_px(grid, z_near_mm), disparity_spread_px(grid, z_far_mm)
     count = max(2, int(np.ceil((near - far) / step_px)) + 1)
-    scale = disparity_spread_px(grid, 1.0)
-    return scale / np.linspace(near, far, count)
+    return depth_of_spread_mm(grid, np.linspace(near, far, count))

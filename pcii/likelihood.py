@@ -17,8 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.focus import Predictions, best_labels, depth_of_spread_mm, focus_of, predictions_of, windowed
-from pcii.geometry import disparity_spread_px, landing, nearest_shifts_px
+from pcii.focus import Predictions, best_labels, focus_of, predictions_of, windowed
+from pcii.foreground import connected_pieces
+from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing, whole_shifts_px
 from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
@@ -67,12 +68,13 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
     own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
     best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
+    in_focus = masks[which]
     steps = {
         "evidence": np.stack([_on_pixels(best[p], grid) for p in which]),
-        "bright": np.stack([_on_pixels(bright, grid)] * len(z_mm)),
-        "region": np.stack([_on_pixels(numbers, grid)] * len(z_mm)),
+        "bright": np.broadcast_to(_on_pixels(bright, grid), in_focus.shape),
+        "region": np.broadcast_to(_on_pixels(numbers, grid), in_focus.shape),
     }
-    return Segmented(z_mm, masks[which], "likelihood", sections, steps, own == which[:, None])
+    return Segmented(z_mm, in_focus, "likelihood", sections, steps, own == which[:, None])
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
@@ -116,10 +118,7 @@ def duelled(
 
 def _where_planes_touch(bright: np.ndarray, numbers: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
     """Connected pieces of what is bright that hold regions of several planes, (h, w) bool."""
-    from scipy.ndimage import label
-
-    pieces = np.zeros(bright.shape, np.int32)
-    label(bright, output=pieces)
+    pieces = connected_pieces(bright)
     planes_of: dict[int, set[int]] = {}
     for region in regions:
         piece = int(pieces[numbers == region.number][0])
@@ -132,10 +131,9 @@ def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.
     from pcii import focus_kernels as kernels
 
     grid = counts.grid
-    shifts = [nearest_shifts_px(grid, z) for z in depth_of_spread_mm(grid, spread_px)]
     rows, cols = (
-        np.floor(np.stack(axis)[:, _some(size)] / kernels.CELL_PX + 0.5).astype(np.int64)
-        for axis, size in zip(zip(*shifts, strict=True), (grid.rows, grid.cols), strict=True)
+        np.floor(axis[:, _some(axis.shape[1])] / kernels.CELL_PX + 0.5).astype(np.int64)
+        for axis in whole_shifts_px(grid, spread_px)
     )
     S, h, w = seen.expected.shape
     views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)

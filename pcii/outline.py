@@ -8,6 +8,8 @@ total variation (Chan, Esedoglu and Nikolova 2006).
 
 import numpy as np
 
+from pcii.foreground import SMALLEST_REGION_PX, large_pieces
+
 LENGTH_NATS = 1.5
 """What an outline must earn per px of its length: a contour's next step is one of three or so, log 3 nats,
 and it must pay for noise."""
@@ -21,7 +23,6 @@ where no photon happened to land anything would be more likely than darkness."""
 LARGEST_BIN_PX = 8
 LARGEST_HOLE = 0.05
 """Holes of less than this share of a region are dark paint."""
-SMALLEST_REGION_PX = 100
 SPILL, SPILL_PHOTONS = 0.2, 6.0
 """Views are shifted by whole pixels and so bring light of the inside beside it: if this share is expected
 there, an outline lies where half of the light is left. Below 6 photons a pixel noise misplaces it more than
@@ -105,7 +106,7 @@ def _least_outline(gain: np.ndarray, bin_px: int) -> np.ndarray:
     """The mask of least outline, found on bins in which there is about a photon, then between them."""
     from scipy.ndimage import map_coordinates
 
-    from pcii import focus_kernels as kernels
+    from pcii import outline_kernels as kernels
 
     H, W = gain.shape
     h, w = -(-H // bin_px), -(-W // bin_px)
@@ -122,15 +123,8 @@ def _least_outline(gain: np.ndarray, bin_px: int) -> np.ndarray:
 
 def _tidied(region: np.ndarray, taken: np.ndarray) -> np.ndarray:
     """Without small holes, then without specks."""
-    from scipy.ndimage import binary_fill_holes, label
+    from scipy.ndimage import binary_fill_holes
 
     holes = np.asarray(binary_fill_holes(region)) & ~region & ~taken
-    numbers = np.zeros(region.shape, np.int32)
-    label(holes, output=numbers)
-    small = np.asarray(np.bincount(numbers.ravel()) < LARGEST_HOLE * np.count_nonzero(region))
-    small[0] = False
-    region = region | small[numbers]
-    label(region, output=numbers)
-    large = np.bincount(numbers.ravel()) >= SMALLEST_REGION_PX
-    large[0] = False
-    return large[numbers]
+    small = holes & ~large_pieces(holes, LARGEST_HOLE * np.count_nonzero(region))
+    return large_pieces(region | small, SMALLEST_REGION_PX)

@@ -6,7 +6,7 @@ probe planes stand around each of them, a stated blur away; what is sharper ther
 
 import numpy as np
 
-from pcii.geometry import disparity_spread_px
+from pcii.geometry import depth_of_spread_mm, disparity_spread_px
 from pcii.types import CameraGrid
 
 PROBE_STEPS_PX = (-28.0, -14.0, 14.0, 28.0)
@@ -30,4 +30,4 @@ def with_probes(grid: CameraGrid, z_mm: np.ndarray, *, clear_px: float = 7.0) ->
             clear = np.all(np.abs(probe - requested) > clear_px - 1e-9)  # rounding of the sum
             if probe > 0 and clear and all(abs(probe - other) > apart for other in probes):
                 probes.append(probe)
-    return unit / np.array([*requested, *probes])
+    return depth_of_spread_mm(grid, np.array([*requested, *probes]))

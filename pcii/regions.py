@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.focus import Focus
+from pcii.foreground import connected_pieces
 
 HALO_CELLS = 4
 """Evidence of an outline lies up to 16 px outside it."""
@@ -176,10 +177,9 @@ def regions_of(
 
 def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
     """Connected pieces of a mask: a box with room for the halo, and the piece in it."""
-    from scipy.ndimage import find_objects, label
+    from scipy.ndimage import find_objects
 
-    numbers = np.zeros(mask.shape, np.int32)
-    label(mask, output=numbers)
+    numbers = connected_pieces(mask)
     found = []
     for number, place in enumerate(find_objects(numbers), start=1):
         room = HALO_CELLS + 2

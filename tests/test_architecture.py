@@ -25,7 +25,7 @@ SHARED = {
 PCII_LEVELS = [
     {"errors"},
     {"bayer", "store", "console", "kernels", "paired", "evaluation_tables", "evaluation_plots"},
-    {"types", "dense_kernels", "demosaic_kernels", "focus_kernels"},
+    {"types", "dense_kernels", "demosaic_kernels", "focus_kernels", "label_kernels", "outline_kernels"},
     {"photon_counts"},
     {"geometry", "dataset", "demosaic", "picture"},
     {"dense", "boundary"},

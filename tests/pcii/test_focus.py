@@ -14,12 +14,11 @@ from pcii.focus import (
     WINDOW_WEIGHT,
     best_labels,
     cell_shape,
-    depth_of_spread_mm,
     focus_of,
     predictions_of,
     windowed,
 )
-from pcii.geometry import disparity_spread_px
+from pcii.geometry import depth_of_spread_mm, disparity_spread_px
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
 from pcii.types import CameraGrid

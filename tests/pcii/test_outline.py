@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from twins import intersection_over_union
 
-from pcii.focus_kernels import least_outline
 from pcii.outline import LARGEST_HOLE, MARGIN_PX, SMALLEST_REGION_PX, box_around, outlined
+from pcii.outline_kernels import least_outline
 
 
 def energies(masks: np.ndarray, gain: np.ndarray, length_cost: float) -> np.ndarray:
