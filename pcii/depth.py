@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pcii.cells import CELL_PX
 from pcii.errors import InputError
 from pcii.focus import Focus, best_labels, focus_of, windowed
 from pcii.geometry import depth_of_spread_mm, depths_of_equal_spread_mm, disparity_spread_px
@@ -39,7 +40,6 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
-    from pcii.focus_kernels import CELL_PX
 
     if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")

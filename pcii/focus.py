@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.bayer import colour_cells
+from pcii.cells import CELL_PX
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 
@@ -60,8 +61,6 @@ class Predictions:
 
 def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
     """Cells of the coarse grid, (H / 4, W / 4) rounded up."""
-    from pcii.focus_kernels import CELL_PX
-
     return -(-counts.grid.height // CELL_PX), -(-counts.grid.width // CELL_PX)
 
 
@@ -78,26 +77,44 @@ def predictions_of(counts: PhotonCounts, spread_px: np.ndarray) -> tuple[Focus, 
 def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[Focus, Predictions]:
     from pcii import focus_kernels as kernels
     from pcii.kernels import threads
+    from pcii.prediction_kernels import predict
 
     grid, events = counts.grid, counts.events
     rows, cols = whole_shifts_px(grid, spread_px)
     sites = np.bincount(colour_cells(counts.cfa).ravel(), minlength=counts.channel_count).astype(np.float64)
-    Z, C, (h, w) = len(rows), counts.channel_count, cell_shape(counts)
+    Z, N, C, (h, w) = len(rows), events.n.size, counts.channel_count, cell_shape(counts)
     gain, photons = np.zeros((Z, h, w), np.float32), np.zeros((Z, C, h, w), np.float32)
-    # What nobody asked for has no size, and is left out.
-    rate, cell = (np.zeros((Z, events.n.size * keep), kind) for kind in (np.float32, np.int32))
-    expected = np.zeros((Z, h * keep, w * keep), np.float32)
-    where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
-    film = grid.height, grid.width
+    # What nobody asked for is not kept.
+    rate, cell = (np.zeros((Z * keep, N), kind) for kind in (np.float32, np.int32))
+    expected = np.zeros((Z * keep, h, w), np.float32)
+    n, believed = events.n.astype(np.float32), np.ones(N, np.float32)
+    where = events.k, events.l, events.i, events.j, counts.event_colours, n, believed
+    film, everywhere = (grid.height, grid.width), np.ones((h, w), np.float32)
 
     def look(z: int) -> None:
-        kernels.focus_plane(
-            *where, rows[z], cols[z], film, sites, gain[z], photons[z], rate[z], cell[z], expected[z]
-        )
+        own_cell, own_rate, base = np.empty(N, np.int32), np.empty(N, np.float32), np.empty(N, np.float32)
+        samples, mean, blurred = np.empty((3, h, w), np.float32)
+        predict(
+            *where, rows[z], cols[z], film, sites, everywhere, 0.0,
+            own_cell, own_rate, base, samples, mean, blurred,
+        )  # fmt: skip
+        gain[z] = samples * (blurred - mean)
+        kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, gain[z], photons[z])
+        if keep:
+            rate[z], cell[z], expected[z] = own_rate, own_cell, samples * mean
 
     with ThreadPoolExecutor(threads()) as pool:
         list(pool.map(look, range(Z)))
     return Focus(np.asarray(spread_px, dtype=np.float64), gain, photons), Predictions(rate, cell, expected)
+
+
+def typical_light(photons: np.ndarray) -> float:
+    """What a photon sees on average: photons per cell of a picture (h, w), however much of it is dark.
+
+    A photon does not count itself, so that Poisson noise does not bias it.
+    """
+    total = float(photons.sum())
+    return float((photons.astype(np.float64) * np.maximum(photons - 1, 0)).sum()) / total if total else 0.0
 
 
 def windowed(gain: np.ndarray, photons: np.ndarray) -> np.ndarray:

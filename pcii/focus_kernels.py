@@ -10,230 +10,27 @@ import numpy as np
 
 from pcii.kernels import compiled, helper
 
-BLOCK_PX = 2
-"""Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
-
-Single pixels are not. At depths where all shifts are even a colour falls on every fourth voxel only, where
-photons have four times as many partners, and textured patches would be drawn to such depths.
-"""
-CELL_PX = 4
-"""Evidence is kept on cells of 4 x 4 pixels: windows are larger."""
-SCALES = 5
-"""Rates are smoothed over 2, 4, 8, 16 and 32 px and their mean taken: texture may be of any scale."""
-COLOUR_SCALE = 3
-"""What is finer than 16 px is estimated from all colours together, and shared out as they are around it."""
-COLOUR_PRIOR = 0.3
-"""Photons that are thought to be of each colour in proportion to its sites: one photon tells no colour."""
-BASE_SCALE = 4
-"""What a plane that shows nothing of its own would predict: the rate smoothed over 32 px."""
-BASE_SHARE = 0.05
-"""Least share of the base in a prediction, so that a single photon in the dark cannot decide."""
-
-# Smoothing is by the binomial weights 1/4, 1/2, 1/4 along both axes, then linear between centres.
-CENTRE, SIDE = 0.5, 0.25
-
 
 @helper
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Each plane of (C, H, W) smoothed by binomial weights; nothing comes in across borders."""
-    C, H, W = values.shape
-    across = np.zeros_like(values)
-    for c in range(C):
-        for i in range(H):
-            for j in range(W):
-                total = CENTRE * values[c, i, j]
-                if j > 0:
-                    total += SIDE * values[c, i, j - 1]
-                if j + 1 < W:
-                    total += SIDE * values[c, i, j + 1]
-                across[c, i, j] = total
-    result = np.zeros_like(values)
-    for c in range(C):
-        for i in range(H):
-            for j in range(W):
-                total = CENTRE * across[c, i, j]
-                if i > 0:
-                    total += SIDE * across[c, i - 1, j]
-                if i + 1 < H:
-                    total += SIDE * across[c, i + 1, j]
-                result[c, i, j] = total
-    return result
-
-
-@helper
-def _halved(values: np.ndarray) -> np.ndarray:
-    """Sums over 2 x 2 of (C, H, W), sizes rounded up."""
-    C, H, W = values.shape
-    result = np.zeros((C, (H + 1) // 2, (W + 1) // 2), np.float32)
-    for c in range(C):
-        for i in range(H):
-            for j in range(W):
-                result[c, i // 2, j // 2] += values[c, i, j]
-    return result
-
-
-@helper
-def _between(place: float, size: int) -> tuple[int, float, float]:
-    """Cell centre below a place (in cells), the share of the next, and what an event there gives itself."""
-    low = math.floor(place - 0.5)
-    share = place - 0.5 - low
-    if low < 0 or low + 1 >= size:  # beside the frame both centres are the same
-        return low, share, CENTRE
-    own = CENTRE * (1 - share) + SIDE * share if share < 0.5 else CENTRE * share + SIDE * (1 - share)
-    return low, share, own
-
-
-@helper
-def _at(values: np.ndarray, c: int, low_i: int, share_i: float, low_j: int, share_j: float) -> float:
-    """Linear between the four centres around a place; borders continue."""
-    _, H, W = values.shape
-    top, bottom = min(max(low_i, 0), H - 1), min(max(low_i + 1, 0), H - 1)
-    left, right = min(max(low_j, 0), W - 1), min(max(low_j + 1, 0), W - 1)
-    upper = (1 - share_j) * values[c, top, left] + share_j * values[c, top, right]
-    lower = (1 - share_j) * values[c, bottom, left] + share_j * values[c, bottom, right]
-    return (1 - share_i) * upper + share_i * lower
-
-
-@helper
-def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
-    """First and last row (or column) + 1 of the blocks that a shifted view covers as a whole.
-
-    Blocks that it covers in part are left out: there it would bring more of one colour than of another.
-    """
-    first, last = max(0, shift), min(size, size + shift)
-    return first + first % BLOCK_PX, last - last % BLOCK_PX
-
-
-@helper
-def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
-    """How many camera rows (or columns) see each block row (or column), (blocks,)."""
-    seen = np.zeros(blocks, np.float32)
-    for camera in range(shifts.size):
-        first, last = _whole_blocks(int(shifts[camera]), size)
-        for place in range(first, last):
-            seen[place // BLOCK_PX] += 1.0 / BLOCK_PX
-    return seen
-
-
-@helper
-def focus_plane(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
+def gain_over_blur(
+    cell: np.ndarray,
     colour: np.ndarray,
     n: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    size: tuple[int, int],
-    sites: np.ndarray,
+    rate: np.ndarray,
+    base: np.ndarray,
     gain: np.ndarray,
     photons: np.ndarray,
-    predicted: np.ndarray,
-    cell: np.ndarray,
-    expected: np.ndarray,
 ) -> None:
-    """What a plane predicts better than a blurred picture would: all outputs from zeros. One thread's part.
+    """Adds to `gain` (H, W) by how much events (N,) are better predicted than by the blurred `base`.
 
-    Events (N,) with their `colour` and number `n`; whole shifts `rows` (K,) and `cols` (L,); `size` of the
-    film in px; `sites` (C,) of each colour in a block. `gain` (H, W) and `photons` (C, H, W) by cell. If they
-    are not empty: `predicted` (N,), the rate of each event's pixel by all other events; its `cell` (N,), -1
-    outside; `expected` (H, W) photons in each cell.
+    `photons` (C, H, W), from zeros, counts them by colour and `cell`.
     """
-    H, W = size
-    h, w = gain.shape
-    C = sites.size
-    share_of_site = sites / sites.sum()
-    own_cells = np.empty(k.size, np.int32)
-    counts = np.zeros((C, 2 * h, 2 * w), np.float32)
-    for e in range(k.size):
-        row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-        top, bottom = _whole_blocks(int(rows[k[e]]), H)
-        left, right = _whole_blocks(int(cols[l[e]]), W)
-        if top <= row < bottom and left <= col < right:
-            counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e]
-            own_cells[e] = (row // CELL_PX) * w + col // CELL_PX
-        else:
-            own_cells[e] = -1
-    by_row = _views_of_blocks(rows, H, 2 * h)
-    by_col = _views_of_blocks(cols, W, 2 * w)
-    views = np.empty((1, 2 * h, 2 * w), np.float32)
-    for a in range(2 * h):
-        for b in range(2 * w):
-            views[0, a, b] = by_row[a] * by_col[b]
-    totals = np.zeros((1, 2 * h, 2 * w), np.float32)
-    for c in range(C):
-        totals[0] += counts[c]
-    seen = [_smoothed(views)]
-    light = [_smoothed(totals)]
-    coloured = [counts[:, :1, :1].copy()]  # finer than the colour scale no colour is smoothed on its own
-    for scale in range(1, SCALES):
-        counts, totals, views = _halved(counts), _halved(totals), _halved(views)
-        seen.append(_smoothed(views))
-        light.append(_smoothed(totals))
-        coloured.append(_smoothed(counts) if scale >= COLOUR_SCALE else counts[:, :1, :1].copy())
-
-    for e in range(k.size):
-        if own_cells[e] < 0:
-            continue
-        c = colour[e]
-        row, col = i[e] + rows[k[e]] + 0.5, j[e] + cols[l[e]] + 0.5
-        share = 1.0
-        mean = 0.0
-        base = 0.0
-        for reverse in range(SCALES):
-            scale = SCALES - 1 - reverse
-            if scale == 0:  # a block is its own best estimate: nothing between centres
-                low_i, share_i, own_i = int(row) // BLOCK_PX, 0.0, CENTRE
-                low_j, share_j, own_j = int(col) // BLOCK_PX, 0.0, CENTRE
-            else:
-                width = float(BLOCK_PX << scale)
-                low_i, share_i, own_i = _between(row / width, light[scale].shape[1])
-                low_j, share_j, own_j = _between(col / width, light[scale].shape[2])
-            samples = _at(seen[scale], 0, low_i, share_i, low_j, share_j) * sites[c]
-            others = max(_at(light[scale], 0, low_i, share_i, low_j, share_j) - own_i * own_j, 0.0)
-            if scale >= COLOUR_SCALE:
-                same = max(_at(coloured[scale], c, low_i, share_i, low_j, share_j) - own_i * own_j, 0.0)
-                share = (same + COLOUR_PRIOR * share_of_site[c]) / (others + COLOUR_PRIOR)
-            rate = others * share / max(samples, 1e-6)
-            mean += rate / SCALES
-            if scale == BASE_SCALE:
-                base = max(rate, 1e-12)
-        rate = (1 - BASE_SHARE) * mean + BASE_SHARE * base
-        a, b = own_cells[e] // w, own_cells[e] % w
-        gain[a, b] += n[e] * math.log(rate / base)
-        photons[c, a, b] += n[e]
-        if predicted.size:
-            predicted[e] = rate
-    if cell.size:
-        cell[:] = own_cells
-
-    for a in range(h):
-        for b in range(w):
-            samples = 0.0
-            mean = 0.0
-            base = 0.0
-            for u in range(2):
-                for v in range(2):
-                    views_here = by_row[2 * a + u] * by_col[2 * b + v]
-                    samples += views_here
-                    if views_here > 0:
-                        block = light[0][0, 2 * a + u, 2 * b + v] / seen[0][0, 2 * a + u, 2 * b + v]
-                        mean += block / (4 * SCALES)
-            if samples <= 0:
-                continue
-            for scale in range(1, SCALES):
-                width = float(BLOCK_PX << scale)
-                low_i, share_i, _ = _between((a + 0.5) * CELL_PX / width, light[scale].shape[1])
-                low_j, share_j, _ = _between((b + 0.5) * CELL_PX / width, light[scale].shape[2])
-                there = _at(seen[scale], 0, low_i, share_i, low_j, share_j)
-                rate = _at(light[scale], 0, low_i, share_i, low_j, share_j) / max(there, 1e-6)
-                mean += rate / SCALES
-                if scale == BASE_SCALE:
-                    base = rate
-            gain[a, b] -= samples * (1 - BASE_SHARE) * (mean - base)
-            if expected.size:
-                expected[a, b] = samples * ((1 - BASE_SHARE) * mean + BASE_SHARE * base)
+    w = gain.shape[1]
+    for e in range(cell.size):
+        if cell[e] >= 0:
+            a, b = cell[e] // w, cell[e] % w
+            gain[a, b] += n[e] * math.log(rate[e] / base[e])
+            photons[colour[e], a, b] += n[e]
 
 
 @compiled

@@ -17,13 +17,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.focus import Predictions, best_labels, focus_of, predictions_of, windowed
-from pcii.foreground import connected_pieces
-from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing, whole_shifts_px
+from pcii.cells import CELL_PX
+from pcii.duel import duelled, where_planes_touch
+from pcii.focus import Focus, best_labels, focus_of, typical_light, windowed
+from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing
+from pcii.layers import layered
 from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
-from pcii.regions import SURE_NATS, Planes, Region, bright_cells, regions_of, settled
+from pcii.regions import HALO_CELLS, SURE_NATS, Planes, Region, bright_cells, regions_of, settled
 from pcii.types import CameraGrid, Segmented
 
 SEARCH_STEP_PX = 2.0
@@ -36,11 +38,8 @@ FOCUS_PX = 10.0
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 STEP_NATS, JUMP_NATS = 0.05, 0.2
 DUELS = 2
-DUEL_NATS = 20.0
-DUEL_CELLS = 25
-"""Regions that are compared photon by photon have this much evidence and this many cells."""
-VIEWS_PER_AXIS = 4
-"""Expected light is averaged over 4 x 4 cameras of the grid, its corners among them."""
+FAINT_PER_PX = 1.0
+"""Below a photon per px in what is seen the depth within a thing shows nowhere."""
 
 
 def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
@@ -58,12 +57,12 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     evidence = windowed(focus.gain[close], focus.photons[close])
     label = best_labels(evidence, STEP_NATS * np.diff(planes.spread_px[close]) / SEARCH_STEP_PX, JUMP_NATS)
     photons = focus.photons[close].sum(axis=1)
-    bright = bright_cells(np.take_along_axis(photons, label[None], axis=0)[0])
+    shown = np.take_along_axis(photons, label[None], axis=0)[0]
+    bright = bright_cells(shown)
     plane = settled(planes.nearest[close][label], bright, focus, planes)
-    numbers, regions = regions_of(plane, bright, focus, planes)
-    for _ in range(DUELS):
-        plane = duelled(counts, plane, bright, (numbers, regions), own_spread)
-        numbers, regions = regions_of(plane, bright, focus, planes)
+    faint = typical_light(shown) < FAINT_PER_PX * CELL_PX**2
+    plane = _parted(counts, plane, bright, focus, planes, own_spread, faint=faint)
+    numbers, regions = regions_of(plane, plane >= 0, focus, planes)
     masks, belongs = _outlines(counts, regions, numbers, own_spread.size)
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
     own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
@@ -77,6 +76,37 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     return Segmented(z_mm, in_focus, "likelihood", sections, steps, own == which[:, None])
 
 
+def _parted(
+    counts: PhotonCounts,
+    plane: np.ndarray,
+    bright: np.ndarray,
+    focus: Focus,
+    planes: Planes,
+    own_spread_px: np.ndarray,
+    *,
+    faint: bool,
+) -> np.ndarray:
+    """The planes (h, w) of cells, -1 for none, after what touches was told apart.
+
+    A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part, and
+    none is to have it. It is left alone, unless there is too little light for that and to see where it ends.
+    """
+    from scipy.ndimage import binary_dilation
+
+    found = regions_of(plane, bright, focus, planes)
+    touching = where_planes_touch(bright, found)
+    alone = bright & ~touching & (not faint)
+    starts = [np.where(bright, plane, -1)]
+    if not (touching.any() or faint):
+        return starts[0]
+    for _ in range(DUELS if touching.any() else 0):
+        plane = duelled(counts, plane, touching, found, own_spread_px)
+        found = regions_of(plane, bright, focus, planes)
+    starts.append(np.where(bright, plane, -1))
+    near_it = np.asarray(binary_dilation(alone, iterations=HALO_CELLS), dtype=bool)
+    return np.where(near_it, starts[0], layered(counts, own_spread_px, starts))
+
+
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
     """The planes' own depths, and others in steps of 2 px of total spread up to 30 px around each."""
     steps = np.arange(-SEARCHED_PX, SEARCHED_PX + SEARCH_STEP_PX, SEARCH_STEP_PX)
@@ -86,70 +116,6 @@ def searched_planes(own_spread_px: np.ndarray) -> Planes:
     spread = np.sort(np.concatenate([own_spread_px, between[apart >= SEARCH_STEP_PX / 2]]))
     away = np.abs(spread[:, None] - own_spread_px[None])
     return Planes(spread, np.argmin(away, axis=1), away.min(axis=1), NEAR_PX, FOCUS_PX)
-
-
-def duelled(
-    counts: PhotonCounts,
-    plane: np.ndarray,
-    bright: np.ndarray,
-    found: tuple[np.ndarray, list[Region]],
-    own_spread_px: np.ndarray,
-) -> np.ndarray:
-    """The planes (h, w) of cells after depths were compared photon by photon where regions touch.
-
-    Compared are the depths of regions, and of requested planes that have none. A thing by itself in the dark
-    has been judged as a whole: of a round one each depth explains a part, and none is to have it.
-    """
-    numbers, regions = found
-    strong = [r for r in regions if r.gain_nats > DUEL_NATS and r.cells >= DUEL_CELLS]
-    touching = _where_planes_touch(bright, numbers, strong)
-    if not touching.any():
-        return plane
-    named = {region.plane for region in strong}
-    idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
-    labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
-    focus, seen = predictions_of(counts, np.array([spread for spread, _ in labels]))
-    gain = _duel(counts, focus.spread_px, seen)
-    # Any change costs the same: these labels are in no order.
-    cost = np.full(len(labels) - 1, JUMP_NATS)
-    best = best_labels(windowed(gain, focus.photons), cost, JUMP_NATS)
-    return np.where(touching, np.array([own for _, own in labels])[best], plane)
-
-
-def _where_planes_touch(bright: np.ndarray, numbers: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
-    """Connected pieces of what is bright that hold regions of several planes, (h, w) bool."""
-    pieces = connected_pieces(bright)
-    planes_of: dict[int, set[int]] = {}
-    for region in regions:
-        piece = int(pieces[numbers == region.number][0])
-        planes_of.setdefault(piece, set()).add(region.plane)
-    return np.isin(pieces, [piece for piece, own in planes_of.items() if len(own) > 1])
-
-
-def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.ndarray:
-    """Nats that each depth gains over all of them together (S, h, w)."""
-    from pcii import focus_kernels as kernels
-
-    grid = counts.grid
-    rows, cols = (
-        np.floor(axis[:, _some(axis.shape[1])] / kernels.CELL_PX + 0.5).astype(np.int64)
-        for axis in whole_shifts_px(grid, spread_px)
-    )
-    S, h, w = seen.expected.shape
-    views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)
-    kernels.views_of_planes(seen.expected, rows, cols, 1 / S, views)
-    rate = np.maximum(seen.rate, np.float32(1e-9))
-    # Where a depth lands outside the section it has no say.
-    inside = seen.cell >= 0
-    together = np.where(inside, rate, 0).sum(axis=0) / np.maximum(inside.sum(axis=0), 1)
-    gain = np.zeros_like(seen.expected)
-    n = counts.events.n.astype(np.float32)
-    kernels.duel_planes(views, seen.expected, rows, cols, rate, seen.cell, together, n, gain)
-    return gain
-
-
-def _some(cameras: int) -> np.ndarray:
-    return np.unique(np.linspace(0, cameras - 1, VIEWS_PER_AXIS).round().astype(int))
 
 
 def _outlines(
@@ -193,7 +159,6 @@ def _close_frame(taken: np.ndarray, box: tuple[slice, slice], grid: CameraGrid) 
 
 
 def _on_pixels(cells: np.ndarray, grid: CameraGrid) -> np.ndarray:
-    from pcii import focus_kernels as kernels
     from pcii.statistics import cells_to_pixels
 
-    return cells_to_pixels(cells, kernels.CELL_PX, grid)
+    return cells_to_pixels(cells, CELL_PX, grid)

@@ -15,14 +15,26 @@ def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside:
     of Chambolle and Pock 2011; thresholding u anywhere gives a best mask (Chan, Esedoglu and Nikolova 2006).
     """
     H, W = gain.shape
-    ahead = np.empty((H, W), np.float32)
-    across = np.zeros((H, W), np.float32)
-    down = np.zeros((H, W), np.float32)
-    step = 0.35  # 8 step^2 < 1
     for i in range(H):
         for j in range(W):
             inside[i, j] = 1.0 if gain[i, j] > 0 else 0.0
-            ahead[i, j] = inside[i, j]
+    across, down = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32)
+    shorten_outline(gain, length_cost, iterations, inside, inside.copy(), across, down)
+
+
+@helper
+def shorten_outline(
+    gain: np.ndarray,
+    length_cost: float,
+    iterations: int,
+    inside: np.ndarray,
+    ahead: np.ndarray,
+    across: np.ndarray,
+    down: np.ndarray,
+) -> None:
+    """The same, going on from a state (all (H, W)), which is overwritten: gains may have changed."""
+    H, W = gain.shape
+    step = 0.35  # 8 step^2 < 1
     for _ in range(iterations):
         for i in range(H):
             for j in range(W):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.focus import Focus
+from pcii.focus import Focus, typical_light
 from pcii.foreground import connected_pieces
 
 HALO_CELLS = 4
@@ -76,8 +76,7 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     total = float(photons.sum())
     if total == 0:
         return np.zeros(photons.shape, dtype=bool)
-    # The mean that a photon sees, which Poisson noise does not bias.
-    typical = max(float((photons.astype(np.float64) * (photons - 1)).sum()) / total, 0.05)
+    typical = max(typical_light(photons), 0.05)
     cells = float(np.clip(np.sqrt(PHOTONS_TO_SEE / (4 * np.pi * typical)), 1.0, 4.0))
     smooth = gaussian_filter(photons, cells)
     dark = float(np.quantile(smooth, 0.2))
