@@ -29,8 +29,9 @@ SWEEPS, STEPS = 5, 40
 PRIOR_SAMPLES = 1.0
 BLOCKED_WEIGHT = 0.003
 """Of a place that nothing sees freely, what comes through tells at least something."""
-MOST_PHOTONS_PER_PX = 0.3
-"""Masks of cells do not get better by more: of photons of brighter films so many are drawn."""
+MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
+"""Masks of cells do not get better by more: of brighter films as many photons are drawn, or as many per px
+of a large one."""
 DARK_SHARE, DARKEST_SHARE, LEAST_DARK = 0.25, 0.1, 1e-3
 """Behind all layers it is dark. If the darkest fifth of the film is as bright as a quarter of what a photon
 typically sees, there is no dark, and a tenth of that is the most that is behind."""
@@ -57,7 +58,8 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
 def _drawn(counts: PhotonCounts) -> PhotonCounts:
     """The counts, or where there are many photons a fair draw of them (always the same)."""
     events, grid = counts.events, counts.grid
-    share = MOST_PHOTONS_PER_PX * grid.height * grid.width / max(float(events.n.sum()), 1.0)
+    most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
+    share = most / max(float(events.n.sum()), 1.0)
     if share >= 1:
         return counts
     n = np.random.default_rng(0).binomial(events.n.astype(np.int64), share)

@@ -1,0 +1,190 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from pcii import PhotonCounts, layer_kernels, layers, segment
+from pcii.cells import CELL_PX
+from pcii.geometry import disparity_spread_px
+from pcii.layers import layered
+from pcii.outline_kernels import least_outline, shorten_outline
+from pcii.prediction_kernels import predict
+from twins import bayer_photons, blocky_texture, intersection_over_union, patch_views, unit_grid
+
+GRID = unit_grid(7, 7, 256, 256)
+CARD_DISPARITY, BAR_DISPARITY = 4, 8
+SPREAD_PX = disparity_spread_px(GRID, 1 / np.array([CARD_DISPARITY, BAR_DISPARITY]))
+BAR_LEFT, BAR_WIDTH, BAR_TOP, BAR_HEIGHT = 108, 40, 16, 224
+CARD_TOP, CARD_LEFT, CARD_SIZE = 40, 40, 176
+
+
+def truth() -> tuple[np.ndarray, np.ndarray]:
+    """What the virtual centre sees of the card and of the bar, (H, W) each."""
+    card, bar = np.zeros((2, GRID.height, GRID.width), dtype=bool)
+    bar[BAR_TOP : BAR_TOP + BAR_HEIGHT, BAR_LEFT : BAR_LEFT + BAR_WIDTH] = True
+    card[CARD_TOP : CARD_TOP + CARD_SIZE, CARD_LEFT : CARD_LEFT + CARD_SIZE] = True
+    return card & ~bar, bar
+
+
+def bar_before_card(per_view: float, seed: int = 0) -> PhotonCounts:
+    """A plain grey bar, narrower than its parallax, before a card of strong texture; dark around."""
+    texture = blocky_texture(np.random.default_rng(7), CARD_SIZE, CARD_SIZE, block_px=12)
+    card = patch_views(texture, CARD_TOP, CARD_LEFT, CARD_DISPARITY, GRID)
+    grey = np.full((BAR_HEIGHT, BAR_WIDTH, 3), 0.4)
+    bar = patch_views(grey, BAR_TOP, BAR_LEFT, BAR_DISPARITY, GRID)
+    rates = np.where(bar > 0, bar, card) + 0.002
+    rates *= 3 * per_view * GRID.view_count / rates.sum()  # a pixel sees one colour of three
+    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), GRID, cfa="GRBG")
+
+
+def cells_of(mask: np.ndarray) -> np.ndarray:
+    return mask[CELL_PX // 2 :: CELL_PX, CELL_PX // 2 :: CELL_PX]
+
+
+def everything_at_the_card() -> np.ndarray:
+    card, bar = truth()
+    return np.where(cells_of(card | bar), 0, -1)
+
+
+def found(per_view: float) -> list[float]:
+    seen = layered(bar_before_card(per_view), SPREAD_PX, [everything_at_the_card()])
+    return [intersection_over_union(seen == layer, cells_of(mask)) for layer, mask in enumerate(truth())]
+
+
+def test_a_bar_is_told_from_the_card_that_cameras_see_past_it():
+    # An eighth of the card is dark in all colours: paint, or nothing there? The bar is 10 cells wide, and of
+    # each cell along its sides it may be told or not.
+    card, bar = found(2000)
+    assert card > 1 - 1 / 8
+    assert bar > 0.9
+
+
+def test_rays_that_are_blocked_must_not_be_believed(monkeypatch: pytest.MonkeyPatch):
+    # The planted fault: light of the bar counts as the card's, and the bar's as the card behind it.
+    monkeypatch.setattr(layers, "BLOCKED_WEIGHT", 1.0)
+    card, bar = found(2000)
+    assert card < 0.7
+    assert bar < 0.98
+
+
+def test_the_method_finds_both():
+    z_mm = [1 / CARD_DISPARITY, 1 / BAR_DISPARITY]
+    focus = segment(bar_before_card(2000), z_mm, method="likelihood")
+    # A pixel off all along both sides of the bar: 2 / 41; of the card there are as many again.
+    for mask, own in zip(focus.in_focus, truth(), strict=True):
+        assert intersection_over_union(mask, own) > 0.92
+
+
+def test_the_start_of_least_energy_is_followed():
+    counts = bar_before_card(2000)
+    card, bar = truth()
+    good = np.where(cells_of(bar), 1, np.where(cells_of(card), 0, -1))
+    # Everything at the bar's plane: the card, which is then hidden, can never show that it is there.
+    bad = np.where(cells_of(card | bar), 1, -1)
+    results = {order: layered(counts, SPREAD_PX, order_of) for order, order_of in starts(good, bad)}
+    np.testing.assert_array_equal(results["good, bad"], results["bad, good"])
+    np.testing.assert_array_equal(results["good, bad"], results["good"])
+
+
+def starts(good: np.ndarray, bad: np.ndarray) -> list[tuple[str, list[np.ndarray]]]:
+    return [("good, bad", [good, bad]), ("bad, good", [bad, good]), ("good", [good, good])]
+
+
+def test_without_photons_all_is_dark():
+    counts = PhotonCounts.from_dense(np.zeros(GRID.shape_KLHW, np.int64), GRID, cfa="GRBG")
+    seen = layered(counts, SPREAD_PX, [np.zeros((64, 64), np.int64)])
+    np.testing.assert_array_equal(seen, -1)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 9), (16, 5)])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_tiny_films_have_an_answer(size, cfa):
+    grid = unit_grid(2, 3, *size)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, np.int64), grid, cfa=cfa)
+    shape = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
+    seen = layered(counts, np.array([2.0, 40.0]), [np.zeros(shape, np.int64)])
+    assert seen.shape == shape
+    assert np.isin(seen, [-1, 0, 1]).all()
+
+
+def test_many_photons_are_drawn_from_fairly_and_always_alike():
+    counts = bar_before_card(20_000)
+    drawn = layers._drawn(counts)
+    n, kept = counts.events.n.sum(), drawn.events.n.sum()
+    most = layers.MOST_PHOTONS
+    assert n > 3 * most
+    assert abs(kept - most) < 5 * np.sqrt(most)
+    # Views keep their shares: chi square of 48 degrees of freedom, 5 deviations of its mean of 48.
+    views = np.bincount(counts.events.k * 7 + counts.events.l, counts.events.n, 49) * kept / n
+    chi2 = ((np.bincount(drawn.events.k * 7 + drawn.events.l, drawn.events.n, 49) - views) ** 2 / views).sum()
+    assert chi2 < 48 + 5 * np.sqrt(96)
+    np.testing.assert_array_equal(drawn.events.n, layers._drawn(counts).events.n)
+    few = bar_before_card(50)
+    assert layers._drawn(few) is few
+
+
+def test_who_hides_what_is_counted_as_the_formula_reads():
+    rng = np.random.default_rng(3)
+    V, (h, w), rows, cols = 6, (7, 5), np.array([-3, 0]), np.array([2, 0, -9])
+    mask, light = rng.random((h, w)) < 0.5, rng.random((h, w)).astype(np.float32)
+    near = rng.integers(0, 2, (V, h, w)).astype(np.uint16)
+    behind = rng.random((V, h, w)).astype(np.float32)
+    covered, painted, free, within, less = near.copy(), behind.copy(), *np.zeros((3, h, w))
+    for v, a, b in itertools.product(range(V), range(h), range(w)):
+        i, j = a - rows[v // 3], b - cols[v % 3]
+        if 0 <= i < h and 0 <= j < w:
+            within[a, b] += 1
+            free[a, b] += near[v, i, j] == 0
+            less[a, b] += (near[v, i, j] == 0) * (float(behind[v, i, j]) - light[a, b])
+            covered[v, i, j] += mask[a, b]
+            painted[v, i, j] = light[a, b] if mask[a, b] else behind[v, i, j]
+    own_free, own_within = np.zeros((2, h, w), np.int32)
+    layer_kernels.free_views(near, rows, cols, own_free, own_within)
+    np.testing.assert_array_equal(own_free, free)
+    np.testing.assert_array_equal(own_within, within)
+    own_less = np.zeros((h, w), np.float32)
+    layer_kernels.less_light(near, behind, rows, cols, light, own_less)
+    np.testing.assert_allclose(own_less, less, rtol=1e-6, atol=1e-6)
+    own_painted = behind.copy()
+    layer_kernels.paint(mask, light, rows, cols, own_painted)
+    np.testing.assert_array_equal(own_painted, painted)
+    own_near = near.copy()
+    layer_kernels.cover(mask, rows, cols, 1, own_near)
+    np.testing.assert_array_equal(own_near, covered)
+    layer_kernels.cover(mask, rows, cols, -1, own_near)
+    np.testing.assert_array_equal(own_near, near)
+
+
+def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
+    rate, views = 0.5, 16
+    grid = unit_grid(4, 4, 64, 64)
+    film = np.random.default_rng(5).poisson(rate, grid.shape_KLHW)
+    counts = PhotonCounts.from_dense(film, grid, cfa=None)
+    events = counts.events
+    hidden = ((events.k + events.l) % 2 == 0) & (events.j < 32)
+    # The shifts are 0: of the left half every second view is hidden.
+    seen = np.repeat(np.where(np.arange(16) < 8, 0.5, 1.0)[None], 16, axis=0).astype(np.float32)
+    none = np.zeros(4, np.int32)
+    N = events.n.size
+    cell, own, base = np.zeros(N, np.int32), np.zeros(N, np.float32), np.zeros(N, np.float32)
+    samples, mean, blurred = np.zeros((3, 16, 16), np.float32)
+    where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
+    weight = (~hidden).astype(np.float32)
+    sites = np.array([4.0])
+    predict(*where, weight, none, none, (64, 64), sites, seen, 1.0, cell, own, base, samples, mean, blurred)
+    for part in (np.s_[:, :8], np.s_[:, 8:]):
+        photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
+        assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
+    # A hidden event is predicted, too, and takes no part in it: those beside it are all alike.
+    assert abs(own[hidden].mean() / rate - 1) < 0.02
+
+
+def test_going_on_is_as_good_as_more_steps_at_once():
+    gain = np.random.default_rng(1).normal(size=(12, 9)).astype(np.float32)
+    at_once = np.zeros_like(gain)
+    least_outline(gain, 1.0, 30, at_once)
+    inside = (gain > 0).astype(np.float32)
+    state = inside, inside.copy(), np.zeros_like(gain), np.zeros_like(gain)
+    for _ in range(3):
+        shorten_outline(gain, 1.0, 10, *state)
+    np.testing.assert_array_equal(inside, at_once)
