@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from twins import bayer_photons, blocky_texture, intersection_over_union, patch_views, unit_grid
 
 from pcii import PhotonCounts, layer_kernels, layers, segment
 from pcii.cells import CELL_PX
@@ -9,7 +10,6 @@ from pcii.geometry import disparity_spread_px
 from pcii.layers import layered
 from pcii.outline_kernels import least_outline, shorten_outline
 from pcii.prediction_kernels import predict
-from twins import bayer_photons, blocky_texture, intersection_over_union, patch_views, unit_grid
 
 GRID = unit_grid(7, 7, 256, 256)
 CARD_DISPARITY, BAR_DISPARITY = 4, 8
