@@ -24,10 +24,12 @@ from pcii.focus import cell_shape, typical_light
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 
-LENGTH_NATS, AREA_NATS = 0.3, 0.1
-SWEEPS, STEPS = 5, 40
+LENGTH_NATS, AREA_NATS = 0.3, 0.15
+HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25
+"""A cell that less than a quarter of the views see costs less, down to half: hidden surfaces go on."""
+SWEEPS, STEPS = 5, 80
 PRIOR_SAMPLES = 1.0
-BLOCKED_WEIGHT = 0.003
+BLOCKED_WEIGHT = 0.02
 """Of a place that nothing sees freely, what comes through tells at least something."""
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
 """Masks of cells do not get better by more: of brighter films as many photons are drawn, or as many per px
@@ -154,7 +156,8 @@ class _Layers:
         gain = np.zeros(self.light.shape, np.float32)
         kernels.less_light(self.near, behind, self.cell_rows[layer], self.cell_cols[layer], self.light, gain)
         kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
-        gain -= np.float32(AREA_NATS)
+        seen = self.free / (MOSTLY_HIDDEN * len(self.near))
+        gain -= (AREA_NATS * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
 
