@@ -9,13 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from pcii.cells import CELL_PX
-from pcii.focus import Predictions, best_labels, predictions_of, windowed
+from pcii.focus import JUMP_NATS, Predictions, best_labels, predictions_of, windowed
 from pcii.foreground import connected_pieces
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 from pcii.regions import Region
 
-JUMP_NATS = 0.2
 DUEL_NATS = 20.0
 DUEL_CELLS = 25
 """Regions that are compared have this much evidence and this many cells."""

@@ -29,6 +29,8 @@ there is none, as inside a plain object, its outline decides."""
 WINDOW_WEIGHT = 2 * np.pi * WINDOW_CELLS**2 * (1 + sum(WIDER_CELLS) / WINDOW_CELLS)
 """How often `windowed` counts each cell in all: a nat of real evidence is so many there."""
 EDGE_STIFFNESS = 10.0
+JUMP_NATS = 0.2
+"""What a change of plane costs per px of outline, however far."""
 PICTURE_CELLS = 1.0
 """What a section shows is smoothed by this before its edges are looked for."""
 SWEEPS = 3

@@ -5,9 +5,11 @@
 2. Each cell of 4 px takes the requested plane that has most of it, and every change costs (`best_labels`).
 3. Connected pieces of what is bright are judged as wholes: a piece without evidence of its own joins its
    neighbour, and one that a depth far from every plane explains better is defocused (`pcii.regions`).
-4. Where several remain they are compared photon by photon: what does each of their depths predict of it that
-   the others do not? Light of a defocused object is explained by its own plane, instead of being outvoted.
-5. Each region is outlined to the pixel at its own depth (`pcii.outline`).
+4. Where pieces of several planes touch they are compared photon by photon: what does each of their depths
+   predict of it that the others do not? (`pcii.duel`)
+5. There, and everywhere if light is scarce, opaque layers are fitted to all photons together: what a nearer
+   one hides says nothing of those behind it (`pcii.layers`).
+6. Each region is outlined to the pixel at its own depth (`pcii.outline`).
 
 Nothing is told about the number of objects, their colours or their depths, and nothing is claimed without
 evidence. Muniraj et al. 2017 ask for the same masks; their three steps are in `pcii.three_step`.
@@ -19,7 +21,7 @@ import numpy as np
 
 from pcii.cells import CELL_PX
 from pcii.duel import duelled, where_planes_touch
-from pcii.focus import Focus, best_labels, focus_of, typical_light, windowed
+from pcii.focus import JUMP_NATS, Focus, best_labels, focus_of, typical_light, windowed
 from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing
 from pcii.layers import layered
 from pcii.outline import box_around, outlined
@@ -36,7 +38,7 @@ NEAR_PX = 4.5
 FOCUS_PX = 10.0
 """A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
-STEP_NATS, JUMP_NATS = 0.05, 0.2
+STEP_NATS = 0.05
 DUELS = 2
 FAINT_PER_PX = 1.0
 """Below a photon per px in what is seen the depth within a thing shows nowhere."""

@@ -16,6 +16,7 @@ from pcii.focus import (
     cell_shape,
     focus_of,
     predictions_of,
+    typical_light,
     windowed,
 )
 from pcii.geometry import depth_of_spread_mm, disparity_spread_px
@@ -514,3 +515,18 @@ def test_a_lone_cell_gives_in_to_its_neighbours_and_a_patch_does_not():
 @pytest.mark.parametrize("labels", [1, 3])
 def test_without_evidence_the_first_label_is_taken(labels):
     assert not best_labels(np.zeros((labels, 4, 6), np.float32), np.full(labels - 1, 0.1), 0.5).any()
+
+
+@pytest.mark.parametrize("rate", [0.05, 3.0])
+@pytest.mark.parametrize("lit", [1.0, 0.25])
+def test_typical_light_is_that_of_what_is_lit(rate, lit):
+    cells = np.random.default_rng(0).poisson(np.where(np.arange(200) < 200 * lit, rate, 0.0), (200, 200))
+    # The pairs n (n - 1) tell it; of them there are rate^2 a cell.
+    pairs = 200 * 200 * lit * rate**2
+    assert abs(typical_light(cells.astype(np.float32)) / rate - 1) < 5 * np.sqrt(
+        2 / pairs + 4 / (pairs / rate)
+    )
+
+
+def test_without_photons_there_is_no_light():
+    assert typical_light(np.zeros((3, 4), np.float32)) == 0

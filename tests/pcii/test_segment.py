@@ -146,6 +146,21 @@ def test_plain_discs_are_found_at_their_depths_and_better_with_more_light():
     assert np.all(np.diff(found, axis=0) > -10 / (math.pi * RADIUS_PX**2))
 
 
+def test_layers_are_fitted_only_where_things_touch_or_light_is_scarce(monkeypatch):
+    fitted = []
+
+    def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: list[np.ndarray]) -> np.ndarray:
+        fitted.append(counts)
+        return starts[0]
+
+    monkeypatch.setattr("pcii.likelihood.layered", layered)
+    for per_view, needed in ((30, 1), (3000, 1)):  # the second adds none
+        segment(
+            plain_discs((50, 52, 3), (118, 116, 5), per_view=per_view), [1 / 3, 1 / 5], method="likelihood"
+        )
+        assert len(fitted) == needed
+
+
 @pytest.mark.parametrize("per_view", [30, 300])
 @pytest.mark.parametrize("asked", [3, 5])
 def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
