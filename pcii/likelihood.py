@@ -40,6 +40,8 @@ FOCUS_PX = 10.0
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 STEP_NATS = 0.05
 DUELS = 2
+OUTLINE_CELLS = 3
+"""Between things that layers told apart a border is theirs; outlines are drawn this near to the dark."""
 FAINT_PER_PX = 1.0
 """Below a photon per px in what is seen the depth within a thing shows nowhere."""
 
@@ -63,9 +65,10 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     bright = bright_cells(shown)
     plane = settled(planes.nearest[close][label], bright, focus, planes)
     faint = typical_light(shown) < FAINT_PER_PX * CELL_PX**2
-    plane = _parted(counts, plane, bright, focus, planes, own_spread, faint=faint)
+    plane, fitted = _parted(counts, plane, bright, focus, planes, own_spread, faint=faint)
     numbers, regions = regions_of(plane, plane >= 0, focus, planes)
-    masks, belongs = _outlines(counts, regions, numbers, own_spread.size)
+    inner = fitted & ~_dilated(plane < 0, OUTLINE_CELLS)
+    masks, belongs = _outlines(counts, regions, numbers, inner, own_spread.size)
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
     own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
     best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
@@ -87,26 +90,24 @@ def _parted(
     own_spread_px: np.ndarray,
     *,
     faint: bool,
-) -> np.ndarray:
-    """The planes (h, w) of cells, -1 for none, after what touches was told apart.
+) -> tuple[np.ndarray, np.ndarray]:
+    """The planes (h, w) of cells, -1 for none, after what touches was told apart, and where layers did that.
 
     A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part, and
     none is to have it. It is left alone, unless there is too little light for that and to see where it ends.
     """
-    from scipy.ndimage import binary_dilation
-
     found = regions_of(plane, bright, focus, planes)
     touching = where_planes_touch(bright, found)
     alone = bright & ~touching & (not faint)
     starts = [np.where(bright, plane, -1)]
     if not (touching.any() or faint):
-        return starts[0]
+        return starts[0], np.zeros_like(bright)
     for _ in range(DUELS if touching.any() else 0):
         plane = duelled(counts, plane, touching, found, own_spread_px)
         found = regions_of(plane, bright, focus, planes)
     starts.append(np.where(bright, plane, -1))
-    near_it = np.asarray(binary_dilation(alone, iterations=HALO_CELLS), dtype=bool)
-    return np.where(near_it, starts[0], layered(counts, own_spread_px, starts))
+    fitted = ~_dilated(alone, HALO_CELLS)
+    return np.where(fitted, layered(counts, own_spread_px, starts), starts[0]), fitted
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
@@ -121,10 +122,14 @@ def searched_planes(own_spread_px: np.ndarray) -> Planes:
 
 
 def _outlines(
-    counts: PhotonCounts, regions: Sequence[Region], numbers: np.ndarray, planes: int
+    counts: PhotonCounts, regions: Sequence[Region], numbers: np.ndarray, inner: np.ndarray, planes: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Masks (P, H, W) of the planes' regions to the pixel, and which events (P, N) land in them."""
+    """Masks (P, H, W) of the planes' regions to the pixel, and which events (P, N) land in them.
+
+    What is `inner` (h, w) stays as it is: an outline parts a thing from the dark around it.
+    """
     grid = counts.grid
+    inner = _on_pixels(inner, grid)
     # What nothing speaks for is free to be taken; what is defocused is not.
     firm = [0, *(region.number for region in regions if region.gain_nats > SURE_NATS)]
     on_pixels = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
@@ -146,9 +151,16 @@ def _outlines(
             )
             mask = np.zeros((grid.height, grid.width), dtype=bool)
             mask[box] = outlined(photons, samples, start[box], taken)
+            mask = np.where(inner, start, mask)
             masks[region.plane] |= mask
             belongs[region.plane, inside] |= mask[row[inside], col[inside]]
     return masks, belongs
+
+
+def _dilated(mask: np.ndarray, cells: int) -> np.ndarray:
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(mask, iterations=cells), dtype=bool)
 
 
 def _close_frame(taken: np.ndarray, box: tuple[slice, slice], grid: CameraGrid) -> None:
