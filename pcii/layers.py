@@ -29,6 +29,7 @@ HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25
 """A cell that less than a quarter of the views see costs less, down to half: hidden surfaces go on."""
 SWEEPS, STEPS = 5, 80
 PRIOR_SAMPLES = 1.0
+"""Where few rays reach a place, what is around it tells as much as so many."""
 BLOCKED_WEIGHT = 0.02
 """Of a place that nothing sees freely, what comes through tells at least something."""
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
@@ -42,8 +43,8 @@ typically sees, there is no dark, and a tenth of that is the most that is behind
 def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
     """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
 
-    `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result, of which the one
-    that leads to the least E is followed. Deterministic.
+    `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed, and the
+    nearest that they lead to; the result of least E is given. Deterministic.
     """
     layers = _Layers(_drawn(counts), spread_px)
     different = [
