@@ -26,7 +26,8 @@ from pcii.photon_counts import PhotonCounts
 
 LENGTH_NATS, AREA_NATS = 0.3, 0.15
 HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25
-"""A cell that less than a quarter of the views see costs less, down to half: hidden surfaces go on."""
+"""While a mask is fitted, a cell that less than a quarter of the views see costs less, down to half, so that
+holes behind others close. Results are compared by the whole E."""
 SWEEPS, STEPS = 5, 80
 PRIOR_SAMPLES = 1.0
 """Where few rays reach a place, what is around it tells as much as so many."""
