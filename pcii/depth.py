@@ -40,7 +40,6 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
-
     if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
         raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
     near, far = check_z_mm(z_range_mm)

@@ -26,14 +26,14 @@ def duelled(
     counts: PhotonCounts,
     plane: np.ndarray,
     touching: np.ndarray,
-    found: tuple[np.ndarray, list[Region]],
+    regions: Sequence[Region],
     own_spread_px: np.ndarray,
 ) -> np.ndarray:
     """The planes (h, w) of cells after depths were compared photon by photon in `touching` (h, w) bool.
 
     Compared are the depths of regions, and of requested planes that have none.
     """
-    strong = _strong(found[1])
+    strong = _strong(regions)
     named = {region.plane for region in strong}
     idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
     labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
@@ -45,11 +45,11 @@ def duelled(
     return np.where(touching, np.array([own for _, own in labels])[best], plane)
 
 
-def where_planes_touch(bright: np.ndarray, found: tuple[np.ndarray, list[Region]]) -> np.ndarray:
+def where_planes_touch(bright: np.ndarray, numbers: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
     """Connected pieces of what is bright that hold regions of several planes, (h, w) bool."""
-    pieces, numbers = connected_pieces(bright), found[0]
+    pieces = connected_pieces(bright)
     planes_of: dict[int, set[int]] = {}
-    for region in _strong(found[1]):
+    for region in _strong(regions):
         piece = int(pieces[numbers == region.number][0])
         planes_of.setdefault(piece, set()).add(region.plane)
     return np.isin(pieces, [piece for piece, own in planes_of.items() if len(own) > 1])

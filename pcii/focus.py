@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.bayer import colour_cells
+from pcii.bayer import sites_of_colours
 from pcii.cells import CELL_PX
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
@@ -79,26 +79,27 @@ def predictions_of(counts: PhotonCounts, spread_px: np.ndarray) -> tuple[Focus, 
 def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[Focus, Predictions]:
     from pcii import focus_kernels as kernels
     from pcii.kernels import threads
-    from pcii.prediction_kernels import predict
+    from pcii.prediction_kernels import land, predict
 
     grid, events = counts.grid, counts.events
     rows, cols = whole_shifts_px(grid, spread_px)
-    sites = np.bincount(colour_cells(counts.cfa).ravel(), minlength=counts.channel_count).astype(np.float64)
+    sites = sites_of_colours(counts.cfa)
     Z, N, C, (h, w) = len(rows), events.n.size, counts.channel_count, cell_shape(counts)
     gain, photons = np.zeros((Z, h, w), np.float32), np.zeros((Z, C, h, w), np.float32)
     # What nobody asked for is not kept.
     rate, cell = (np.zeros((Z * keep, N), kind) for kind in (np.float32, np.int32))
     expected = np.zeros((Z * keep, h, w), np.float32)
     n, believed = events.n.astype(np.float32), np.ones(N, np.float32)
-    where = events.k, events.l, events.i, events.j, counts.event_colours, n, believed
+    place = events.k, events.l, events.i, events.j
     film, everywhere = (grid.height, grid.width), np.ones((h, w), np.float32)
 
     def look(z: int) -> None:
         own_cell, own_rate, base = np.empty(N, np.int32), np.empty(N, np.float32), np.empty(N, np.float32)
         samples, mean, blurred = np.empty((3, h, w), np.float32)
+        land(*place, rows[z], cols[z], film, own_cell)
         predict(
-            *where, rows[z], cols[z], film, sites, everywhere, 0.0,
-            own_cell, own_rate, base, samples, mean, blurred,
+            *place, counts.event_colours, n, believed, own_cell,
+            rows[z], cols[z], film, sites, everywhere, 0.0, own_rate, base, samples, mean, blurred,
         )  # fmt: skip
         gain[z] = samples * (blurred - mean)
         kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, gain[z], photons[z])

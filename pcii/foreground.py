@@ -81,6 +81,13 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
     return ~large_pieces(~large_pieces(mask, smallest_px), smallest_px)
 
 
+def dilated(mask: np.ndarray, steps: int) -> np.ndarray:
+    """The mask and what is within so many steps of it along rows and columns."""
+    from scipy.ndimage import binary_dilation
+
+    return np.asarray(binary_dilation(mask, iterations=steps), dtype=bool)
+
+
 def connected_pieces(mask: np.ndarray) -> np.ndarray:
     """Number of the connected piece (by edges) that each pixel belongs to, from 1; 0 outside."""
     from scipy.ndimage import label

@@ -13,19 +13,6 @@ from pcii.kernels import compiled, helper
 
 
 @compiled
-def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, near: np.ndarray) -> None:
-    """Add `step` to `near` in every view where the layer's `mask` (H, W) is seen."""
-    H, W = mask.shape
-    for view in nb.prange(near.shape[0]):
-        v = np.int64(view)
-        down, right = rows[v // cols.size], cols[v % cols.size]
-        for a in range(max(0, down), min(H, H + down)):
-            for b in range(max(0, right), min(W, W + right)):
-                if mask[a, b]:
-                    near[v, a - down, b - right] += step
-
-
-@compiled
 def paint(
     mask: np.ndarray, light: np.ndarray, rows: np.ndarray, cols: np.ndarray, behind: np.ndarray
 ) -> None:

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.bayer import colour_cells
+from pcii.bayer import sites_of_colours
 from pcii.cells import CELL_PX
 from pcii.focus import cell_shape, typical_light
 from pcii.geometry import whole_shifts_px
@@ -75,6 +75,8 @@ class _Layers:
     """The masks (D, h, w), and who hides what while they are fitted."""
 
     def __init__(self, counts: PhotonCounts, spread_px: np.ndarray) -> None:
+        from pcii.prediction_kernels import land
+
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
@@ -82,9 +84,8 @@ class _Layers:
             np.floor(shifts / CELL_PX + 0.5).astype(np.int64) for shifts in (self.rows, self.cols)
         )
         self.n = events.n.astype(np.float32)
-        self.where = events.k, events.l, events.i, events.j, counts.event_colours, self.n
-        sites = np.bincount(colour_cells(counts.cfa).ravel(), minlength=counts.channel_count)
-        self.sites = sites.astype(np.float64)
+        self.place = events.k, events.l, events.i, events.j
+        self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
         D, V, N, (h, w) = len(spread_px), grid.view_count, self.n.size, cell_shape(counts)
         self.masks = np.zeros((D, h, w), dtype=bool)
         self.near = np.zeros((V, h, w), np.uint16)
@@ -96,7 +97,7 @@ class _Layers:
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
-            self._predict(layer)
+            land(*self.place, self.rows[layer], self.cols[layer], self.film, self.cells[layer])
         self.least_dark, self.most_dark = self._dark()
 
     def put(self, masks: np.ndarray) -> None:
@@ -142,7 +143,7 @@ class _Layers:
         # The dark is what the farthest section shows if it is blurred; what is brighter is a surface.
         rate = np.clip(self.base, least, most).astype(np.float32)
         behind = np.full(self.near.shape, self.least_dark, np.float32)
-        dark = np.clip(4 * self.blurred, self.least_dark, self.most_dark)
+        dark = np.clip(self.blurred, self.least_dark, self.most_dark)
         kernels.paint(np.ones_like(self.masks[0]), dark, self.cell_rows[0], self.cell_cols[0], behind)
         for layer in range(len(self.masks)):
             self._cover(layer, -1)
@@ -171,33 +172,41 @@ class _Layers:
 
     def _predict(self, layer: int) -> None:
         """What the rays that reach a layer say of its light."""
-        from pcii import layer_kernels as kernels
         from pcii.prediction_kernels import predict
 
-        kernels.free_views(self.near, self.cell_rows[layer], self.cell_cols[layer], self.free, self.within)
+        self._look(layer)
         seen = BLOCKED_WEIGHT + (1 - BLOCKED_WEIGHT) * self.free / np.maximum(self.within, 1)
         weight = np.where(self.hidden == 0, np.float32(1), np.float32(BLOCKED_WEIGHT))
         predict(
-            *self.where, weight, self.rows[layer], self.cols[layer], self.film, self.sites,
-            seen.astype(np.float32), PRIOR_SAMPLES,
-            self.cells[layer], self.rate, self.base, self.samples, self.light, self.blurred,
+            *self.place, self.colours, self.n, weight, self.cells[layer],
+            self.rows[layer], self.cols[layer], self.film, self.sites, seen.astype(np.float32), PRIOR_SAMPLES,
+            self.rate, self.base, self.samples, self.light, self.blurred,
         )  # fmt: skip
-        self.light *= 4  # from blocks to cells
+        for light in (self.light, self.blurred):
+            light *= 4  # from blocks to cells
+
+    def _look(self, layer: int) -> None:
+        """How many views see each cell of a layer, and would if nothing were nearer."""
+        from pcii.layer_kernels import free_views
+
+        free_views(self.near, self.cell_rows[layer], self.cell_cols[layer], self.free, self.within)
 
     def _cover(self, layer: int, step: int) -> None:
-        from pcii import layer_kernels as kernels
+        from pcii.focus_kernels import views_of_planes
+        from pcii.layer_kernels import hide
 
         mask = self.masks[layer]
         if mask.any():
-            kernels.cover(mask, self.cell_rows[layer], self.cell_cols[layer], step, self.near)
-            kernels.hide(mask, self.cells[layer], step, self.hidden)
+            own = slice(layer, layer + 1)
+            views_of_planes(self.masks[own], self.cell_rows[own], self.cell_cols[own], step, self.near)
+            hide(mask, self.cells[layer], step, self.hidden)
 
     def _dark(self) -> tuple[float, float]:
         """The least and the most light behind all layers, in photons per cell and view."""
         from scipy.ndimage import gaussian_filter
 
         layer, (V, h, w) = len(self.masks) // 2, self.near.shape
-        self._predict(layer)
+        self._look(layer)
         inside = self.cells[layer] >= 0
         photons = np.bincount(self.cells[layer][inside], self.n[inside], h * w).reshape(h, w)
         smooth = gaussian_filter(photons, 3) / np.maximum(

@@ -21,7 +21,8 @@ import numpy as np
 
 from pcii.cells import CELL_PX
 from pcii.duel import duelled, where_planes_touch
-from pcii.focus import JUMP_NATS, Focus, best_labels, focus_of, typical_light, windowed
+from pcii.focus import JUMP_NATS, best_labels, focus_of, typical_light, windowed
+from pcii.foreground import dilated
 from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing
 from pcii.layers import layered
 from pcii.outline import box_around, outlined
@@ -39,7 +40,6 @@ FOCUS_PX = 10.0
 """A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 STEP_NATS = 0.05
-DUELS = 2
 OUTLINE_CELLS = 3
 """Between things that layers told apart a border is theirs; outlines are drawn this near to the dark."""
 FAINT_PER_PX = 1.0
@@ -65,9 +65,22 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     bright = bright_cells(shown)
     plane = settled(planes.nearest[close][label], bright, focus, planes)
     faint = typical_light(shown) < FAINT_PER_PX * CELL_PX**2
-    plane, fitted = _parted(counts, plane, bright, focus, planes, own_spread, faint=faint)
-    numbers, regions = regions_of(plane, plane >= 0, focus, planes)
-    inner = fitted & ~_dilated(plane < 0, OUTLINE_CELLS)
+    numbers, regions = regions_of(plane, bright, focus, planes)
+    touching = where_planes_touch(bright, numbers, regions)
+    plane, fitted = np.where(bright, plane, -1), np.zeros_like(bright)
+    if faint or touching.any():
+        starts = [plane]
+        if touching.any():
+            plane = duelled(counts, plane, touching, regions, own_spread)
+            # Once more: what was one region may be several now, at depths of their own.
+            parted = regions_of(plane, bright, focus, planes)[1]
+            starts.append(duelled(counts, plane, touching, parted, own_spread))
+        # A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part,
+        # and none is to have it. It is left alone, unless there is too little light to see where it ends.
+        fitted = ~dilated(bright & ~touching & (not faint), HALO_CELLS)
+        plane = np.where(fitted, layered(counts, own_spread, starts), starts[0])
+        numbers, regions = regions_of(plane, plane >= 0, focus, planes)
+    inner = fitted & ~dilated(plane < 0, OUTLINE_CELLS)
     masks, belongs = _outlines(counts, regions, numbers, inner, own_spread.size)
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
     own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
@@ -79,35 +92,6 @@ def likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
         "region": np.broadcast_to(_on_pixels(numbers, grid), in_focus.shape),
     }
     return Segmented(z_mm, in_focus, "likelihood", sections, steps, own == which[:, None])
-
-
-def _parted(
-    counts: PhotonCounts,
-    plane: np.ndarray,
-    bright: np.ndarray,
-    focus: Focus,
-    planes: Planes,
-    own_spread_px: np.ndarray,
-    *,
-    faint: bool,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The planes (h, w) of cells, -1 for none, after what touches was told apart, and where layers did that.
-
-    A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part, and
-    none is to have it. It is left alone, unless there is too little light for that and to see where it ends.
-    """
-    found = regions_of(plane, bright, focus, planes)
-    touching = where_planes_touch(bright, found)
-    alone = bright & ~touching & (not faint)
-    starts = [np.where(bright, plane, -1)]
-    if not (touching.any() or faint):
-        return starts[0], np.zeros_like(bright)
-    for _ in range(DUELS if touching.any() else 0):
-        plane = duelled(counts, plane, touching, found, own_spread_px)
-        found = regions_of(plane, bright, focus, planes)
-    starts.append(np.where(bright, plane, -1))
-    fitted = ~_dilated(alone, HALO_CELLS)
-    return np.where(fitted, layered(counts, own_spread_px, starts), starts[0]), fitted
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
@@ -150,17 +134,10 @@ def _outlines(
                 part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
             )
             mask = np.zeros((grid.height, grid.width), dtype=bool)
-            mask[box] = outlined(photons, samples, start[box], taken)
-            mask = np.where(inner, start, mask)
+            mask[box] = np.where(inner[box], start[box], outlined(photons, samples, start[box], taken))
             masks[region.plane] |= mask
             belongs[region.plane, inside] |= mask[row[inside], col[inside]]
     return masks, belongs
-
-
-def _dilated(mask: np.ndarray, cells: int) -> np.ndarray:
-    from scipy.ndimage import binary_dilation
-
-    return np.asarray(binary_dilation(mask, iterations=cells), dtype=bool)
 
 
 def _close_frame(taken: np.ndarray, box: tuple[slice, slice], grid: CameraGrid) -> None:

@@ -8,7 +8,7 @@ total variation (Chan, Esedoglu and Nikolova 2006).
 
 import numpy as np
 
-from pcii.foreground import SMALLEST_REGION_PX, large_pieces
+from pcii.foreground import SMALLEST_REGION_PX, dilated, large_pieces
 
 LENGTH_NATS = 1.5
 """What an outline must earn per px of its length: a contour's next step is one of three or so, log 3 nats,
@@ -72,9 +72,7 @@ def _gain(
     away_px: int,
 ) -> np.ndarray:
     """Nats that each pixel gains by being inside, (H, W) float32; -50 where it cannot be."""
-    from scipy.ndimage import binary_dilation
-
-    outside = ~(taken | np.asarray(binary_dilation(region, iterations=away_px), dtype=bool))
+    outside = ~(taken | dilated(region, away_px))
     outer_px = max(inner_px, 10.0)
     rate = float(photons.sum(axis=-1)[region].mean())
     spill = SPILL * min(1.0, rate / SPILL_PHOTONS)

@@ -32,30 +32,26 @@ CENTRE, SIDE = 0.5, 0.25
 
 
 @helper
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Each plane of (C, H, W) smoothed by binomial weights; nothing comes in across borders."""
+def _smoothed_along(values: np.ndarray, down: int, right: int) -> np.ndarray:
+    """Each plane of (C, H, W) smoothed by binomial weights along one axis: a step is (down, right)."""
     C, H, W = values.shape
-    across = np.zeros_like(values)
-    for c in range(C):
-        for i in range(H):
-            for j in range(W):
-                total = CENTRE * values[c, i, j]
-                if j > 0:
-                    total += SIDE * values[c, i, j - 1]
-                if j + 1 < W:
-                    total += SIDE * values[c, i, j + 1]
-                across[c, i, j] = total
     result = np.zeros_like(values)
     for c in range(C):
         for i in range(H):
             for j in range(W):
-                total = CENTRE * across[c, i, j]
-                if i > 0:
-                    total += SIDE * across[c, i - 1, j]
-                if i + 1 < H:
-                    total += SIDE * across[c, i + 1, j]
+                total = CENTRE * values[c, i, j]
+                if i >= down and j >= right:
+                    total += SIDE * values[c, i - down, j - right]
+                if i + down < H and j + right < W:
+                    total += SIDE * values[c, i + down, j + right]
                 result[c, i, j] = total
     return result
+
+
+@helper
+def _smoothed(values: np.ndarray) -> np.ndarray:
+    """Each plane of (C, H, W) smoothed along both axes; nothing comes in across borders."""
+    return _smoothed_along(_smoothed_along(values, 0, 1), 1, 0)
 
 
 @helper
@@ -114,6 +110,31 @@ def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
 
 
 @helper
+def land(
+    k: np.ndarray,
+    l: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    size: tuple[int, int],
+    cell: np.ndarray,
+) -> None:
+    """The `cell` (N,) that each event lands in, row by row; -1 outside the blocks that its view covers.
+
+    Whole shifts `rows` (K,) and `cols` (L,); `size` of the film in px.
+    """
+    H, W = size
+    across = -(-W // CELL_PX)
+    for e in range(k.size):
+        row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
+        top, bottom = _whole_blocks(int(rows[k[e]]), H)
+        left, right = _whole_blocks(int(cols[l[e]]), W)
+        inside = top <= row < bottom and left <= col < right
+        cell[e] = (row // CELL_PX) * across + col // CELL_PX if inside else -1
+
+
+@helper
 def predict(
     k: np.ndarray,
     l: np.ndarray,
@@ -122,13 +143,13 @@ def predict(
     colour: np.ndarray,
     n: np.ndarray,
     weight: np.ndarray,
+    cell: np.ndarray,
     rows: np.ndarray,
     cols: np.ndarray,
     size: tuple[int, int],
     sites: np.ndarray,
     share_seen: np.ndarray,
     prior: float,
-    cell: np.ndarray,
     rate: np.ndarray,
     base: np.ndarray,
     samples: np.ndarray,
@@ -137,12 +158,12 @@ def predict(
 ) -> None:
     """What a section says of every event and cell; all outputs are overwritten. One thread's part.
 
-    Events (N,) with their `colour`, number `n` and `weight` (0 to 1, how far they are believed); whole shifts
-    `rows` (K,) and `cols` (L,); `size` of the film in px; `sites` (C,) of each colour in a block;
-    `share_seen` (H, W), of the views that cover a cell the share that is believed; `prior`, how many
-    samples a coarser scale is worth. For events: the `cell` it lands in, -1 outside; its `rate`, photons per
-    sample of its pixel by all other events, and the same by the widest window alone, `base`. For cells:
-    the views of all its blocks, `samples`; photons per block and view, `mean` and `blurred` likewise.
+    Events (N,) with their `colour`, number `n`, `weight` (0 to 1, how far they are believed) and `cell` (see
+    `land`); whole shifts `rows` (K,) and `cols` (L,); `size` of the film in px; `sites` (C,) of each colour
+    in a block; `share_seen` (H, W), of the views that cover a cell the share that is believed; `prior`, how
+    many samples a coarser scale is worth. For events: the `rate`, photons per sample of its pixel by all
+    other events, and the same by the widest window alone, `base`. For cells: the views of all its blocks,
+    `samples`; photons per block and view, `mean` and `blurred` likewise.
     """
     H, W = size
     h, w = mean.shape
@@ -150,14 +171,9 @@ def predict(
     share_of_site = sites / sites.sum()
     counts = np.zeros((C, 2 * h, 2 * w), np.float32)
     for e in range(k.size):
-        row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-        top, bottom = _whole_blocks(int(rows[k[e]]), H)
-        left, right = _whole_blocks(int(cols[l[e]]), W)
-        if top <= row < bottom and left <= col < right:
+        if cell[e] >= 0:
+            row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
             counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e] * weight[e]
-            cell[e] = (row // CELL_PX) * w + col // CELL_PX
-        else:
-            cell[e] = -1
     by_row = _views_of_blocks(rows, H, 2 * h)
     by_col = _views_of_blocks(cols, W, 2 * w)
     views = np.empty((1, 2 * h, 2 * w), np.float32)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.focus import Focus, typical_light
-from pcii.foreground import connected_pieces
+from pcii.foreground import connected_pieces, dilated
 
 HALO_CELLS = 4
 """Evidence of an outline lies up to 16 px outside it."""
@@ -121,9 +121,7 @@ def _join(
     piece: np.ndarray,
 ) -> bool:
     """Give a piece to the larger neighbour it borders on most, unless it gains enough by its own plane."""
-    from scipy.ndimage import binary_dilation
-
-    ring = binary_dilation(piece) & ~piece & bright[box] & (size[box] > piece.sum()) & (plane[box] != own)
+    ring = dilated(piece, 1) & ~piece & bright[box] & (size[box] > piece.sum()) & (plane[box] != own)
     if not ring.any():
         return False
     names, numbers = np.unique(plane[box][ring], return_counts=True)
@@ -192,7 +190,5 @@ def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
 
 def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray) -> np.ndarray:
     """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
-    from scipy.ndimage import binary_dilation
-
-    around = np.asarray(binary_dilation(piece, iterations=HALO_CELLS), dtype=bool) & (~bright[box] | piece)
+    around = dilated(piece, HALO_CELLS) & (~bright[box] | piece)
     return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)

@@ -6,10 +6,11 @@ from twins import bayer_photons, blocky_texture, intersection_over_union, patch_
 
 from pcii import PhotonCounts, layer_kernels, layers, segment
 from pcii.cells import CELL_PX
+from pcii.focus_kernels import views_of_planes
 from pcii.geometry import disparity_spread_px
 from pcii.layers import layered
 from pcii.outline_kernels import least_outline, shorten_outline
-from pcii.prediction_kernels import predict
+from pcii.prediction_kernels import land, predict
 
 GRID = unit_grid(7, 7, 256, 256)
 CARD_DISPARITY, BAR_DISPARITY = 4, 8
@@ -149,9 +150,9 @@ def test_who_hides_what_is_counted_as_the_formula_reads():
     layer_kernels.paint(mask, light, rows, cols, own_painted)
     np.testing.assert_array_equal(own_painted, painted)
     own_near = near.copy()
-    layer_kernels.cover(mask, rows, cols, 1, own_near)
+    views_of_planes(mask[None], rows[None], cols[None], 1, own_near)
     np.testing.assert_array_equal(own_near, covered)
-    layer_kernels.cover(mask, rows, cols, -1, own_near)
+    views_of_planes(mask[None], rows[None], cols[None], -1, own_near)
     np.testing.assert_array_equal(own_near, near)
 
 
@@ -171,7 +172,8 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
     weight = (~hidden).astype(np.float32)
     sites = np.array([4.0])
-    predict(*where, weight, none, none, (64, 64), sites, seen, 1.0, cell, own, base, samples, mean, blurred)
+    land(*where[:4], none, none, (64, 64), cell)
+    predict(*where, weight, cell, none, none, (64, 64), sites, seen, 1.0, own, base, samples, mean, blurred)
     for part in (np.s_[:, :8], np.s_[:, 8:]):
         photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
         assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
