@@ -34,6 +34,8 @@ JUMP_NATS = 0.2
 PICTURE_CELLS = 1.0
 """What a section shows is smoothed by this before its edges are looked for."""
 SWEEPS = 3
+DARKEST, DARK = 0.05, 0.2
+DARK_SHARE, DIM_SHARE, EVEN_SHARE = 0.25, 0.5, 0.15
 
 
 @dataclass(frozen=True)
@@ -118,6 +120,20 @@ def typical_light(photons: np.ndarray) -> float:
     """
     total = float(photons.sum())
     return float((photons.astype(np.float64) * np.maximum(photons - 1, 0)).sum()) / total if total else 0.0
+
+
+def dark_around(light: np.ndarray, typical: float, photons: float) -> tuple[float, bool]:
+    """The light of the darkest fifth of a smooth picture (...), and whether that is the dark around things.
+
+    It is if it is well below the `typical` light of what is lit; or at least below it, and the same
+    everywhere: the darker parts of things are not. `photons` is how many there are in a window of the
+    smoothing for each unit of light, which tells how even light can look.
+    """
+    darkest, dark = (float(part) for part in np.quantile(light, (DARKEST, DARK)))
+    if dark <= DARK_SHARE * typical:
+        return dark, True
+    noise = float(np.sqrt(dark / max(photons, 1e-12)))
+    return dark, dark <= DIM_SHARE * typical and dark - darkest <= EVEN_SHARE * dark + noise
 
 
 def windowed(gain: np.ndarray, photons: np.ndarray) -> np.ndarray:

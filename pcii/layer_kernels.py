@@ -28,23 +28,17 @@ def paint(
 
 
 @compiled
-def free_views(
-    near: np.ndarray, rows: np.ndarray, cols: np.ndarray, free: np.ndarray, within: np.ndarray
-) -> None:
-    """How many views see a layer's cell, `free` (H, W), and would if nothing were nearer, `within` (H, W)."""
+def free_views(near: np.ndarray, rows: np.ndarray, cols: np.ndarray, free: np.ndarray) -> None:
+    """How many views see a layer's cell: `free` (H, W), overwritten."""
     _, H, W = near.shape
     for line in nb.prange(H):
         a = np.int64(line)
-        for b in range(W):
-            seen = 0
-            inside = 0
-            for v in range(near.shape[0]):
-                i, j = a - rows[v // cols.size], b - cols[v % cols.size]
-                if 0 <= i < H and 0 <= j < W:
-                    inside += 1
-                    seen += near[v, i, j] == 0
-            free[a, b] = seen
-            within[a, b] = inside
+        free[a] = 0
+        for v in range(near.shape[0]):
+            i, right = a - rows[v // cols.size], cols[v % cols.size]
+            if 0 <= i < H:
+                for b in range(max(0, right), min(W, W + right)):
+                    free[a, b] += near[v, i, b - right] == 0
 
 
 @compiled
@@ -60,13 +54,36 @@ def less_light(
     _, H, W = near.shape
     for line in nb.prange(H):
         a = np.int64(line)
-        for b in range(W):
-            total = 0.0
-            for v in range(near.shape[0]):
-                i, j = a - rows[v // cols.size], b - cols[v % cols.size]
-                if 0 <= i < H and 0 <= j < W and near[v, i, j] == 0:
-                    total += behind[v, i, j] - light[a, b]
-            gain[a, b] = total
+        total = np.zeros(W, np.float32)
+        for v in range(near.shape[0]):
+            i, right = a - rows[v // cols.size], cols[v % cols.size]
+            if 0 <= i < H:
+                for b in range(max(0, right), min(W, W + right)):
+                    seen = near[v, i, b - right] == 0
+                    total[b] += np.float32(seen) * (behind[v, i, b - right] - light[a, b])
+        gain[a] = total
+
+
+@compiled
+def gathered(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, result: np.ndarray) -> None:
+    """The views' `values` (V, H, W) where a layer would show them, summed: `result` (H, W), overwritten.
+
+    What a view shows beside the layer's frame counts at its nearest border.
+    """
+    _, H, W = values.shape
+    for line in nb.prange(H):
+        a = np.int64(line)
+        result[a] = 0
+        for v in range(values.shape[0]):
+            down, right = rows[v // cols.size], cols[v % cols.size]
+            first, last = a - down, a - down
+            if a == 0:
+                first = 0
+            if a == H - 1:
+                last = H - 1
+            for i in range(max(0, first), min(H - 1, last) + 1):
+                for j in range(W):
+                    result[a, min(max(j + right, 0), W - 1)] += values[v, i, j]
 
 
 @helper

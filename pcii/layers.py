@@ -14,13 +14,11 @@ fitted one by one, from far to near, each outline the best one given the others 
 Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from pcii.bayer import sites_of_colours
 from pcii.cells import CELL_PX
-from pcii.focus import cell_shape, typical_light
+from pcii.focus import cell_shape, dark_around, typical_light
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 
@@ -28,57 +26,60 @@ LENGTH_NATS, AREA_NATS = 0.3, 0.15
 HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25
 """While a mask is fitted, a cell that less than a quarter of the views see costs less, down to half, so that
 holes behind others close. Results are compared by the whole E."""
-SWEEPS, STEPS = 5, 80
+STEPS = 80
 PRIOR_SAMPLES = 1.0
 """Where few rays reach a place, what is around it tells as much as so many."""
 BLOCKED_WEIGHT = 0.02
 """Of a place that nothing sees freely, what comes through tells at least something."""
-MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
-"""Masks of cells do not get better by more: of brighter films as many photons are drawn, or as many per px
-of a large one."""
-DARK_SHARE, DARKEST_SHARE, LEAST_DARK = 0.25, 0.1, 1e-3
-"""Behind all layers it is dark. If the darkest fifth of the film is as bright as a quarter of what a photon
-typically sees, there is no dark, and a tenth of that is the most that is behind."""
+LEAST_DARK, DARKEST_SHARE, BRIGHTEST_SHARE, BRIGHTER = 1e-3, 0.1, 0.25, 1.3
+"""Behind all layers it is dark: at most twice as bright as the darkest fifth of the film, and hardly more
+than a quarter of what a photon typically sees. If there is no dark, a tenth of that is the most."""
+DARK_CELLS = 3
 
 
-def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
-    """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
+def dark_of(counts: PhotonCounts, spread_px: float) -> tuple[float, float]:
+    """The least and the most light behind all things, in photons per cell and view, from one section."""
+    from scipy.ndimage import gaussian_filter
 
-    `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed, and the
-    nearest that they lead to; the result of least E is given. Deterministic.
+    grid, events = counts.grid, counts.events
+    V, (h, w) = grid.view_count, cell_shape(counts)
+    rows, cols = (axis[0] for axis in whole_shifts_px(grid, np.array([spread_px])))
+    row, col = events.i + rows[events.k], events.j + cols[events.l]
+    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    cell = (row // CELL_PX * w + col // CELL_PX)[inside]
+    photons = np.bincount(cell, events.n[inside], h * w).reshape(h, w)
+    views = np.outer(_cameras_of_cells(rows, grid.height, h), _cameras_of_cells(cols, grid.width, w))
+    smooth, seen = (gaussian_filter(part.astype(np.float64), DARK_CELLS) for part in (photons, views))
+    typical = typical_light(photons) / V
+    well_seen = views >= views.max() / 2
+    dark, there = dark_around(
+        (smooth / np.maximum(seen, 1))[well_seen], typical, V * 4 * np.pi * DARK_CELLS**2
+    )
+    least = max(0.3 * dark, LEAST_DARK * typical, 1e-9)
+    if not there:
+        return least, max(DARKEST_SHARE * typical, least)
+    most = max(min(2 * dark, BRIGHTEST_SHARE * typical), BRIGHTER * dark, 2 * LEAST_DARK * typical)
+    return least, max(most, least)
+
+
+def _cameras_of_cells(shifts: np.ndarray, size: int, cells: int) -> np.ndarray:
+    """How many rows (or columns) of cameras see each row (or column) of cells, by the pixel at its centre."""
+    place = np.arange(cells)[:, None] * CELL_PX + CELL_PX // 2 - shifts
+    return ((place >= 0) & (place < size)).sum(axis=1)
+
+
+class Layers:
+    """The masks (D, h, w), and who hides what while they are fitted.
+
+    `spread_px` (D,) ascends, from far to near; `dark` is the least and the most light behind all (`dark_of`).
     """
-    layers = _Layers(_drawn(counts), spread_px)
-    different = [
-        start for i, start in enumerate(starts) if not any(np.array_equal(start, o) for o in starts[:i])
-    ]
-    found = [layers.settled(start) for start in different]
-    if len(found) > 1:
-        # What one of them found in front another may have missed: what explains nothing goes again.
-        found.append(layers.settled(np.max([seen for _, seen in found], axis=0)))
-    return min(found, key=lambda one: one[0])[1]
 
-
-def _drawn(counts: PhotonCounts) -> PhotonCounts:
-    """The counts, or where there are many photons a fair draw of them (always the same)."""
-    events, grid = counts.events, counts.grid
-    most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
-    share = most / max(float(events.n.sum()), 1.0)
-    if share >= 1:
-        return counts
-    n = np.random.default_rng(0).binomial(events.n.astype(np.int64), share)
-    kept = n > 0
-    k, l, i, j = (getattr(events, name)[kept] for name in "klij")
-    return PhotonCounts.from_events(k, l, i, j, n[kept], grid, cfa=counts.cfa)
-
-
-class _Layers:
-    """The masks (D, h, w), and who hides what while they are fitted."""
-
-    def __init__(self, counts: PhotonCounts, spread_px: np.ndarray) -> None:
+    def __init__(self, counts: PhotonCounts, spread_px: np.ndarray, dark: tuple[float, float]) -> None:
         from pcii.prediction_kernels import land
 
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
+        self.least_dark, self.most_dark = dark
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
         self.cell_rows, self.cell_cols = (
             np.floor(shifts / CELL_PX + 0.5).astype(np.int64) for shifts in (self.rows, self.cols)
@@ -93,12 +94,14 @@ class _Layers:
         self.cells = np.zeros((D, N), np.int32)
         self.rate, self.base = np.zeros((2, N), np.float32)
         self.samples, self.light, self.blurred = np.zeros((3, h, w), np.float32)
-        self.free, self.within = np.zeros((2, h, w), np.int32)
+        self.free = np.zeros((h, w), np.int32)
+        # How many views see each cell if nothing is nearer: the film's frame is all that hides.
+        self.within = np.stack([self._freely_seen(layer) for layer in range(D)])
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
             land(*self.place, self.rows[layer], self.cols[layer], self.film, self.cells[layer])
-        self.least_dark, self.most_dark = self._dark()
+        self.home = self._home(D // 2)
 
     def put(self, masks: np.ndarray) -> None:
         """Go on from these masks (D, h, w)."""
@@ -110,13 +113,6 @@ class _Layers:
         for layer in range(len(masks)):
             self._cover(layer, 1)
 
-    def settled(self, start: np.ndarray) -> tuple[float, np.ndarray]:
-        """E and what is seen (h, w) after sweeps from a guess of what is seen."""
-        self.put(np.arange(len(self.masks))[:, None, None] == start)
-        for _ in range(SWEEPS):
-            self.sweep()
-        return self.energy(), self.visible()
-
     def visible(self) -> np.ndarray:
         """The nearest layer (h, w) in each cell of the virtual centre, -1 for none."""
         D = len(self.masks)
@@ -126,13 +122,33 @@ class _Layers:
         """Fit each layer's mask to the others, from far to near."""
         self._compose(fit=True)
 
-    def energy(self) -> float:
-        """E of the masks as they are, in nats."""
+    def energy(self) -> np.ndarray:
+        """E of the masks as they are, in nats, by the cell (h, w) that it has to do with.
+
+        Light counts where the middle layer would show it.
+        """
+        from pcii.layer_kernels import gathered
+
         rate, behind = self._compose(fit=False)
-        fit = float((self.n * np.log(rate)).sum(dtype=np.float64)) - float(behind.sum(dtype=np.float64))
+        middle, (h, w) = len(self.masks) // 2, self.light.shape
+        expected = np.empty((h, w))
+        gathered(behind, self.cell_rows[middle], self.cell_cols[middle], expected)
+        fit = np.bincount(self.home, self.n * np.log(rate), h * w).reshape(h, w) - expected
         edge = np.pad(self.masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
-        length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum()
-        return -fit + LENGTH_NATS * CELL_PX * float(length) + AREA_NATS * int(self.masks.sum())
+        length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
+        return -fit + LENGTH_NATS * CELL_PX * length + AREA_NATS * self.masks.sum(axis=0)
+
+    def in_the_open(self) -> list[np.ndarray]:
+        """Nats (h, w) that each layer would gain over what is believed now, were it in front of all."""
+        rate, behind = self._compose(fit=False)
+        hidden, near = self.hidden, self.near
+        self.hidden, self.near = np.zeros_like(hidden), np.zeros_like(near)
+        gains = []
+        for layer in range(len(self.masks)):
+            self._predict(layer)
+            gains.append(self._gain(layer, rate, behind))
+        self.hidden, self.near = hidden, near
+        return gains
 
     def _compose(self, *, fit: bool) -> tuple[np.ndarray, np.ndarray]:
         """Rates (N,) of the events and light (V, h, w) of the views, all layers in front of the dark."""
@@ -159,23 +175,29 @@ class _Layers:
 
     def _fit(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> None:
         """The layer's best mask in front of what is behind it."""
-        from pcii import layer_kernels as kernels
         from pcii.outline_kernels import shorten_outline
 
-        gain = np.zeros(self.light.shape, np.float32)
-        kernels.less_light(self.near, behind, self.cell_rows[layer], self.cell_cols[layer], self.light, gain)
-        kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
+        gain = self._gain(layer, rate, behind)
         seen = self.free / (MOSTLY_HIDDEN * len(self.near))
         gain -= (AREA_NATS * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
+
+    def _gain(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> np.ndarray:
+        """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""
+        from pcii import layer_kernels as kernels
+
+        gain = np.empty(self.light.shape, np.float32)
+        kernels.less_light(self.near, behind, self.cell_rows[layer], self.cell_cols[layer], self.light, gain)
+        kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
+        return gain
 
     def _predict(self, layer: int) -> None:
         """What the rays that reach a layer say of its light."""
         from pcii.prediction_kernels import predict
 
         self._look(layer)
-        seen = BLOCKED_WEIGHT + (1 - BLOCKED_WEIGHT) * self.free / np.maximum(self.within, 1)
+        seen = BLOCKED_WEIGHT + (1 - BLOCKED_WEIGHT) * self.free / np.maximum(self.within[layer], 1)
         weight = np.where(self.hidden == 0, np.float32(1), np.float32(BLOCKED_WEIGHT))
         predict(
             *self.place, self.colours, self.n, weight, self.cells[layer],
@@ -186,10 +208,21 @@ class _Layers:
             light *= 4  # from blocks to cells
 
     def _look(self, layer: int) -> None:
-        """How many views see each cell of a layer, and would if nothing were nearer."""
+        """How many views see each cell of a layer."""
         from pcii.layer_kernels import free_views
 
-        free_views(self.near, self.cell_rows[layer], self.cell_cols[layer], self.free, self.within)
+        free_views(self.near, self.cell_rows[layer], self.cell_cols[layer], self.free)
+
+    def _home(self, layer: int) -> np.ndarray:
+        """The cell (N,), row by row, in which a layer would show each event, or the nearest in its frame."""
+        h, w = self.light.shape
+        k, l, i, j = self.place
+        row = np.clip((i + self.rows[layer][k]) // CELL_PX, 0, h - 1)
+        return row * w + np.clip((j + self.cols[layer][l]) // CELL_PX, 0, w - 1)
+
+    def _freely_seen(self, layer: int) -> np.ndarray:
+        self._look(layer)
+        return self.free.copy()
 
     def _cover(self, layer: int, step: int) -> None:
         from pcii.focus_kernels import views_of_planes
@@ -200,21 +233,3 @@ class _Layers:
             own = slice(layer, layer + 1)
             views_of_planes(self.masks[own], self.cell_rows[own], self.cell_cols[own], step, self.near)
             hide(mask, self.cells[layer], step, self.hidden)
-
-    def _dark(self) -> tuple[float, float]:
-        """The least and the most light behind all layers, in photons per cell and view."""
-        from scipy.ndimage import gaussian_filter
-
-        layer, (V, h, w) = len(self.masks) // 2, self.near.shape
-        self._look(layer)
-        inside = self.cells[layer] >= 0
-        photons = np.bincount(self.cells[layer][inside], self.n[inside], h * w).reshape(h, w)
-        smooth = gaussian_filter(photons, 3) / np.maximum(
-            gaussian_filter(self.within.astype(np.float64), 3), 1
-        )
-        typical = typical_light(photons) / V
-        dark = float(np.quantile(smooth[self.within >= self.within.max() / 2], 0.2))
-        least = max(0.3 * dark, LEAST_DARK * typical, 1e-9)
-        if dark > DARK_SHARE * typical:
-            return least, max(DARKEST_SHARE * typical, least)
-        return least, max(min(2 * dark, DARK_SHARE * typical), 2 * LEAST_DARK * typical, least)

@@ -24,7 +24,7 @@ from pcii.duel import duelled, where_planes_touch
 from pcii.focus import JUMP_NATS, best_labels, focus_of, typical_light, windowed
 from pcii.foreground import dilated
 from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing
-from pcii.layers import layered
+from pcii.layer_search import layered
 from pcii.outline import box_around, outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct

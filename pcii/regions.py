@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.focus import Focus, typical_light
+from pcii.focus import Focus, dark_around, typical_light
 from pcii.foreground import connected_pieces, dilated
 
 HALO_CELLS = 4
@@ -26,8 +26,6 @@ SKIRT_CELLS = 17
 which it may be a blurred skirt."""
 STRAY_SHARE = 0.1
 """Nor is it much darker than what half of the photons come from, which single photons in the dark are."""
-DARK_SHARE = 0.25
-"""If even the darkest fifth of the picture is as bright as this, nothing in it is the dark around things."""
 OWN_OPINION_CELLS = 25
 """A piece of less than 20 x 20 px within something larger is narrower than the windows that put it there."""
 SMALLEST_CELLS = 6
@@ -79,8 +77,8 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     typical = max(typical_light(photons), 0.05)
     cells = float(np.clip(np.sqrt(PHOTONS_TO_SEE / (4 * np.pi * typical)), 1.0, 4.0))
     smooth = gaussian_filter(photons, cells)
-    dark = float(np.quantile(smooth, 0.2))
-    if dark > DARK_SHARE * typical:
+    dark, there = dark_around(smooth, typical, 4 * np.pi * cells**2)
+    if not there:
         return np.ones(photons.shape, dtype=bool)
     noise = np.sqrt(max(dark, 0.02) / (4 * np.pi * cells**2))
     nearby = maximum_filter(smooth, SKIRT_CELLS)

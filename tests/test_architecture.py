@@ -33,6 +33,7 @@ PCII_LEVELS = [
     {"statistics", "edge_entropy"},
     {"focus", "outline"},
     {"regions", "layers"},
+    {"layer_search"},
     {"duel"},
     {"likelihood"},
     {"three_step", "depth", "true_masks", "plugins"},

@@ -70,6 +70,18 @@ def test_one_lamp_does_not_put_out_the_rest():
     assert bright[here].mean() > 0.9
 
 
+def test_a_dim_but_even_surround_is_dark():
+    # A thing of 160 photons per cell before a wall of 40: the wall is as bright as parts of things may be, but
+    # even. One that is lit from the side is not, and is seen as a thing.
+    photons = np.full((64, 64), 40.0)
+    photons[20:44, 20:44] = 160
+    bright = bright_cells(np.random.default_rng(3).poisson(photons).astype(np.float32))
+    assert bright[22:42, 22:42].all()
+    assert bright[:12].mean() < 0.01
+    photons *= np.linspace(0.4, 1.6, 64)
+    assert bright_cells(np.random.default_rng(3).poisson(photons).astype(np.float32)).all()
+
+
 def test_a_weak_piece_joins_its_neighbour():
     large, small = box(5, 5, 12, 12), box(5, 17, 3, 2)
     plane = np.where(small, 1, 0)

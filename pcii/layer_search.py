@@ -1,0 +1,189 @@
+"""The search for the opaque layers of least energy: from several starts, then guess by guess.
+
+Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
+nothing behind it can show that it is there. So whole pieces are guessed, put in place and fitted with
+everything else; where that costs less around the piece, it stays.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pcii.cells import CELL_PX
+from pcii.foreground import connected_pieces, dilated
+from pcii.geometry import whole_shifts_px
+from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers, dark_of
+from pcii.photon_counts import PhotonCounts
+from pcii.types import CameraGrid
+
+MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
+"""Masks of cells do not get better by more: of brighter films as many photons are drawn, or as many per px
+of a large one."""
+SWEEPS = 5
+ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
+FAVOURS_NATS = (0.0, 0.3, 0.8)
+"""What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
+SMALLEST_CELLS = 16
+AROUND_CELLS = 8
+"""A guess is judged by what changes within 32 px of it: parallax brings it there."""
+LEAST_NATS, BACKWARD_NATS = 3.0, 0.25
+"""What a guess must save, and for each cell in which something nearer goes: the starts had evidence for it,
+and of two layers of which one would do E, whose predictions lose by having fewer photons, favours one."""
+
+
+@dataclass(frozen=True)
+class _Guess:
+    """That `layer` is what is seen in `cells`; judged in `around` (both (h, w) bool)."""
+
+    layer: int
+    cells: np.ndarray
+    around: np.ndarray
+
+
+def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
+    """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
+
+    `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed, and the
+    nearest that they lead to; from the one of least E pieces are guessed anew. Deterministic.
+    """
+    drawn = _drawn(counts)
+    dark = dark_of(drawn, float(spread_px[len(spread_px) // 2]))
+    box = _box_around(np.max(starts, axis=0) >= 0, drawn.grid, spread_px)
+    layers = Layers(_cut_out(drawn, box), spread_px, dark)
+    different: list[np.ndarray] = []
+    for start in starts:
+        if not any(np.array_equal(start, other) for other in different):
+            different.append(start)
+    found = [_settled(layers, start[box]) for start in different]
+    if len(found) > 1:
+        # What one of them found in front another may have missed: what explains nothing goes again.
+        found.append(_settled(layers, np.max([seen for _, seen in found], axis=0)))
+    best = min(found, key=lambda one: one[0])[1]
+    result = np.full(starts[0].shape, -1)
+    result[box] = _guessed_anew(layers, best) if len(spread_px) > 1 else best
+    return result
+
+
+def _box_around(lit: np.ndarray, grid: CameraGrid, spread_px: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns of cells around all that is `lit` (h, w), and as far as its light goes by parallax."""
+    box = []
+    for axis, shifts in enumerate(whole_shifts_px(grid, spread_px)):
+        there = np.flatnonzero(lit.any(axis=1 - axis))
+        room = int(np.ceil(np.abs(shifts).max() / CELL_PX)) + AROUND_CELLS
+        ends = (max(int(there[0]) - room, 0), int(there[-1]) + 1 + room) if there.size else (0, 1)
+        box.append(slice(ends[0], min(ends[1], lit.shape[axis])))
+    return box[0], box[1]
+
+
+def _cut_out(counts: PhotonCounts, box: tuple[slice, slice]) -> PhotonCounts:
+    """The same cells of every view: a smaller film, whose cells have the same shifts."""
+    events, grid = counts.events, counts.grid
+    (top, bottom), (left, right) = ((part.start * CELL_PX, part.stop * CELL_PX) for part in box)
+    film = replace(grid, height=min(bottom, grid.height) - top, width=min(right, grid.width) - left)
+    inside = (events.i >= top) & (events.i < bottom) & (events.j >= left) & (events.j < right)
+    k, l, i, j, n = (getattr(events, name)[inside] for name in "klijn")
+    return PhotonCounts.from_events(k, l, i - top, j - left, n, film, cfa=counts.cfa)
+
+
+def _drawn(counts: PhotonCounts) -> PhotonCounts:
+    """The counts, or where there are many photons a fair draw of them (always the same)."""
+    events, grid = counts.events, counts.grid
+    most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
+    share = most / max(float(events.n.sum()), 1.0)
+    if share >= 1:
+        return counts
+    n = np.random.default_rng(0).binomial(events.n.astype(np.int64), share)
+    kept = n > 0
+    k, l, i, j = (getattr(events, name)[kept] for name in "klij")
+    return PhotonCounts.from_events(k, l, i, j, n[kept], grid, cfa=counts.cfa)
+
+
+def _settled(layers: Layers, start: np.ndarray) -> tuple[float, np.ndarray]:
+    """E and what is seen (h, w) after sweeps from a guess of what is seen."""
+    layers.put(_masks_of(start, len(layers.masks)))
+    for _ in range(SWEEPS):
+        layers.sweep()
+    return float(layers.energy().sum()), layers.visible()
+
+
+def _masks_of(seen: np.ndarray, count: int) -> np.ndarray:
+    return np.arange(count)[:, None, None] == seen
+
+
+def _guessed_anew(layers: Layers, seen: np.ndarray) -> np.ndarray:
+    """What is seen (h, w) after pieces were guessed and those kept that cost less."""
+    layers.put(_masks_of(seen, len(layers.masks)))
+    changed = np.ones(seen.shape, dtype=bool)
+    for _ in range(ROUNDS):
+        for _ in range(SWEEPS_OF_A_GUESS):
+            layers.sweep()
+        energy = layers.energy()
+        # Where nothing has changed since, the same guess would fail again.
+        guesses = [guess for guess in _guesses(layers) if (guess.around & changed).any()]
+        changed = np.zeros_like(changed)
+        for together in _apart(guesses):
+            energy, kept = _tried(layers, together, energy)
+            for guess in kept:
+                changed |= guess.around
+        if not changed.any():
+            break
+    return layers.visible()
+
+
+def _guesses(layers: Layers) -> Iterator[_Guess]:
+    """Pieces that a layer in front of all would explain better, or would if it were granted a little."""
+    from pcii.outline_kernels import least_outline
+
+    seen = layers.visible()
+    near_light = dilated(seen >= 0, 2)
+    told: set[bytes] = set()
+    for layer, gain in enumerate(layers.in_the_open()):
+        for favour in FAVOURS_NATS:
+            inside = np.empty_like(gain)
+            granted = gain + np.float32(favour - AREA_NATS)
+            least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
+            pieces = connected_pieces((inside > 0.5) & (seen != layer) & near_light)
+            for number in np.flatnonzero(np.bincount(pieces.ravel()) >= SMALLEST_CELLS):
+                cells = pieces == number
+                name = bytes([layer]) + np.packbits(cells).tobytes()
+                if number > 0 and name not in told:
+                    told.add(name)
+                    yield _Guess(layer, cells, dilated(cells, AROUND_CELLS))
+
+
+def _apart(guesses: Sequence[_Guess]) -> list[list[_Guess]]:
+    """The guesses in groups in which no two have to do with each other."""
+    groups: list[tuple[np.ndarray, list[_Guess]]] = []
+    for guess in guesses:
+        for taken, group in groups:
+            if not (taken & guess.around).any():
+                taken |= guess.around
+                group.append(guess)
+                break
+        else:
+            groups.append((guess.around.copy(), [guess]))
+    return [group for _, group in groups]
+
+
+def _tried(layers: Layers, guesses: Sequence[_Guess], energy: np.ndarray) -> tuple[np.ndarray, list[_Guess]]:
+    """The energy after those of the guesses were kept that lessen it, and which they are."""
+    before, seen = layers.masks.copy(), layers.visible()
+    guessed = before.copy()
+    for guess in guesses:
+        guessed[:, guess.cells] = False
+        guessed[guess.layer, guess.cells] = True
+    layers.put(guessed)
+    for _ in range(SWEEPS_OF_A_GUESS):
+        layers.sweep()
+    saved = energy - layers.energy()
+    after = layers.masks.copy()
+    kept = []
+    for guess in guesses:
+        gone = int(np.count_nonzero(seen[guess.cells] > guess.layer))
+        if saved[guess.around].sum() > LEAST_NATS + BACKWARD_NATS * gone:
+            kept.append(guess)
+    for guess in kept:
+        before[:, guess.around] = after[:, guess.around]
+    layers.put(before)
+    return (layers.energy() if kept else energy), kept
