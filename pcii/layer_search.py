@@ -17,9 +17,9 @@ from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers, dark_of
 from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid
 
-MOST_PHOTONS, MOST_PHOTONS_PER_PX = 300_000, 0.3
-"""Masks of cells do not get better by more: of brighter films as many photons are drawn, or as many per px
-of a large one."""
+MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
+"""Of brighter films as many photons are drawn, or as many per px of a large one. A layer is flat and things are
+round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
 FAVOURS_NATS = (0.0, 0.3, 0.8)
