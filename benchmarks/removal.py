@@ -6,6 +6,7 @@ BENCH_SEEDS    datasets of each scene, 20
 BENCH_BUDGETS  photons per view, "30 100 300 1000 3000"; 10000 photons are drawn and counted too
 BENCH_METHODS  methods by name, with commas between them; all
 BENCH_PART     i/n: only every n-th dataset from the i-th on, so that n processes share the work
+BENCH_DRAWN    a-b: instead of the corpus the random scenes of these numbers, of every kind (drawn.py)
 BENCH_OUT      where datasets and scores are kept, out/benchmark; what is there is not made again
 """
 
@@ -16,7 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from benchmarks.drawn import KINDS, TUNING, write_drawn
 from pcii.console import Stages
+from pcii.errors import InputError
 from pcii.evaluate import evaluate, part_of
 from pcii.evaluation_tables import Table, markdown, overview, tables_of
 from pcii.measurements import recipe_of
@@ -31,12 +34,17 @@ MOST_PHOTONS = 10_000
 
 
 class Entry(Strict):
-    """One scene of the corpus: the name of a recipe, and what the scene is for."""
+    """One scene of the corpus: the name or path of a recipe, and what the scene is for."""
 
     recipe: str
     half: Literal["train", "test"]
     """Methods may be tuned on the one; figures that are told are of the other."""
     kind: Literal["textured", "untextured", "cluttered", "depth", "empty", "paper"]
+
+    @property
+    def name(self) -> str:
+        """What datasets and tables call it; `recipe` may be a path."""
+        return Path(self.recipe).stem
 
 
 class Corpus(Strict):
@@ -60,14 +68,30 @@ def load_corpus(path: Path = CORPUS) -> tuple[Entry, ...]:
     return validate(Corpus, read_toml(path), str(path)).scene
 
 
+def drawn_corpus(numbers: str, folder: Path) -> tuple[Entry, ...]:
+    """Random scenes of every kind, of the numbers "a-b", written into a folder; else `InputError`."""
+    first, _, last = numbers.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal()):
+        raise InputError(f"BENCH_DRAWN: expected numbers of scenes such as 100-103, got {numbers!r}")
+    return tuple(
+        Entry(
+            recipe=str(write_drawn(folder, kind, number)),
+            half="train" if number < TUNING else "test",
+            kind=hard,
+        )
+        for kind, hard in KINDS.items()
+        for number in range(int(first), int(last or first) + 1)
+    )
+
+
 def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int]) -> list[Work]:
     """Every dataset, seed by seed, so that what is done early tells of all scenes."""
     light = [f"photons.budget={MOST_PHOTONS}", f"photons.nested={budgets}"]
     nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
     series: list[list[Work]] = []
     for entry in entries:
-        recipe, near = load_recipe(entry.recipe, [*light, *nothing_more, f"title={entry.recipe}"])
-        folder = out / "data" / entry.recipe
+        recipe, near = load_recipe(entry.recipe, [*light, *nothing_more, f"title={entry.name}"])
+        folder = out / "data" / entry.name
         series.append([Work(entry, own, near, folder_of(folder, own)) for own in at_seeds(recipe, seeds)])
     return [work for step in zip(*series, strict=True) for work in step]
 
@@ -79,7 +103,9 @@ def table() -> Iterator[str]:
     methods = [name.strip() for name in setting("BENCH_METHODS", "").split(",") if name.strip()]
     out = Path(setting("BENCH_OUT", "out/benchmark"))
     number, parts = part_of(setting("BENCH_PART", "1/1"))
-    works = work_list(load_corpus(), out, int(setting("BENCH_SEEDS", "20")), budgets)
+    drawn = setting("BENCH_DRAWN", "")
+    corpus = drawn_corpus(drawn, out / "drawn") if drawn else load_corpus()
+    works = work_list(corpus, out, int(setting("BENCH_SEEDS", "20")), budgets)
     own = [work for position, work in enumerate(works) if position % parts == number - 1]
     with Stages() as progress:
         for done, work in enumerate(own, start=1):

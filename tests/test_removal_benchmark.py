@@ -5,8 +5,11 @@ from typing import Any
 
 import pytest
 
-from benchmarks.removal import Entry, by_half_and_kind, load_corpus, report, work_list
+from benchmarks.drawn import KINDS, write_drawn
+from benchmarks.removal import Entry, by_half_and_kind, drawn_corpus, load_corpus, report, work_list
 from pcii.errors import InputError
+from simgen.recipe import load_recipe
+from simgen.scene import load_scene
 
 
 def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:
@@ -29,6 +32,31 @@ def test_a_corpus_that_is_told_wrongly_is_refused(tmp_path: Path) -> None:
     path.write_text('[[scene]]\nrecipe = "paper"\nhalf = "both"\nkind = "paper"\n')
     with pytest.raises(InputError, match="half"):
         load_corpus(path)
+
+
+def test_drawn_scenes_are_whole_and_always_the_same(tmp_path: Path) -> None:
+    # All that a reader of scenes refuses would come to light here: colours beyond white, things without room.
+    for kind in KINDS:
+        for number in range(5):
+            path = write_drawn(tmp_path, kind, number)
+            recipe, near = load_recipe(str(path))
+            scene, _ = load_scene(recipe.scene, near)
+            assert len(scene.objects) >= 2
+            assert len(recipe.analysis.z_mm) >= 2
+            text = (tmp_path / f"{kind}_{number}" / "scene.toml").read_text()
+            write_drawn(tmp_path / "again", kind, number)
+            assert (tmp_path / "again" / f"{kind}_{number}" / "scene.toml").read_text() == text
+
+
+def test_drawn_scenes_are_a_corpus(tmp_path: Path) -> None:
+    entries = drawn_corpus("99-100", tmp_path)
+    assert [entry.half for entry in entries] == ["train", "test"] * len(KINDS)
+    works = work_list(entries, tmp_path / "out", 1, [300])
+    assert [work.recipe.title for work in works][:2] == ["plain_99", "plain_100"]
+    assert works[0].folder.parent == tmp_path / "out" / "data" / "plain_99"
+    assert len(drawn_corpus("7", tmp_path)) == len(KINDS)
+    with pytest.raises(InputError, match="BENCH_DRAWN"):
+        drawn_corpus("some", tmp_path)
 
 
 def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict[str, Any]:

@@ -71,8 +71,8 @@ def test_one_lamp_does_not_put_out_the_rest():
 
 
 def test_a_dim_but_even_surround_is_dark():
-    # A thing of 160 photons per cell before a wall of 40: the wall is as bright as parts of things may be, but
-    # even. One that is lit from the side is not, and is seen as a thing.
+    # A thing of 160 photons per cell before a wall of 40: the wall is as bright as parts of things may be,
+    # but even. One that is lit from the side is not, and is seen as a thing.
     photons = np.full((64, 64), 40.0)
     photons[20:44, 20:44] = 160
     bright = bright_cells(np.random.default_rng(3).poisson(photons).astype(np.float32))
