@@ -18,8 +18,8 @@ from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid
 
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
-"""Of brighter films as many photons are drawn, or as many per px of a large one. A layer is flat and things are
-round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
+"""Of brighter films as many photons are drawn, or as many per px of a large one. A layer is flat and things
+are round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
 FAVOURS_NATS = (0.0, 0.3, 0.8)

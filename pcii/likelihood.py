@@ -8,7 +8,7 @@
 4. Where pieces of several planes touch they are compared photon by photon: what does each of their depths
    predict of it that the others do not? (`pcii.duel`)
 5. There, and everywhere if light is scarce, opaque layers are fitted to all photons together: what a nearer
-   one hides says nothing of those behind it (`pcii.layers`).
+   one hides says nothing of those behind it (`pcii.layers`, `pcii.layer_search`).
 6. Each region is outlined to the pixel at its own depth (`pcii.outline`).
 
 Nothing is told about the number of objects, their colours or their depths, and nothing is claimed without
