@@ -24,7 +24,8 @@ SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
 FAVOURS_NATS = (0.0, 0.3, 0.8)
 """What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
-SMALLEST_CELLS = 16
+SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
+"""Less light than that cannot save what a guess must."""
 AROUND_CELLS = 8
 """A guess is judged by what changes within 32 px of it: parallax brings it there."""
 LEAST_NATS, BACKWARD_NATS = 3.0, 0.25
@@ -139,12 +140,14 @@ def _guesses(layers: Layers) -> Iterator[_Guess]:
     near_light = dilated(seen >= 0, 2)
     told: set[bytes] = set()
     for layer, gain in enumerate(layers.in_the_open()):
+        photons = layers.photons(layer)
         for favour in FAVOURS_NATS:
             inside = np.empty_like(gain)
             granted = gain + np.float32(favour - AREA_NATS)
             least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
             pieces = connected_pieces((inside > 0.5) & (seen != layer) & near_light)
-            for number in np.flatnonzero(np.bincount(pieces.ravel()) >= SMALLEST_CELLS):
+            bright = np.bincount(pieces.ravel(), photons.ravel()) >= FEWEST_PHOTONS
+            for number in np.flatnonzero(bright & (np.bincount(pieces.ravel()) >= SMALLEST_CELLS)):
                 cells = pieces == number
                 name = bytes([layer]) + np.packbits(cells).tobytes()
                 if number > 0 and name not in told:

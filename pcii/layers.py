@@ -118,6 +118,12 @@ class Layers:
         D = len(self.masks)
         return np.where(self.masks.any(axis=0), D - 1 - np.argmax(self.masks[::-1], axis=0), -1)
 
+    def photons(self, layer: int) -> np.ndarray:
+        """How many photons land in each cell (h, w) of a layer, whatever hides it."""
+        cells, shape = self.cells[layer], self.light.shape
+        inside = cells >= 0
+        return np.bincount(cells[inside], self.n[inside], self.light.size).reshape(shape)
+
     def sweep(self) -> None:
         """Fit each layer's mask to the others, from far to near."""
         self._compose(fit=True)
