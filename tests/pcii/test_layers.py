@@ -86,7 +86,7 @@ def test_the_start_of_least_energy_is_followed(monkeypatch: pytest.MonkeyPatch):
 
 
 def everything_at_the_bar() -> np.ndarray:
-    """The card, which is then hidden, can never show that it is there."""
+    """What is true in part, and hides the card."""
     return np.where(everything_at_the_card() >= 0, 1, -1)
 
 
