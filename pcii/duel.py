@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.cells import CELL_PX
+from pcii.cells import in_cells
 from pcii.focus import JUMP_NATS, Predictions, best_labels, predictions_of, windowed
 from pcii.foreground import connected_pieces
 from pcii.geometry import whole_shifts_px
@@ -64,10 +64,7 @@ def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.
     from pcii import focus_kernels as kernels
 
     grid = counts.grid
-    rows, cols = (
-        np.floor(axis[:, _some(axis.shape[1])] / CELL_PX + 0.5).astype(np.int64)
-        for axis in whole_shifts_px(grid, spread_px)
-    )
+    rows, cols = (in_cells(axis[:, _some(axis.shape[1])]) for axis in whole_shifts_px(grid, spread_px))
     S, h, w = seen.expected.shape
     views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)
     kernels.views_of_planes(seen.expected, rows, cols, 1 / S, views)

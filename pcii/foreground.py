@@ -14,6 +14,8 @@ SKIRT_SHARE = 1 / 3
 """What is below 1/3 of the brightest nearby (1/9 of its photons) may be its blurred skirt."""
 EDGE_SMOOTHING_PX = 1.0
 SMALLEST_REGION_PX = 100
+MARGIN_PX = 40
+"""What is shown or looked at around a thing, so that its outline may move."""
 
 
 def roberts_magnitude(image: np.ndarray) -> np.ndarray:
@@ -86,6 +88,17 @@ def dilated(mask: np.ndarray, steps: int) -> np.ndarray:
     from scipy.ndimage import binary_dilation
 
     return np.asarray(binary_dilation(mask, iterations=steps), dtype=bool)
+
+
+def box_around(mask: np.ndarray, room: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:
+    """Rows and columns around a mask, with room above and below, left and right; all if it is empty."""
+    if not mask.any():
+        return slice(0, mask.shape[0]), slice(0, mask.shape[1])
+    box = []
+    for axis, size in enumerate(mask.shape):
+        there = np.flatnonzero(mask.any(axis=1 - axis))
+        box.append(slice(max(int(there[0]) - room[axis], 0), min(int(there[-1]) + 1 + room[axis], size)))
+    return box[0], box[1]
 
 
 def connected_pieces(mask: np.ndarray) -> np.ndarray:

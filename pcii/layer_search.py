@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pcii.cells import CELL_PX
-from pcii.foreground import connected_pieces, dilated
+from pcii.foreground import box_around, connected_pieces, dilated
 from pcii.geometry import whole_shifts_px
 from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers, dark_of
 from pcii.photon_counts import PhotonCounts
@@ -48,9 +48,12 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
     `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed, and the
     nearest that they lead to; from the one of least E pieces are guessed anew. Deterministic.
     """
+    lit = np.max(starts, axis=0) >= 0
+    if not lit.any():
+        return starts[0]
     drawn = _drawn(counts)
     dark = dark_of(drawn, float(spread_px[len(spread_px) // 2]))
-    box = _box_around(np.max(starts, axis=0) >= 0, drawn.grid, spread_px)
+    box = _box_of_light(lit, drawn.grid, spread_px)
     layers = Layers(_cut_out(drawn, box), spread_px, dark)
     different: list[np.ndarray] = []
     for start in starts:
@@ -66,15 +69,13 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
     return result
 
 
-def _box_around(lit: np.ndarray, grid: CameraGrid, spread_px: np.ndarray) -> tuple[slice, slice]:
+def _box_of_light(lit: np.ndarray, grid: CameraGrid, spread_px: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns of cells around all that is `lit` (h, w), and as far as its light goes by parallax."""
-    box = []
-    for axis, shifts in enumerate(whole_shifts_px(grid, spread_px)):
-        there = np.flatnonzero(lit.any(axis=1 - axis))
-        room = int(np.ceil(np.abs(shifts).max() / CELL_PX)) + AROUND_CELLS
-        ends = (max(int(there[0]) - room, 0), int(there[-1]) + 1 + room) if there.size else (0, 1)
-        box.append(slice(ends[0], min(ends[1], lit.shape[axis])))
-    return box[0], box[1]
+    down, right = (
+        int(np.ceil(np.abs(shifts).max() / CELL_PX)) + AROUND_CELLS
+        for shifts in whole_shifts_px(grid, spread_px)
+    )
+    return box_around(lit, (down, right))
 
 
 def _cut_out(counts: PhotonCounts, box: tuple[slice, slice]) -> PhotonCounts:
@@ -146,11 +147,13 @@ def _guesses(layers: Layers) -> Iterator[_Guess]:
             granted = gain + np.float32(favour - AREA_NATS)
             least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
             pieces = connected_pieces((inside > 0.5) & (seen != layer) & near_light)
-            bright = np.bincount(pieces.ravel(), photons.ravel()) >= FEWEST_PHOTONS
-            for number in np.flatnonzero(bright & (np.bincount(pieces.ravel()) >= SMALLEST_CELLS)):
+            enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
+            enough &= np.bincount(pieces.ravel(), photons.ravel()) >= FEWEST_PHOTONS
+            enough[0] = False
+            for number in np.flatnonzero(enough):
                 cells = pieces == number
                 name = bytes([layer]) + np.packbits(cells).tobytes()
-                if number > 0 and name not in told:
+                if name not in told:
                     told.add(name)
                     yield _Guess(layer, cells, dilated(cells, AROUND_CELLS))
 

@@ -17,9 +17,9 @@ Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
 import numpy as np
 
 from pcii.bayer import sites_of_colours
-from pcii.cells import CELL_PX
+from pcii.cells import CELL_PX, in_cells
 from pcii.focus import cell_shape, dark_around, typical_light
-from pcii.geometry import whole_shifts_px
+from pcii.geometry import depth_of_spread_mm, landing, whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 
 LENGTH_NATS, AREA_NATS = 0.3, 0.15
@@ -43,12 +43,13 @@ def dark_of(counts: PhotonCounts, spread_px: float) -> tuple[float, float]:
 
     grid, events = counts.grid, counts.events
     V, (h, w) = grid.view_count, cell_shape(counts)
-    rows, cols = (axis[0] for axis in whole_shifts_px(grid, np.array([spread_px])))
-    row, col = events.i + rows[events.k], events.j + cols[events.l]
-    inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
+    row, col, inside = landing(grid, events, float(depth_of_spread_mm(grid, np.array(spread_px))))
     cell = (row // CELL_PX * w + col // CELL_PX)[inside]
     photons = np.bincount(cell, events.n[inside], h * w).reshape(h, w)
-    views = np.outer(_cameras_of_cells(rows, grid.height, h), _cameras_of_cells(cols, grid.width, w))
+    rows, cols = (axis[0] for axis in whole_shifts_px(grid, np.array([spread_px])))
+    # A cell is seen by whoever sees the pixel at its centre.
+    i, j = (np.arange(size) * CELL_PX + CELL_PX // 2 for size in (h, w))
+    views = _views_of(i, j, rows, cols, (grid.height, grid.width))
     smooth, seen = (gaussian_filter(part.astype(np.float64), DARK_CELLS) for part in (photons, views))
     typical = typical_light(photons) / V
     well_seen = views >= views.max() / 2
@@ -62,10 +63,15 @@ def dark_of(counts: PhotonCounts, spread_px: float) -> tuple[float, float]:
     return least, max(most, least)
 
 
-def _cameras_of_cells(shifts: np.ndarray, size: int, cells: int) -> np.ndarray:
-    """How many rows (or columns) of cameras see each row (or column) of cells, by the pixel at its centre."""
-    place = np.arange(cells)[:, None] * CELL_PX + CELL_PX // 2 - shifts
-    return ((place >= 0) & (place < size)).sum(axis=1)
+def _views_of(
+    i: np.ndarray, j: np.ndarray, rows: np.ndarray, cols: np.ndarray, film: tuple[int, int]
+) -> np.ndarray:
+    """How many views have places i (h,) x j (w,) on their film (H, W) if they are shifted, (h, w)."""
+    cameras = []
+    for place, shifts, size in zip((i, j), (rows, cols), film, strict=True):
+        seen = place[:, None] - shifts
+        cameras.append(((seen >= 0) & (seen < size)).sum(axis=1))
+    return np.outer(*cameras)
 
 
 class Layers:
@@ -81,9 +87,7 @@ class Layers:
         self.film = grid.height, grid.width
         self.least_dark, self.most_dark = dark
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
-        self.cell_rows, self.cell_cols = (
-            np.floor(shifts / CELL_PX + 0.5).astype(np.int64) for shifts in (self.rows, self.cols)
-        )
+        self.cell_rows, self.cell_cols = in_cells(self.rows), in_cells(self.cols)
         self.n = events.n.astype(np.float32)
         self.place = events.k, events.l, events.i, events.j
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
@@ -96,7 +100,8 @@ class Layers:
         self.samples, self.light, self.blurred = np.zeros((3, h, w), np.float32)
         self.free = np.zeros((h, w), np.int32)
         # How many views see each cell if nothing is nearer: the film's frame is all that hides.
-        self.within = np.stack([self._freely_seen(layer) for layer in range(D)])
+        shifts = zip(self.cell_rows, self.cell_cols, strict=True)
+        self.within = np.stack([_views_of(np.arange(h), np.arange(w), *shift, (h, w)) for shift in shifts])
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
@@ -105,13 +110,11 @@ class Layers:
 
     def put(self, masks: np.ndarray) -> None:
         """Go on from these masks (D, h, w)."""
-        for layer in range(len(masks)):
-            self._cover(layer, -1)
+        self._cover_all(-1)
         self.masks[:] = masks
         self.relaxed[:, :2] = masks[:, None]
         self.relaxed[:, 2:] = 0
-        for layer in range(len(masks)):
-            self._cover(layer, 1)
+        self._cover_all(1)
 
     def visible(self) -> np.ndarray:
         """The nearest layer (h, w) in each cell of the virtual centre, -1 for none."""
@@ -147,13 +150,12 @@ class Layers:
     def in_the_open(self) -> list[np.ndarray]:
         """Nats (h, w) that each layer would gain over what is believed now, were it in front of all."""
         rate, behind = self._compose(fit=False)
-        hidden, near = self.hidden, self.near
-        self.hidden, self.near = np.zeros_like(hidden), np.zeros_like(near)
+        self._cover_all(-1)
         gains = []
         for layer in range(len(self.masks)):
             self._predict(layer)
             gains.append(self._gain(layer, rate, behind))
-        self.hidden, self.near = hidden, near
+        self._cover_all(1)
         return gains
 
     def _compose(self, *, fit: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -175,8 +177,7 @@ class Layers:
             mask = self.masks[layer]
             kernels.paint(mask, self.light, self.cell_rows[layer], self.cell_cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
-        for layer in range(len(self.masks)):
-            self._cover(layer, 1)
+        self._cover_all(1)
         return rate, behind
 
     def _fit(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> None:
@@ -226,9 +227,9 @@ class Layers:
         row = np.clip((i + self.rows[layer][k]) // CELL_PX, 0, h - 1)
         return row * w + np.clip((j + self.cols[layer][l]) // CELL_PX, 0, w - 1)
 
-    def _freely_seen(self, layer: int) -> np.ndarray:
-        self._look(layer)
-        return self.free.copy()
+    def _cover_all(self, step: int) -> None:
+        for layer in range(len(self.masks)):
+            self._cover(layer, step)
 
     def _cover(self, layer: int, step: int) -> None:
         from pcii.focus_kernels import views_of_planes

@@ -22,10 +22,10 @@ import numpy as np
 from pcii.cells import CELL_PX
 from pcii.duel import duelled, where_planes_touch
 from pcii.focus import JUMP_NATS, best_labels, focus_of, typical_light, windowed
-from pcii.foreground import dilated
+from pcii.foreground import box_around, dilated
 from pcii.geometry import depth_of_spread_mm, disparity_spread_px, landing
 from pcii.layer_search import layered
-from pcii.outline import box_around, outlined
+from pcii.outline import outlined
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
 from pcii.regions import HALO_CELLS, SURE_NATS, Planes, Region, bright_cells, regions_of, settled

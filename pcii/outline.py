@@ -27,7 +27,6 @@ SPILL, SPILL_PHOTONS = 0.2, 6.0
 """Views are shifted by whole pixels and so bring light of the inside beside it: if this share is expected
 there, an outline lies where half of the light is left. Below 6 photons a pixel noise misplaces it more than
 that, and more contrast between inside and outside helps more."""
-MARGIN_PX = 40
 AWAY_PX, FIRST_AWAY_PX = 2, 8
 """What is farther from a region is surely around it; at first, when its outline is known to cells only."""
 
@@ -51,16 +50,6 @@ def outlined(photons: np.ndarray, samples: np.ndarray, start: np.ndarray, taken:
         if not region.any():
             return region
     return _tidied(region, taken)
-
-
-def box_around(mask: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns of a mask that is not empty, with a margin."""
-    rows, cols = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    H, W = mask.shape
-    return (
-        slice(max(int(rows[0]) - MARGIN_PX, 0), min(int(rows[-1]) + 1 + MARGIN_PX, H)),
-        slice(max(int(cols[0]) - MARGIN_PX, 0), min(int(cols[-1]) + 1 + MARGIN_PX, W)),
-    )
 
 
 def _gain(

@@ -12,18 +12,6 @@ AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
 """Colours of the comparison with the truth: claimed and true, true only, claimed only."""
 
 
-def crop_box(interesting: np.ndarray, margin_px: int = 40) -> tuple[slice, slice]:
-    """Rows and columns around what is True in `interesting` (H, W); everything if nothing is."""
-    if not interesting.any():
-        return slice(0, interesting.shape[0]), slice(0, interesting.shape[1])
-    box: list[slice] = []
-    for axis in (1, 0):
-        where = np.flatnonzero(interesting.any(axis=axis))
-        size = interesting.shape[1 - axis]
-        box.append(slice(max(0, where[0] - margin_px), min(size, where[-1] + 1 + margin_px)))
-    return box[0], box[1]
-
-
 def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
     """Linear values (H, W) or (H, W, C) as 8-bit sRGB (H, W, 3); `white` and above become 255."""
     x = np.clip(np.nan_to_num(linear) / max(white, 1e-30), 0, 1)

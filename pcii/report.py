@@ -11,6 +11,7 @@ import numpy as np
 
 from pcii import __version__, picture
 from pcii.demosaic import demosaic
+from pcii.foreground import box_around
 from pcii.pipeline import Outcome, depth_range_of
 from pcii.score import object_masks, pixel_masks
 from pcii.store import write_bytes_safely
@@ -41,7 +42,7 @@ def _number(value: float | None, digits: int = 3) -> str:
 
 def _content(outcome: Outcome) -> dict[str, Any]:
     dataset = outcome.dataset
-    box = picture.crop_box(picture.interesting_part(dataset.truth, list(outcome.focus)))
+    box = box_around(picture.interesting_part(dataset.truth, list(outcome.focus)))
     manifest = dataset.manifest
     return {
         "title": manifest.get("title") or dataset.name,

@@ -131,11 +131,11 @@ def test_a_film_that_is_dark_around_is_cut_to_what_is_lit(monkeypatch: pytest.Mo
     counts = bar_before_card(500)
     start = everything_at_the_card()
     whole = np.s_[0 : start.shape[0]], np.s_[0 : start.shape[1]]
-    rows, cols = layer_search._box_around(start[8:12, 20:] >= 0, GRID, SPREAD_PX)
+    rows, cols = layer_search._box_of_light(start[8:12, 20:] >= 0, GRID, SPREAD_PX)
     assert (rows.start, rows.stop) == (0, 4)
     assert cols.stop == 44
     cut = layered(counts, SPREAD_PX, [start])
-    monkeypatch.setattr(layer_search, "_box_around", lambda *_: whole)
+    monkeypatch.setattr(layer_search, "_box_of_light", lambda *_: whole)
     np.testing.assert_array_equal(cut, layered(counts, SPREAD_PX, [start]))
 
 

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from twins import intersection_over_union
 
-from pcii.outline import LARGEST_HOLE, MARGIN_PX, SMALLEST_REGION_PX, box_around, outlined
+from pcii.foreground import MARGIN_PX, box_around
+from pcii.outline import LARGEST_HOLE, SMALLEST_REGION_PX, outlined
 from pcii.outline_kernels import least_outline
 
 
