@@ -2,11 +2,13 @@
 
 Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
 nothing behind it can show that it is there. So whole pieces are guessed, put in place and fitted with
-everything else; where that costs less around the piece, it stays.
+everything else; where that costs less around the piece, it stays. Guessed are pieces that a layer in front
+would explain, and that a border between two layers lies farther on.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 
 import numpy as np
 
@@ -24,6 +26,8 @@ SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
 FAVOURS_NATS = (0.0, 0.3, 0.8)
 """What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
+BEYOND_CELLS = 8
+"""How far a border may lie farther on: the fit that follows takes back what is too much."""
 SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
 """Less light than that cannot save what a guess must."""
 AROUND_CELLS = 8
@@ -134,28 +138,35 @@ def _guessed_anew(layers: Layers, seen: np.ndarray) -> np.ndarray:
 
 
 def _guesses(layers: Layers) -> Iterator[_Guess]:
-    """Pieces that a layer in front of all would explain better, or would if it were granted a little."""
+    """Connected pieces of what may be another layer's, each of them once."""
+    told: set[bytes] = set()
+    for layer, where in _supposed(layers):
+        pieces = connected_pieces(where)
+        enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
+        enough &= np.bincount(pieces.ravel(), layers.photons(layer).ravel()) >= FEWEST_PHOTONS
+        enough[0] = False
+        for number in np.flatnonzero(enough):
+            cells = pieces == number
+            name = bytes([layer]) + np.packbits(cells).tobytes()
+            if name not in told:
+                told.add(name)
+                yield _Guess(layer, cells, dilated(cells, AROUND_CELLS))
+
+
+def _supposed(layers: Layers) -> Iterator[tuple[int, np.ndarray]]:
+    """Layers, and where (h, w) bool they may be instead of what is seen there now."""
     from pcii.outline_kernels import least_outline
 
     seen = layers.visible()
+    for layer, other in permutations(range(len(layers.masks)), 2):
+        yield layer, dilated(seen == layer, BEYOND_CELLS) & (seen == other)
     near_light = dilated(seen >= 0, 2)
-    told: set[bytes] = set()
     for layer, gain in enumerate(layers.in_the_open()):
-        photons = layers.photons(layer)
         for favour in FAVOURS_NATS:
             inside = np.empty_like(gain)
             granted = gain + np.float32(favour - AREA_NATS)
             least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
-            pieces = connected_pieces((inside > 0.5) & (seen != layer) & near_light)
-            enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
-            enough &= np.bincount(pieces.ravel(), photons.ravel()) >= FEWEST_PHOTONS
-            enough[0] = False
-            for number in np.flatnonzero(enough):
-                cells = pieces == number
-                name = bytes([layer]) + np.packbits(cells).tobytes()
-                if name not in told:
-                    told.add(name)
-                    yield _Guess(layer, cells, dilated(cells, AROUND_CELLS))
+            yield layer, (inside > 0.5) & (seen != layer) & near_light
 
 
 def _apart(guesses: Sequence[_Guess]) -> list[list[_Guess]]:

@@ -87,21 +87,22 @@ class Layers:
         self.film = grid.height, grid.width
         self.least_dark, self.most_dark = dark
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
-        self.cell_rows, self.cell_cols = in_cells(self.rows), in_cells(self.cols)
         self.n = events.n.astype(np.float32)
         self.place = events.k, events.l, events.i, events.j
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
         D, V, N, (h, w) = len(spread_px), grid.view_count, self.n.size, cell_shape(counts)
         self.masks = np.zeros((D, h, w), dtype=bool)
-        self.near = np.zeros((V, h, w), np.uint16)
+        # What share of each view's cell nearer layers cover, what is left, and the light that is seen there.
+        self.covered, self.open, self.through = np.zeros((3, V, h, w), np.float32)
         self.hidden = np.zeros(N, np.int32)
         self.cells = np.zeros((D, N), np.int32)
         self.rate, self.base = np.zeros((2, N), np.float32)
-        self.samples, self.light, self.blurred = np.zeros((3, h, w), np.float32)
-        self.free = np.zeros((h, w), np.int32)
+        self.samples, self.light, self.blurred, self.free = np.zeros((4, h, w), np.float32)
         # How many views see each cell if nothing is nearer: the film's frame is all that hides.
-        shifts = zip(self.cell_rows, self.cell_cols, strict=True)
-        self.within = np.stack([_views_of(np.arange(h), np.arange(w), *shift, (h, w)) for shift in shifts])
+        self.within = np.zeros((D, h, w), np.float32)
+        for layer in range(D):
+            self._look(layer)
+            self.within[layer] = self.free
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
@@ -141,7 +142,7 @@ class Layers:
         rate, behind = self._compose(fit=False)
         middle, (h, w) = len(self.masks) // 2, self.light.shape
         expected = np.empty((h, w))
-        gathered(behind, self.cell_rows[middle], self.cell_cols[middle], expected)
+        gathered(behind, in_cells(self.rows[middle]), in_cells(self.cols[middle]), expected)
         fit = np.bincount(self.home, self.n * np.log(rate), h * w).reshape(h, w) - expected
         edge = np.pad(self.masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
         length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
@@ -166,16 +167,16 @@ class Layers:
         least, most = self.least_dark / CELL_PX**2, self.most_dark / CELL_PX**2
         # The dark is what the farthest section shows if it is blurred; what is brighter is a surface.
         rate = np.clip(self.base, least, most).astype(np.float32)
-        behind = np.full(self.near.shape, self.least_dark, np.float32)
+        behind = np.full(self.covered.shape, self.least_dark, np.float32)
         dark = np.clip(self.blurred, self.least_dark, self.most_dark)
-        kernels.paint(np.ones_like(self.masks[0]), dark, self.cell_rows[0], self.cell_cols[0], behind)
+        kernels.paint(np.ones_like(dark), dark, self.rows[0], self.cols[0], behind)
         for layer in range(len(self.masks)):
             self._cover(layer, -1)
             self._predict(layer)
             if fit:
                 self._fit(layer, rate, behind)
             mask = self.masks[layer]
-            kernels.paint(mask, self.light, self.cell_rows[layer], self.cell_cols[layer], behind)
+            kernels.paint(mask.astype(np.float32), self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
         return rate, behind
@@ -185,7 +186,7 @@ class Layers:
         from pcii.outline_kernels import shorten_outline
 
         gain = self._gain(layer, rate, behind)
-        seen = self.free / (MOSTLY_HIDDEN * len(self.near))
+        seen = self.free / (MOSTLY_HIDDEN * len(self.covered))
         gain -= (AREA_NATS * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
@@ -194,8 +195,10 @@ class Layers:
         """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""
         from pcii import layer_kernels as kernels
 
+        np.multiply(self.open, behind, out=self.through)
         gain = np.empty(self.light.shape, np.float32)
-        kernels.less_light(self.near, behind, self.cell_rows[layer], self.cell_cols[layer], self.light, gain)
+        kernels.from_views(self.through, self.rows[layer], self.cols[layer], gain)
+        gain -= self.light * self.free  # photons that are expected less
         kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
         return gain
 
@@ -215,10 +218,11 @@ class Layers:
             light *= 4  # from blocks to cells
 
     def _look(self, layer: int) -> None:
-        """How many views see each cell of a layer."""
-        from pcii.layer_kernels import free_views
+        """How many views see each cell of a layer, in parts: `free`, and where they do: `open`."""
+        from pcii.layer_kernels import from_views
 
-        free_views(self.near, self.cell_rows[layer], self.cell_cols[layer], self.free)
+        np.maximum(1 - self.covered, 0, out=self.open)
+        from_views(self.open, self.rows[layer], self.cols[layer], self.free)
 
     def _home(self, layer: int) -> np.ndarray:
         """The cell (N,), row by row, in which a layer would show each event, or the nearest in its frame."""
@@ -232,11 +236,9 @@ class Layers:
             self._cover(layer, step)
 
     def _cover(self, layer: int, step: int) -> None:
-        from pcii.focus_kernels import views_of_planes
-        from pcii.layer_kernels import hide
+        from pcii.layer_kernels import cover, hide
 
         mask = self.masks[layer]
         if mask.any():
-            own = slice(layer, layer + 1)
-            views_of_planes(self.masks[own], self.cell_rows[own], self.cell_cols[own], step, self.near)
+            cover(mask.astype(np.float32), self.rows[layer], self.cols[layer], step, self.covered)
             hide(mask, self.cells[layer], step, self.hidden)

@@ -6,7 +6,6 @@ from twins import bayer_photons, blocky_texture, intersection_over_union, patch_
 
 from pcii import PhotonCounts, layer_kernels, layer_search, layers, segment
 from pcii.cells import CELL_PX
-from pcii.focus_kernels import views_of_planes
 from pcii.geometry import disparity_spread_px
 from pcii.layer_search import layered
 from pcii.outline_kernels import least_outline, shorten_outline
@@ -172,39 +171,56 @@ def test_many_photons_are_drawn_from_fairly_and_always_alike():
     assert layer_search._drawn(few) is few
 
 
-def test_who_hides_what_is_counted_as_the_formula_reads():
+def on_pixels(cells: np.ndarray) -> np.ndarray:
+    return cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1).astype(np.float64)
+
+
+def moved(cells: np.ndarray, down: int, right: int) -> np.ndarray:
+    """Cells (h, w) of what is seen at (i, j) and belongs to (i + down, j + right), pixel by pixel; else 0."""
+    pixels = on_pixels(cells)
+    result = np.zeros_like(pixels)
+    for i, j in np.ndindex(*pixels.shape):
+        if 0 <= i + down < pixels.shape[0] and 0 <= j + right < pixels.shape[1]:
+            result[i, j] = pixels[i + down, j + right]
+    h, w = cells.shape
+    return result.reshape(h, CELL_PX, w, CELL_PX).mean(axis=(1, 3))
+
+
+def test_who_hides_what_is_counted_as_pixel_by_pixel():
+    # Shifts of every remainder, and one by which nothing is seen.
+    rng = np.random.default_rng(3)
+    V, (h, w), rows, cols = 6, (7, 5), np.array([-11, 2]), np.array([8, 1, -33])
+    mask, light = (rng.random((h, w)) < 0.5).astype(np.float32), rng.random((h, w)).astype(np.float32)
+    mask[:2] = 0
+    before = rng.integers(0, 2, (V, h, w)).astype(np.float32)
+    behind = rng.random((V, h, w)).astype(np.float32)
+    shifts = list(itertools.product(rows, cols))
+    total = np.ones((h, w), np.float32)
+    layer_kernels.from_views(behind, rows, cols, total)
+    expected = sum(moved(behind[v], -down, -right) for v, (down, right) in enumerate(shifts))
+    np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6)
+    covered, painted = before.copy(), behind.copy()
+    layer_kernels.cover(mask, rows, cols, 1, covered)
+    layer_kernels.paint(mask, light, rows, cols, painted)
+    for v, (down, right) in enumerate(shifts):
+        share = moved(mask, down, right)
+        np.testing.assert_array_equal(covered[v], before[v] + share)
+        own = moved(mask * light, down, right)
+        np.testing.assert_allclose(painted[v], behind[v] * (1 - share) + own, rtol=1e-5, atol=1e-6)
+    layer_kernels.cover(mask, rows, cols, -1, covered)
+    np.testing.assert_array_equal(covered, before)
+
+
+def test_all_light_of_the_views_is_gathered_somewhere():
     rng = np.random.default_rng(3)
     V, (h, w), rows, cols = 6, (7, 5), np.array([-3, 0]), np.array([2, 0, -9])
-    mask, light = rng.random((h, w)) < 0.5, rng.random((h, w)).astype(np.float32)
-    near = rng.integers(0, 2, (V, h, w)).astype(np.uint16)
     behind = rng.random((V, h, w)).astype(np.float32)
-    covered, painted, free, less, gathered = near.copy(), behind.copy(), *np.zeros((3, h, w))
+    gathered, own = np.zeros((h, w)), np.ones((h, w))
     for v, a, b in itertools.product(range(V), range(h), range(w)):
-        i, j = a - rows[v // 3], b - cols[v % 3]
         at = np.clip(a + rows[v // 3], 0, h - 1), np.clip(b + cols[v % 3], 0, w - 1)
         gathered[at] += behind[v, a, b]
-        if 0 <= i < h and 0 <= j < w:
-            free[a, b] += near[v, i, j] == 0
-            less[a, b] += (near[v, i, j] == 0) * (float(behind[v, i, j]) - light[a, b])
-            covered[v, i, j] += mask[a, b]
-            painted[v, i, j] = light[a, b] if mask[a, b] else behind[v, i, j]
-    own_free = np.ones((h, w), np.int32)
-    layer_kernels.free_views(near, rows, cols, own_free)
-    np.testing.assert_array_equal(own_free, free)
-    own_gathered = np.ones((h, w))
-    layer_kernels.gathered(behind, rows, cols, own_gathered)
-    np.testing.assert_allclose(own_gathered, gathered, rtol=1e-5)
-    own_less = np.zeros((h, w), np.float32)
-    layer_kernels.less_light(near, behind, rows, cols, light, own_less)
-    np.testing.assert_allclose(own_less, less, rtol=1e-6, atol=1e-6)
-    own_painted = behind.copy()
-    layer_kernels.paint(mask, light, rows, cols, own_painted)
-    np.testing.assert_array_equal(own_painted, painted)
-    own_near = near.copy()
-    views_of_planes(mask[None], rows[None], cols[None], 1, own_near)
-    np.testing.assert_array_equal(own_near, covered)
-    views_of_planes(mask[None], rows[None], cols[None], -1, own_near)
-    np.testing.assert_array_equal(own_near, near)
+    layer_kernels.gathered(behind, rows, cols, own)
+    np.testing.assert_allclose(own, gathered, rtol=1e-5)
 
 
 def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
