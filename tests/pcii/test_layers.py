@@ -126,6 +126,25 @@ def test_guesses_lead_out_of_a_valley(monkeypatch: pytest.MonkeyPatch):
     assert max(agreement()) < 0.7
 
 
+def test_borders_are_supposed_to_lie_farther_on_to_both_sides():
+    counts, spread_px, truth = card_before_card(500)
+    fitted = layers.Layers(counts, spread_px, (1e-3, 1e-2))
+    fitted.put(np.arange(2)[:, None, None] == truth)
+    supposed = [where for _, where in itertools.islice(layer_search._supposed(fitted), 2)]
+    columns = np.flatnonzero((truth == 1).any(axis=0))
+    row = int(np.flatnonzero((truth == 1).any(axis=1)).mean())
+    inner, outer = supposed[1][row], supposed[0][row]
+    beyond = layer_search.BEYOND_CELLS
+    assert set(np.flatnonzero(inner)) == {
+        *range(columns[0] - beyond, columns[0]),
+        *range(columns[-1] + 1, columns[-1] + 1 + beyond),
+    }
+    assert set(np.flatnonzero(outer)) == {
+        *range(columns[0], columns[0] + beyond),
+        *range(columns[-1] + 1 - beyond, columns[-1] + 1),
+    }
+
+
 def test_a_film_that_is_dark_around_is_cut_to_what_is_lit(monkeypatch: pytest.MonkeyPatch):
     counts = bar_before_card(500)
     start = everything_at_the_card()
