@@ -3,7 +3,9 @@
 Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
 nothing behind it can show that it is there. So whole pieces are guessed, put in place and fitted with
 everything else; where that costs less around the piece, it stays. Guessed are pieces that a layer in front
-would explain, and that a border between two layers lies farther on.
+would explain, and that a border between two layers lies farther on. Surfaces are compared with the light of
+each told by itself; a piece that differs from what is around it would then save something at any depth, so it
+must also be better than the same piece at the depth where it was.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,7 +17,7 @@ import numpy as np
 from pcii.cells import CELL_PX
 from pcii.foreground import box_around, connected_pieces, dilated
 from pcii.geometry import whole_shifts_px
-from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers, dark_of
+from pcii.layers import AREA_NATS, BESIDE_SHARE, LENGTH_NATS, STEPS, Layers, dark_of
 from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid
 
@@ -32,9 +34,8 @@ SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
 """Less light than that cannot save what a guess must."""
 AROUND_CELLS = 8
 """A guess is judged by what changes within 32 px of it: parallax brings it there."""
-LEAST_NATS, BACKWARD_NATS = 3.0, 0.25
-"""What a guess must save, and for each cell in which something nearer goes: the starts had evidence for it,
-and of two layers of which one would do E, whose predictions lose by having fewer photons, favours one."""
+LEAST_NATS, BACKWARD_NATS = 3.0, 0.12
+"""What a guess must save, and for each cell in which something nearer goes: the starts had evidence of it."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
     drawn = _drawn(counts)
     dark = dark_of(drawn, float(spread_px[len(spread_px) // 2]))
     box = _box_of_light(lit, drawn.grid, spread_px)
-    layers = Layers(_cut_out(drawn, box), spread_px, dark)
+    cut = _cut_out(drawn, box)
+    layers = Layers(cut, spread_px, dark)
     different: list[np.ndarray] = []
     for start in starts:
         if not any(np.array_equal(start, other) for other in different):
@@ -69,7 +71,9 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
         found.append(_settled(layers, np.max([seen for _, seen in found], axis=0)))
     best = min(found, key=lambda one: one[0])[1]
     result = np.full(starts[0].shape, -1)
-    result[box] = _guessed_anew(layers, best) if len(spread_px) > 1 else best
+    if len(spread_px) > 1:
+        best = _guessed_anew(layers, Layers(cut, np.repeat(spread_px, 2), dark), best)
+    result[box] = best
     return result
 
 
@@ -117,19 +121,22 @@ def _masks_of(seen: np.ndarray, count: int) -> np.ndarray:
     return np.arange(count)[:, None, None] == seen
 
 
-def _guessed_anew(layers: Layers, seen: np.ndarray) -> np.ndarray:
-    """What is seen (h, w) after pieces were guessed and those kept that cost less."""
+def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarray:
+    """What is seen (h, w) after pieces were guessed and those kept that cost less.
+
+    `doubled` has each of the `layers` twice, for surfaces that are told by themselves at the same depth.
+    """
     layers.put(_masks_of(seen, len(layers.masks)))
     changed = np.ones(seen.shape, dtype=bool)
     for _ in range(ROUNDS):
         for _ in range(SWEEPS_OF_A_GUESS):
             layers.sweep()
-        energy = layers.energy()
+        energy = _energy_of(doubled, layers.masks)
         # Where nothing has changed since, the same guess would fail again.
         guesses = [guess for guess in _guesses(layers) if (guess.around & changed).any()]
         changed = np.zeros_like(changed)
         for together in _apart(guesses):
-            energy, kept = _tried(layers, together, energy)
+            energy, kept = _tried(layers, doubled, together, energy)
             for guess in kept:
                 changed |= guess.around
         if not changed.any():
@@ -183,7 +190,9 @@ def _apart(guesses: Sequence[_Guess]) -> list[list[_Guess]]:
     return [group for _, group in groups]
 
 
-def _tried(layers: Layers, guesses: Sequence[_Guess], energy: np.ndarray) -> tuple[np.ndarray, list[_Guess]]:
+def _tried(
+    layers: Layers, doubled: Layers, guesses: Sequence[_Guess], energy: np.ndarray
+) -> tuple[np.ndarray, list[_Guess]]:
     """The energy after those of the guesses were kept that lessen it, and which they are."""
     before, seen = layers.masks.copy(), layers.visible()
     guessed = before.copy()
@@ -193,14 +202,34 @@ def _tried(layers: Layers, guesses: Sequence[_Guess], energy: np.ndarray) -> tup
     layers.put(guessed)
     for _ in range(SWEEPS_OF_A_GUESS):
         layers.sweep()
-    saved = energy - layers.energy()
     after = layers.masks.copy()
-    kept = []
-    for guess in guesses:
-        gone = int(np.count_nonzero(seen[guess.cells] > guess.layer))
-        if saved[guess.around].sum() > LEAST_NATS + BACKWARD_NATS * gone:
-            kept.append(guess)
+    energy_after = _energy_of(doubled, after)
+    saved = energy - energy_after
+    cheaper = [
+        guess
+        for guess in guesses
+        if saved[guess.around].sum()
+        > LEAST_NATS + BACKWARD_NATS * np.count_nonzero(seen[guess.cells] > guess.layer)
+    ]
+    kept: list[_Guess] = []
+    if cheaper:
+        # Is it the depth that is better, or that the piece is told by itself?
+        around = np.any([guess.around for guess in cheaper], axis=0)
+        moved = around & (layers.visible() != seen)
+        saved = _energy_of(doubled, before, before & moved & _masks_of(seen, len(before))) - energy_after
+        kept = [guess for guess in cheaper if saved[guess.around].sum() > LEAST_NATS]
     for guess in kept:
         before[:, guess.around] = after[:, guess.around]
     layers.put(before)
-    return (layers.energy() if kept else energy), kept
+    return (_energy_of(doubled, before) if kept else energy), kept
+
+
+def _energy_of(doubled: Layers, masks: np.ndarray, parted: np.ndarray | None = None) -> np.ndarray:
+    """E (h, w) of masks (D, h, w), each told by itself, and so what is `parted` (D, h, w) from them."""
+    both = np.zeros_like(doubled.masks)
+    both[::2] = masks
+    if parted is not None:
+        both[::2] &= ~parted
+        both[1::2] = parted
+    doubled.put(both)
+    return doubled.energy(beside=BESIDE_SHARE)

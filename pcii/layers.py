@@ -29,6 +29,8 @@ holes behind others close. Results are compared by the whole E."""
 STEPS = 80
 PRIOR_SAMPLES = 1.0
 """Where few rays reach a place, what is around it tells as much as so many."""
+BESIDE_SHARE = 0.35
+"""Of a surface that is told by itself what lands beside it tells so much: masks err by a cell."""
 BLOCKED_WEIGHT = 0.02
 """Of a place that nothing sees freely, what comes through tells at least something."""
 LEAST_DARK, DARKEST_SHARE, BRIGHTEST_SHARE, BRIGHTER = 1e-3, 0.1, 0.25, 1.3
@@ -132,14 +134,16 @@ class Layers:
         """Fit each layer's mask to the others, from far to near."""
         self._compose(fit=True)
 
-    def energy(self) -> np.ndarray:
+    def energy(self, *, beside: float = 1.0) -> np.ndarray:
         """E of the masks as they are, in nats, by the cell (h, w) that it has to do with.
 
-        Light counts where the middle layer would show it.
+        Light counts where the middle layer would show it. What lands `beside` a mask tells so much of its
+        light: at less than 1 borders between surfaces cost nothing but their length, yet parting one surface
+        into two along the edges that it shows saves something.
         """
         from pcii.layer_kernels import gathered
 
-        rate, behind = self._compose(fit=False)
+        rate, behind = self._compose(fit=False, beside=beside)
         middle, (h, w) = len(self.masks) // 2, self.light.shape
         expected = np.empty((h, w))
         gathered(behind, in_cells(self.rows[middle]), in_cells(self.cols[middle]), expected)
@@ -159,7 +163,7 @@ class Layers:
         self._cover_all(1)
         return gains
 
-    def _compose(self, *, fit: bool) -> tuple[np.ndarray, np.ndarray]:
+    def _compose(self, *, fit: bool, beside: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Rates (N,) of the events and light (V, h, w) of the views, all layers in front of the dark."""
         from pcii import layer_kernels as kernels
 
@@ -171,11 +175,13 @@ class Layers:
         dark = np.clip(self.blurred, self.least_dark, self.most_dark)
         kernels.paint(np.ones_like(dark), dark, self.rows[0], self.cols[0], behind)
         for layer in range(len(self.masks)):
+            mask = self.masks[layer]
+            if not fit and not mask.any():
+                continue
             self._cover(layer, -1)
-            self._predict(layer)
+            self._predict(layer, beside)
             if fit:
                 self._fit(layer, rate, behind)
-            mask = self.masks[layer]
             kernels.paint(mask.astype(np.float32), self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
@@ -202,13 +208,17 @@ class Layers:
         kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
         return gain
 
-    def _predict(self, layer: int) -> None:
-        """What the rays that reach a layer say of its light."""
+    def _predict(self, layer: int, beside: float = 1.0) -> None:
+        """What the rays that reach a layer say of its light; those `beside` its mask count so much."""
         from pcii.prediction_kernels import predict
 
         self._look(layer)
         seen = BLOCKED_WEIGHT + (1 - BLOCKED_WEIGHT) * self.free / np.maximum(self.within[layer], 1)
         weight = np.where(self.hidden == 0, np.float32(1), np.float32(BLOCKED_WEIGHT))
+        if beside < 1:
+            cell, share = self.cells[layer], np.where(self.masks[layer], 1, beside).astype(np.float32)
+            seen *= share
+            weight *= share.ravel()[np.maximum(cell, 0)]
         predict(
             *self.place, self.colours, self.n, weight, self.cells[layer],
             self.rows[layer], self.cols[layer], self.film, self.sites, seen.astype(np.float32), PRIOR_SAMPLES,
