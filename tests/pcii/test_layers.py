@@ -93,14 +93,19 @@ def starts(good: np.ndarray, bad: np.ndarray) -> list[tuple[str, list[np.ndarray
     return [("good, bad", [good, bad]), ("bad, good", [bad, good]), ("good", [good, good])]
 
 
-def card_before_card(per_view: float, seed: int = 1) -> tuple[PhotonCounts, np.ndarray, np.ndarray]:
-    """Two cards of coarse texture one before the other, their spreads in px, and what is seen (h, w)."""
+def card_before_card(
+    per_view: float, seed: int = 1, *, nearer: bool = True
+) -> tuple[PhotonCounts, np.ndarray, np.ndarray]:
+    """Two cards of coarse texture one before the other, their spreads in px, and what is seen (h, w).
+
+    Without the `nearer` nothing is at its depth.
+    """
     disparities, rng = np.array([4, 6]), np.random.default_rng(seed)
     views, seen = np.zeros((*GRID.shape_KLHW, 3)), np.full((64, 64), -1)
-    for layer, (top, left, size) in enumerate([(40, 40, 176), (80, 70, 100)]):
+    for layer, (top, left, size) in enumerate([(40, 40, 176), (80, 70, 100)][: 1 + nearer]):
         texture = blocky_texture(rng, size, size, block_px=40)
-        nearer = patch_views(texture, top, left, int(disparities[layer]), GRID)
-        views = np.where(nearer > 0, nearer, views)
+        own = patch_views(texture, top, left, int(disparities[layer]), GRID)
+        views = np.where(own > 0, own, views)
         rows, cols = (slice((at + 2) // CELL_PX, (at + size + 2) // CELL_PX) for at in (top, left))
         seen[rows, cols] = layer
     rates = views + 0.002
@@ -124,6 +129,23 @@ def test_guesses_lead_out_of_a_valley(monkeypatch: pytest.MonkeyPatch):
     # ... and without guesses the wrong start stays what it is.
     monkeypatch.setattr(layer_search, "ROUNDS", 0)
     assert max(agreement()) < 0.7
+
+
+def test_a_piece_that_stands_out_stays_at_its_depth(monkeypatch: pytest.MonkeyPatch):
+    # A card of coarse squares: told by itself each saves something, at the depth of the other plane as well.
+    counts, spread_px, card = card_before_card(1000, nearer=False)
+    moved = layered(counts, spread_px, [card]) == 1
+    assert np.count_nonzero(moved) < 0.01 * np.count_nonzero(card >= 0)
+    compared = layer_search._energy_of
+
+    def without_the_same_piece(
+        doubled: layers.Layers, masks: np.ndarray, parted: np.ndarray | None = None
+    ) -> np.ndarray:
+        return compared(doubled, masks) if parted is None else np.full(masks.shape[1:], np.inf)
+
+    monkeypatch.setattr(layer_search, "_energy_of", without_the_same_piece)
+    moved = layered(counts, spread_px, [card]) == 1
+    assert np.count_nonzero(moved) > 0.2 * np.count_nonzero(card >= 0)
 
 
 def test_borders_are_supposed_to_lie_farther_on_to_both_sides():
