@@ -147,10 +147,11 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
 def _guesses(layers: Layers) -> Iterator[_Guess]:
     """Connected pieces of what may be another layer's, each of them once."""
     told: set[bytes] = set()
+    photons = [layers.photons(layer).ravel() for layer in range(len(layers.masks))]
     for layer, where in _supposed(layers):
         pieces = connected_pieces(where)
         enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
-        enough &= np.bincount(pieces.ravel(), layers.photons(layer).ravel()) >= FEWEST_PHOTONS
+        enough &= np.bincount(pieces.ravel(), photons[layer]) >= FEWEST_PHOTONS
         enough[0] = False
         for number in np.flatnonzero(enough):
             cells = pieces == number

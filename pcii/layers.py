@@ -94,8 +94,8 @@ class Layers:
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
         D, V, N, (h, w) = len(spread_px), grid.view_count, self.n.size, cell_shape(counts)
         self.masks = np.zeros((D, h, w), dtype=bool)
-        # What share of each view's cell nearer layers cover, what is left, and the light that is seen there.
-        self.covered, self.open, self.through = np.zeros((3, V, h, w), np.float32)
+        # What share of each view's cell nearer layers cover, and what is found for all views at once.
+        self.covered, self.views = np.zeros((2, V, h, w), np.float32)
         self.hidden = np.zeros(N, np.int32)
         self.cells = np.zeros((D, N), np.int32)
         self.rate, self.base = np.zeros((2, N), np.float32)
@@ -201,9 +201,10 @@ class Layers:
         """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""
         from pcii import layer_kernels as kernels
 
-        np.multiply(self.open, behind, out=self.through)
+        seen = self._open()
+        seen *= behind
         gain = np.empty(self.light.shape, np.float32)
-        kernels.from_views(self.through, self.rows[layer], self.cols[layer], gain)
+        kernels.from_views(seen, self.rows[layer], self.cols[layer], gain)
         gain -= self.light * self.free  # photons that are expected less
         kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
         return gain
@@ -228,11 +229,15 @@ class Layers:
             light *= 4  # from blocks to cells
 
     def _look(self, layer: int) -> None:
-        """How many views see each cell of a layer, in parts: `free`, and where they do: `open`."""
+        """How many views see each cell of a layer, in parts."""
         from pcii.layer_kernels import from_views
 
-        np.maximum(1 - self.covered, 0, out=self.open)
-        from_views(self.open, self.rows[layer], self.cols[layer], self.free)
+        from_views(self._open(), self.rows[layer], self.cols[layer], self.free)
+
+    def _open(self) -> np.ndarray:
+        """What share of each view's cell (V, h, w) nearer layers leave; good until it is asked for again."""
+        np.subtract(1, self.covered, out=self.views)
+        return np.maximum(self.views, 0, out=self.views)
 
     def _home(self, layer: int) -> np.ndarray:
         """The cell (N,), row by row, in which a layer would show each event, or the nearest in its frame."""

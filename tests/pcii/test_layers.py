@@ -151,7 +151,7 @@ def test_a_piece_that_stands_out_stays_at_its_depth(monkeypatch: pytest.MonkeyPa
 def test_borders_are_supposed_to_lie_farther_on_to_both_sides():
     counts, spread_px, truth = card_before_card(500)
     fitted = layers.Layers(counts, spread_px, (1e-3, 1e-2))
-    fitted.put(np.arange(2)[:, None, None] == truth)
+    fitted.put(layer_search._masks_of(truth, 2))
     supposed = [where for _, where in itertools.islice(layer_search._supposed(fitted), 2)]
     columns = np.flatnonzero((truth == 1).any(axis=0))
     row = int(np.flatnonzero((truth == 1).any(axis=1)).mean())
@@ -212,13 +212,9 @@ def test_many_photons_are_drawn_from_fairly_and_always_alike():
     assert layer_search._drawn(few) is few
 
 
-def on_pixels(cells: np.ndarray) -> np.ndarray:
-    return cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1).astype(np.float64)
-
-
 def moved(cells: np.ndarray, down: int, right: int) -> np.ndarray:
     """Cells (h, w) of what is seen at (i, j) and belongs to (i + down, j + right), pixel by pixel; else 0."""
-    pixels = on_pixels(cells)
+    pixels = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1).astype(np.float64)
     result = np.zeros_like(pixels)
     for i, j in np.ndindex(*pixels.shape):
         if 0 <= i + down < pixels.shape[0] and 0 <= j + right < pixels.shape[1]:
