@@ -3,7 +3,8 @@
 At full size this takes hours. Environment variables make it smaller or share it:
 
 BENCH_SEEDS    datasets of each scene, 20
-BENCH_BUDGETS  photons per view, "30 100 300 1000 3000"; 10000 photons are drawn and counted too
+BENCH_BUDGETS  photons per view, "30 100 300 1000 3000 10000 300000", the last of which stands for full light;
+               the most are drawn, and of those the others
 BENCH_METHODS  methods by name, with commas between them; all
 BENCH_PART     i/n: only every n-th dataset from the i-th on, so that n processes share the work
 BENCH_DRAWN    a-b: instead of the corpus the random scenes of these numbers, of every kind (drawn.py)
@@ -30,7 +31,7 @@ from simgen.schema import Strict, read_toml, validate
 from simgen.series import at_seeds, folder_of
 
 CORPUS = Path(__file__).with_name("corpus.toml")
-MOST_PHOTONS = 10_000
+BUDGETS = "30 100 300 1000 3000 10000 300000"
 
 
 class Entry(Strict):
@@ -86,7 +87,8 @@ def drawn_corpus(numbers: str, folder: Path) -> tuple[Entry, ...]:
 
 def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int]) -> list[Work]:
     """Every dataset, seed by seed, so that what is done early tells of all scenes."""
-    light = [f"photons.budget={MOST_PHOTONS}", f"photons.nested={budgets}"]
+    *fewer, most = sorted(set(budgets))
+    light = [f"photons.budget={most}", f"photons.nested={fewer}"]
     nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
     series: list[list[Work]] = []
     for entry in entries:
@@ -99,7 +101,7 @@ def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int
 def table() -> Iterator[str]:
     """Make and score what is missing, then tell all that is there, as Markdown."""
     setting = os.environ.get
-    budgets = [int(text) for text in setting("BENCH_BUDGETS", "30 100 300 1000 3000").split()]
+    budgets = [int(text) for text in setting("BENCH_BUDGETS", BUDGETS).split()]
     methods = [name.strip() for name in setting("BENCH_METHODS", "").split(",") if name.strip()]
     out = Path(setting("BENCH_OUT", "out/benchmark"))
     number, parts = part_of(setting("BENCH_PART", "1/1"))
