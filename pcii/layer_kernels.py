@@ -14,58 +14,103 @@ import numpy as np
 from pcii.cells import CELL_PX
 from pcii.kernels import compiled, helper
 
+PARTS = CELL_PX * CELL_PX
+"""What is covered of a view's cell is counted in pixels: of whole numbers nothing is ever left over."""
+BAND = 16
+"""Rows that a thread adds up at a time: they stay at hand while it goes through all views."""
+
+
+@helper
+def _add_times(weight: np.float32 | np.uint16, source: np.ndarray, cells: int, line: np.ndarray) -> None:
+    """Adds `weight` times a row (W,), moved by whole `cells`, to a `line` (W,)."""
+    first, last = max(0, -cells), max(0, min(line.size, source.size - cells))
+    # Slices, so that the compiler sees that all of it exists and takes several at a time.
+    there, part = source[first + cells : last + cells], line[first:last]
+    for j in range(part.size):
+        part[j] += weight * there[j]
+
+
+@helper
+def _add_row(source: np.ndarray, right: int, share: float, line: np.ndarray) -> None:
+    """Adds `share` times a row of cells (W,), moved by `right` px, to a `line` (W,) of cells."""
+    b, q = right // CELL_PX, right % CELL_PX
+    _add_times(np.float32(share * (CELL_PX - q) / CELL_PX), source, b, line)
+    if q > 0:
+        _add_times(np.float32(share * q / CELL_PX), source, b + 1, line)
+
 
 @helper
 def _add_moved(values: np.ndarray, down: int, right: int, row: int, line: np.ndarray) -> None:
     """Adds to `line` (W,) what `values` (H, W) show there: cells of `row`, moved by `down` and `right` px."""
-    H, W = values.shape
     a, p = row + down // CELL_PX, down % CELL_PX
-    b, q = right // CELL_PX, right % CELL_PX
     for u in range(2):
-        share = np.float32(p if u else CELL_PX - p) / np.float32(CELL_PX)
-        if share == 0 or a + u < 0 or a + u >= H:
-            continue
-        for v in range(2):
-            weight = share * np.float32(q if v else CELL_PX - q) / np.float32(CELL_PX)
-            if weight > 0:
-                first, last = max(0, -b - v), max(0, min(W, W - b - v))
-                # Slices, so that the compiler sees that all of it exists and takes several at a time.
-                source, part = values[a + u, first + b + v : last + b + v], line[first:last]
-                for j in range(part.size):
-                    part[j] += weight * source[j]
+        share = (p if u else CELL_PX - p) / CELL_PX
+        if share > 0 and 0 <= a + u < values.shape[0]:
+            _add_row(values[a + u], right, share, line)
 
 
 @helper
-def _filled(mask: np.ndarray) -> tuple[int, int]:
-    """First and last row + 1 in which a mask (H, W) has anything."""
-    first, last = mask.shape[0], 0
-    for a in range(mask.shape[0]):
-        if mask[a].any():
-            first, last = min(first, a), a + 1
-    return first, last
+def _filled(mask: np.ndarray) -> tuple[int, int, int, int]:
+    """First and last row + 1, first and last column + 1 in which a mask (H, W) has anything."""
+    H, W = mask.shape
+    top, bottom, left, right = H, 0, W, 0
+    for a in range(H):
+        for b in range(W):
+            if mask[a, b]:
+                top, bottom, left, right = min(top, a), a + 1, min(left, b), max(right, b + 1)
+    return top, max(top, bottom), left, max(left, right)
 
 
 @helper
-def _seen(filled: tuple[int, int], down: int, height: int) -> tuple[int, int]:
-    """The rows of a view, moved by `down` px, that show anything of a mask's `filled` rows."""
-    return max(0, filled[0] - down // CELL_PX - 1), min(height, filled[1] - down // CELL_PX)
+def _seen(first: int, last: int, moved: int, size: int) -> tuple[int, int]:
+    """The cells along an axis of a view, moved by so many px, that show anything of `first` to `last`."""
+    start = max(0, first - moved // CELL_PX - 1)
+    return start, max(start, min(size, last - moved // CELL_PX))
+
+
+@helper
+def _rows_under(top: int, size: int, down: int, height: int) -> tuple[int, int]:
+    """First and last row + 1 of a view that show any of `size` rows from `top` on, moved by `down` px."""
+    first = top + down // CELL_PX
+    return max(0, first), max(0, min(height, first + size + 1))
+
+
+@helper
+def _open(covered: np.ndarray, share: np.ndarray) -> None:
+    """The `share` (W,) of each cell that is not `covered` (W,)."""
+    for j in range(share.size):
+        px = max(np.int32(PARTS) - np.int32(covered[j]), np.int32(0))
+        share[j] = np.float32(1 / PARTS) * np.float32(px)
+
+
+@helper
+def _add_to_band(source: np.ndarray, row: int, down: int, right: int, band: np.ndarray) -> None:
+    """Adds what a view's `row` (W,), counted from the band's first, shows to the rows (n, W) of a band."""
+    a, p = row - down // CELL_PX, down % CELL_PX
+    if 0 <= a - 1 < band.shape[0] and p > 0:
+        _add_row(source, right, p / CELL_PX, band[a - 1])
+    if 0 <= a < band.shape[0]:
+        _add_row(source, right, (CELL_PX - p) / CELL_PX, band[a])
 
 
 @compiled
 def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, covered: np.ndarray) -> None:
-    """Adds `step` times a layer's `mask` (H, W) to how much of their cells views see `covered` (V, H, W)."""
-    W = mask.shape[1]
-    filled = _filled(mask)
+    """Adds `step` times the px of a `mask` (H, W) in each cell of the views to `covered` (V, H, W) uint16."""
+    H = mask.shape[0]
+    top, bottom, left, right = _filled(mask)
+    cells = mask[top:bottom, left:right].astype(np.uint16)
     for view in nb.prange(covered.shape[0]):
         v = np.int64(view)
-        down, right = rows[v // cols.size], cols[v % cols.size]
-        share = np.empty(W, np.float32)
-        for i in range(*_seen(filled, down, mask.shape[0])):
-            share[:] = 0
-            _add_moved(mask, down, right, i, share)
-            line = covered[v, i]
-            for j in range(W):
-                line[j] += step * share[j]
+        down, over = rows[v // cols.size], cols[v % cols.size]
+        for i in range(*_seen(top, bottom, down, H)):
+            for u in range(2):
+                a, high = i + down // CELL_PX + u - top, down % CELL_PX if u else CELL_PX - down % CELL_PX
+                if high == 0 or a < 0 or a >= cells.shape[0]:
+                    continue
+                for x in range(2):
+                    wide = over % CELL_PX if x else CELL_PX - over % CELL_PX
+                    moved = over // CELL_PX + x - left
+                    _add_times(np.uint16(step * high * wide), cells[a], moved, covered[v, i])
 
 
 @compiled
@@ -73,30 +118,60 @@ def paint(
     mask: np.ndarray, light: np.ndarray, rows: np.ndarray, cols: np.ndarray, behind: np.ndarray
 ) -> None:
     """Where a layer's `mask` (H, W) is, views show its `light` (H, W) before what is `behind` (V, H, W)."""
-    W = mask.shape[1]
-    shown, filled = mask * light, _filled(mask)
+    H, W = mask.shape
+    top, bottom, left, right = _filled(mask)
+    there = mask[top:bottom, left:right].astype(np.float32)
+    shown = there * light[top:bottom, left:right]
     for view in nb.prange(behind.shape[0]):
         v = np.int64(view)
-        down, right = rows[v // cols.size], cols[v % cols.size]
-        own, share = np.empty(W, np.float32), np.empty(W, np.float32)
-        for i in range(*_seen(filled, down, mask.shape[0])):
+        down, over = rows[v // cols.size], cols[v % cols.size]
+        first, last = _seen(left, right, over, W)
+        own, share = np.empty(last - first, np.float32), np.empty(last - first, np.float32)
+        # What is cut out lies that much nearer to the frame.
+        moved = over + (first - left) * CELL_PX
+        for i in range(*_seen(top, bottom, down, H)):
             own[:] = 0
             share[:] = 0
-            _add_moved(shown, down, right, i, own)
-            _add_moved(mask, down, right, i, share)
-            line = behind[v, i]
-            for j in range(W):
+            _add_moved(shown, down - top * CELL_PX, moved, i, own)
+            _add_moved(there, down - top * CELL_PX, moved, i, share)
+            line = behind[v, i, first:last]
+            for j in range(line.size):
                 line[j] = line[j] * (1 - share[j]) + own[j]
 
 
 @compiled
-def from_views(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray) -> None:
-    """What all views together have (V, H, W) where a layer's cells are: `total` (H, W), overwritten."""
-    for line in nb.prange(total.shape[0]):
-        a = np.int64(line)
-        total[a] = 0
-        for v in range(values.shape[0]):
-            _add_moved(values[v], -rows[v // cols.size], -cols[v % cols.size], int(a), total[a])
+def views_of(covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray) -> None:
+    """How many views see a layer's cells past what is `covered` (V, H, W): `total` (H, W), overwritten."""
+    V, H, W = covered.shape
+    for part in nb.prange((H + BAND - 1) // BAND):
+        top = int(np.int64(part) * BAND)
+        band, seen = total[top : top + BAND], np.empty(W, np.float32)
+        band[:] = 0
+        for v in range(V):
+            down, right = -rows[v // cols.size], -cols[v % cols.size]
+            for row in range(*_rows_under(top, band.shape[0], down, H)):
+                _open(covered[v, row], seen)
+                _add_to_band(seen, row - top, down, right, band)
+
+
+@compiled
+def light_of(
+    behind: np.ndarray, covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray
+) -> None:
+    """What they see there of what is `behind` (V, H, W), all views together: `total` (H, W), overwritten."""
+    V, H, W = covered.shape
+    for part in nb.prange((H + BAND - 1) // BAND):
+        top = int(np.int64(part) * BAND)
+        band, seen = total[top : top + BAND], np.empty(W, np.float32)
+        band[:] = 0
+        for v in range(V):
+            down, right = -rows[v // cols.size], -cols[v % cols.size]
+            for row in range(*_rows_under(top, band.shape[0], down, H)):
+                _open(covered[v, row], seen)
+                light = behind[v, row]
+                for j in range(W):
+                    seen[j] *= light[j]
+                _add_to_band(seen, row - top, down, right, band)
 
 
 @compiled

@@ -94,8 +94,8 @@ class Layers:
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
         D, V, N, (h, w) = len(spread_px), grid.view_count, self.n.size, cell_shape(counts)
         self.masks = np.zeros((D, h, w), dtype=bool)
-        # What share of each view's cell nearer layers cover, and what is found for all views at once.
-        self.covered, self.views = np.zeros((2, V, h, w), np.float32)
+        # How many px of each view's cell nearer layers cover.
+        self.covered = np.zeros((V, h, w), np.uint16)
         self.hidden = np.zeros(N, np.int32)
         self.cells = np.zeros((D, N), np.int32)
         self.rate, self.base = np.zeros((2, N), np.float32)
@@ -167,22 +167,22 @@ class Layers:
         """Rates (N,) of the events and light (V, h, w) of the views, all layers in front of the dark."""
         from pcii import layer_kernels as kernels
 
-        self._predict(0)
+        self._predict(0, None if fit else self.hidden == 0, blurred=True)
         least, most = self.least_dark / CELL_PX**2, self.most_dark / CELL_PX**2
         # The dark is what the farthest section shows if it is blurred; what is brighter is a surface.
         rate = np.clip(self.base, least, most).astype(np.float32)
         behind = np.full(self.covered.shape, self.least_dark, np.float32)
         dark = np.clip(self.blurred, self.least_dark, self.most_dark)
-        kernels.paint(np.ones_like(dark), dark, self.rows[0], self.cols[0], behind)
+        kernels.paint(np.ones(dark.shape, dtype=bool), dark, self.rows[0], self.cols[0], behind)
         for layer in range(len(self.masks)):
             mask = self.masks[layer]
             if not fit and not mask.any():
                 continue
             self._cover(layer, -1)
-            self._predict(layer, beside)
+            self._predict(layer, None if fit else self._claimed(layer), beside=beside)
             if fit:
                 self._fit(layer, rate, behind)
-            kernels.paint(mask.astype(np.float32), self.light, self.rows[layer], self.cols[layer], behind)
+            kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
         return rate, behind
@@ -201,17 +201,22 @@ class Layers:
         """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""
         from pcii import layer_kernels as kernels
 
-        seen = self._open()
-        seen *= behind
         gain = np.empty(self.light.shape, np.float32)
-        kernels.from_views(seen, self.rows[layer], self.cols[layer], gain)
+        kernels.light_of(behind, self.covered, self.rows[layer], self.cols[layer], gain)
         gain -= self.light * self.free  # photons that are expected less
         kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
         return gain
 
-    def _predict(self, layer: int, beside: float = 1.0) -> None:
-        """What the rays that reach a layer say of its light; those `beside` its mask count so much."""
-        from pcii.prediction_kernels import predict
+    def _predict(
+        self, layer: int, asked: np.ndarray | None = None, *, beside: float = 1.0, blurred: bool = False
+    ) -> None:
+        """What the rays that reach a layer say of its light; those `beside` its mask count so much.
+
+        Rates are wanted of the events that are `asked` for (N,), of all if not given; if `blurred`, by the
+        widest window alone.
+        """
+        from pcii.kernels import threads
+        from pcii.prediction_kernels import BASE_SCALE, predict_shared
 
         self._look(layer)
         seen = BLOCKED_WEIGHT + (1 - BLOCKED_WEIGHT) * self.free / np.maximum(self.within[layer], 1)
@@ -220,7 +225,10 @@ class Layers:
             cell, share = self.cells[layer], np.where(self.masks[layer], 1, beside).astype(np.float32)
             seen *= share
             weight *= share.ravel()[np.maximum(cell, 0)]
-        predict(
+        if asked is None:
+            asked = np.ones(self.n.size, dtype=bool)
+        predict_shared(
+            threads(), asked, BASE_SCALE if blurred else 0,
             *self.place, self.colours, self.n, weight, self.cells[layer],
             self.rows[layer], self.cols[layer], self.film, self.sites, seen.astype(np.float32), PRIOR_SAMPLES,
             self.rate, self.base, self.samples, self.light, self.blurred,
@@ -228,16 +236,16 @@ class Layers:
         for light in (self.light, self.blurred):
             light *= 4  # from blocks to cells
 
+    def _claimed(self, layer: int) -> np.ndarray:
+        """Which events (N,) land in the layer's mask and in none that is nearer."""
+        cell = self.cells[layer]
+        return (self.hidden == 0) & (cell >= 0) & self.masks[layer].ravel()[np.maximum(cell, 0)]
+
     def _look(self, layer: int) -> None:
         """How many views see each cell of a layer, in parts."""
-        from pcii.layer_kernels import from_views
+        from pcii.layer_kernels import views_of
 
-        from_views(self._open(), self.rows[layer], self.cols[layer], self.free)
-
-    def _open(self) -> np.ndarray:
-        """What share of each view's cell (V, h, w) nearer layers leave; good until it is asked for again."""
-        np.subtract(1, self.covered, out=self.views)
-        return np.maximum(self.views, 0, out=self.views)
+        views_of(self.covered, self.rows[layer], self.cols[layer], self.free)
 
     def _home(self, layer: int) -> np.ndarray:
         """The cell (N,), row by row, in which a layer would show each event, or the nearest in its frame."""
@@ -255,5 +263,5 @@ class Layers:
 
         mask = self.masks[layer]
         if mask.any():
-            cover(mask.astype(np.float32), self.rows[layer], self.cols[layer], step, self.covered)
+            cover(mask, self.rows[layer], self.cols[layer], step, self.covered)
             hide(mask, self.cells[layer], step, self.hidden)

@@ -16,6 +16,7 @@ evidence. Muniraj et al. 2017 ask for the same masks; their three steps are in `
 """
 
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -112,6 +113,8 @@ def _outlines(
 
     What is `inner` (h, w) stays as it is: an outline parts a thing from the dark around it.
     """
+    from pcii.kernels import threads
+
     grid = counts.grid
     inner = _on_pixels(inner, grid)
     # What nothing speaks for is free to be taken; what is defocused is not.
@@ -119,24 +122,31 @@ def _outlines(
     on_pixels = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
     masks = np.zeros((planes, grid.height, grid.width), dtype=bool)
     belongs = np.zeros((planes, counts.events.n.size), dtype=bool)
-    for spread in sorted({region.spread_px for region in regions if region.is_there}):
-        z_mm = depth_of_spread_mm(grid, np.array([spread]))
-        section = reconstruct(counts, z_mm)
-        row, col, inside = landing(grid, counts.events, float(z_mm[0]))
-        for region in regions:
-            if not region.is_there or region.spread_px != spread:
-                continue
-            start = on_pixels == region.number
-            box = box_around(start)
-            taken = ((on_pixels > 0) & ~start)[box]
-            _close_frame(taken, box, grid)
-            photons, samples = (
-                part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
-            )
-            mask = np.zeros((grid.height, grid.width), dtype=bool)
-            mask[box] = np.where(inner[box], start[box], outlined(photons, samples, start[box], taken))
-            masks[region.plane] |= mask
-            belongs[region.plane, inside] |= mask[row[inside], col[inside]]
+    spreads = sorted({region.spread_px for region in regions if region.is_there})
+    found: list[tuple[Region, tuple[slice, slice], Future[np.ndarray]]] = []
+    with ThreadPoolExecutor(threads()) as pool:
+        for spread in spreads:
+            section = reconstruct(counts, depth_of_spread_mm(grid, np.array([spread])))
+            for region in regions:
+                if not region.is_there or region.spread_px != spread:
+                    continue
+                start = on_pixels == region.number
+                box = box_around(start)
+                taken = ((on_pixels > 0) & ~start)[box]
+                _close_frame(taken, box, grid)
+                photons, samples = (
+                    part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
+                )
+                found.append((region, box, pool.submit(outlined, photons, samples, start[box], taken)))
+    for spread in spreads:
+        z_mm = float(depth_of_spread_mm(grid, np.array(spread)))
+        row, col, inside = landing(grid, counts.events, z_mm)
+        for region, box, outline in found:
+            if region.spread_px == spread:
+                mask = np.zeros((grid.height, grid.width), dtype=bool)
+                mask[box] = np.where(inner[box], on_pixels[box] == region.number, outline.result())
+                masks[region.plane] |= mask
+                belongs[region.plane, inside] |= mask[row[inside], col[inside]]
     return masks, belongs
 
 

@@ -3,12 +3,11 @@
 Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
 
-import math
-
+import numba as nb
 import numpy as np
 
 from pcii.cells import CELL_PX
-from pcii.kernels import helper
+from pcii.kernels import compiled, helper
 
 BLOCK_PX = 2
 """Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
@@ -26,6 +25,8 @@ BASE_SCALE = 4
 """What a plane that shows nothing of its own would predict: the rate smoothed over 32 px."""
 BASE_SHARE = 0.05
 """Least share of the base in a prediction, so that a single photon in the dark cannot decide."""
+
+AT_ONCE = 512
 
 # Smoothing is by the binomial weights 1/4, 1/2, 1/4 along both axes, then linear between centres.
 CENTRE, SIDE = 0.5, 0.25
@@ -65,30 +66,36 @@ def _halved(values: np.ndarray) -> np.ndarray:
     result = np.zeros((C, (H + 1) // 2, (W + 1) // 2), np.float32)
     for c in range(C):
         for i in range(H):
-            for j in range(W):
-                result[c, i // 2, j // 2] += values[c, i, j]
+            row, line = values[c, i], result[c, i // 2]
+            for b in range(W // 2):
+                line[b] = (line[b] + row[2 * b]) + row[2 * b + 1]
+            if W % 2:
+                line[W // 2] += row[W - 1]
     return result
 
 
 @helper
-def _between(place: float, size: int) -> tuple[int, float, float]:
-    """Cell centre below a place (in cells), the share of the next, and what an event there gives itself."""
-    low = math.floor(place - 0.5)
+def _between(place: float, size: int) -> tuple[int, int, float, float]:
+    """The cells whose centres are around a place (in cells), the share of the second, an event's own part.
+
+    Beside the frame both are the same.
+    """
+    low = int(place + 0.5) - 1
     share = place - 0.5 - low
-    if low < 0 or low + 1 >= size:  # beside the frame both centres are the same
-        return low, share, CENTRE
-    own = CENTRE * (1 - share) + SIDE * share if share < 0.5 else CENTRE * share + SIDE * (1 - share)
-    return low, share, own
+    if low < 0 or low + 1 >= size:
+        low = min(max(low, 0), size - 1)
+        return low, low, share, CENTRE
+    nearer = max(share, 1 - share)
+    return low, low + 1, share, CENTRE * nearer + SIDE * (1 - nearer)
 
 
 @helper
-def _at(values: np.ndarray, c: int, low_i: int, share_i: float, low_j: int, share_j: float) -> float:
-    """Linear between the four centres around a place; borders continue."""
-    _, H, W = values.shape
-    top, bottom = min(max(low_i, 0), H - 1), min(max(low_i + 1, 0), H - 1)
-    left, right = min(max(low_j, 0), W - 1), min(max(low_j + 1, 0), W - 1)
-    upper = (1 - share_j) * values[c, top, left] + share_j * values[c, top, right]
-    lower = (1 - share_j) * values[c, bottom, left] + share_j * values[c, bottom, right]
+def _at(
+    values: np.ndarray, top: int, bottom: int, share_i: float, left: int, right: int, share_j: float
+) -> float:
+    """Linear between the four centres (see `_between`) in `values` (H, W)."""
+    upper = (1 - share_j) * values[top, left] + share_j * values[top, right]
+    lower = (1 - share_j) * values[bottom, left] + share_j * values[bottom, right]
     return (1 - share_i) * upper + share_i * lower
 
 
@@ -139,6 +146,169 @@ def land(
 
 
 @helper
+def _scales(
+    k: np.ndarray,
+    l: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    n: np.ndarray,
+    weight: np.ndarray,
+    cell: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    by_row: np.ndarray,
+    by_col: np.ndarray,
+    colours: int,
+    share_seen: np.ndarray,
+    finest: int,
+) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float]:
+    """Views and photons (1, H, W), photons by colour (C, H, W), smoothed, at each scale; the mean rate."""
+    counts = np.zeros((colours, by_row.size, by_col.size), np.float32)
+    for e in range(k.size):
+        if cell[e] >= 0:
+            row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
+            counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e] * weight[e]
+    views = np.empty((1, by_row.size, by_col.size), np.float32)
+    for a in range(by_row.size):
+        for b in range(by_col.size):
+            views[0, a, b] = by_row[a] * by_col[b] * share_seen[a // 2, b // 2]
+    totals = np.zeros((1, by_row.size, by_col.size), np.float32)
+    for c in range(colours):
+        totals[0] += counts[c]
+    everywhere = totals.sum() / max(views.sum(), np.float32(1e-6))
+    seen, light, coloured = [], [], []
+    for scale in range(SCALES):
+        if scale > 0:
+            counts, totals, views = _halved(counts), _halved(totals), _halved(views)
+        # A scale that nobody looks at is there in name only.
+        whole, by_colour = scale >= finest, scale >= max(COLOUR_SCALE, finest)
+        seen.append(_smoothed(views if whole else views[:, :1, :1].copy()))
+        light.append(_smoothed(totals if whole else totals[:, :1, :1].copy()))
+        coloured.append(_smoothed(counts if by_colour else counts[:, :1, :1].copy()))
+    return seen, light, coloured, everywhere
+
+
+@helper
+def _predict_events(
+    first: int,
+    last: int,
+    asked: np.ndarray,
+    k: np.ndarray,
+    l: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    weight: np.ndarray,
+    cell: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    sites: np.ndarray,
+    prior: float,
+    scales: tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float],
+    finest: int,
+    rate: np.ndarray,
+    base: np.ndarray,
+) -> None:
+    """The `rate` and `base` (N,) of those events from `first` to `last` that are `asked` for (N,)."""
+    seen, light, coloured, everywhere = scales
+    share_of_site = sites / sites.sum()
+    # Scale by scale for some events at a time: to take an array from a list costs as much as to look one up.
+    which = np.empty(AT_ONCE, np.int64)
+    shares, coarsers, widest, sums = np.empty((4, AT_ONCE), np.float64)
+    for begin in range(first, last, AT_ONCE):
+        found = 0
+        for e in range(begin, min(begin + AT_ONCE, last)):
+            which[found] = e
+            found += asked[e] and cell[e] >= 0
+            if asked[e] and cell[e] < 0:
+                rate[e] = base[e] = 0.0
+        for x in range(found):
+            c = colour[which[x]]
+            shares[x] = share_of_site[c]
+            coarsers[x] = everywhere * share_of_site[c] / sites[c]
+            sums[x] = 0.0
+        for reverse in range(SCALES - finest):
+            scale = SCALES - 1 - reverse
+            views, photons, by_colour = seen[scale], light[scale], coloured[scale]
+            _, high, wide = views.shape
+            narrow = 1 / float(BLOCK_PX << scale)
+            for x in range(found):
+                e = which[x]
+                c = colour[e]
+                row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
+                if scale == 0:  # a block is its own best estimate: nothing between centres
+                    own = CENTRE * CENTRE * weight[e]
+                    there = views[0, row // BLOCK_PX, col // BLOCK_PX] * sites[c]
+                    others = max(photons[0, row // BLOCK_PX, col // BLOCK_PX] - own, 0.0)
+                else:
+                    top, bottom, share_i, own_i = _between((float(row) + 0.5) * narrow, high)
+                    left, right, share_j, own_j = _between((float(col) + 0.5) * narrow, wide)
+                    own = own_i * own_j * weight[e]
+                    there = _at(views[0], top, bottom, share_i, left, right, share_j) * sites[c]
+                    others = max(_at(photons[0], top, bottom, share_i, left, right, share_j) - own, 0.0)
+                    if scale >= COLOUR_SCALE:
+                        same = max(_at(by_colour[c], top, bottom, share_i, left, right, share_j) - own, 0.0)
+                        shares[x] = (same + COLOUR_PRIOR * share_of_site[c]) / (others + COLOUR_PRIOR)
+                coarsers[x] = (others * shares[x] + prior * coarsers[x]) / max(there + prior, 1e-6)
+                sums[x] += coarsers[x] / SCALES
+                if scale == BASE_SCALE:
+                    widest[x] = max(coarsers[x], 1e-12)
+        for x in range(found):
+            rate[which[x]] = (1 - BASE_SHARE) * sums[x] + BASE_SHARE * widest[x]
+            base[which[x]] = widest[x]
+
+
+@helper
+def _predict_cells(
+    first: int,
+    last: int,
+    by_row: np.ndarray,
+    by_col: np.ndarray,
+    prior: float,
+    scales: tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float],
+    finest: int,
+    samples: np.ndarray,
+    mean: np.ndarray,
+    blurred: np.ndarray,
+) -> None:
+    """The `samples`, `mean` and `blurred` light (H, W) of the rows from `first` to `last`."""
+    seen, light, _, everywhere = scales
+    coarsers, sums = np.empty((2, mean.shape[1]), np.float64)
+    for a in range(first, last):
+        coarsers[:] = everywhere
+        sums[:] = 0.0
+        for reverse in range(SCALES - max(finest, 1)):
+            scale = SCALES - 1 - reverse
+            views, photons = seen[scale][0], light[scale][0]
+            high, wide = views.shape
+            share_of_cell = CELL_PX / float(BLOCK_PX << scale)
+            top, bottom, share_i, _ = _between((a + 0.5) * share_of_cell, high)
+            for b in range(coarsers.size):
+                left, right, share_j, _ = _between((b + 0.5) * share_of_cell, wide)
+                there = _at(views, top, bottom, share_i, left, right, share_j)
+                others = _at(photons, top, bottom, share_i, left, right, share_j)
+                coarsers[b] = (others + prior * coarsers[b]) / max(there + prior, 1e-6)
+                sums[b] += coarsers[b] / SCALES
+                if scale == BASE_SCALE:
+                    blurred[a, b] = coarsers[b]
+        views, photons = seen[0][0], light[0][0]
+        for b in range(coarsers.size):
+            samples[a, b] = (by_row[2 * a] + by_row[2 * a + 1]) * (by_col[2 * b] + by_col[2 * b + 1])
+            if samples[a, b] <= 0:
+                mean[a, b] = blurred[a, b] = 0.0
+                continue
+            if finest > 0:
+                continue
+            for u in range(2 * a, 2 * a + 2):
+                for v in range(2 * b, 2 * b + 2):
+                    if by_row[u] * by_col[v] > 0:
+                        block = (photons[u, v] + prior * coarsers[b]) / (views[u, v] + prior)
+                        sums[b] += block / (4 * SCALES)
+            mean[a, b] = (1 - BASE_SHARE) * sums[b] + BASE_SHARE * blurred[a, b]
+
+
+@helper
 def predict(
     k: np.ndarray,
     l: np.ndarray,
@@ -169,89 +339,60 @@ def predict(
     other events, and the same by the widest window alone, `base`. For cells: the views of all its blocks,
     `samples`; photons per block and view, `mean` and `blurred` likewise.
     """
-    H, W = size
     h, w = mean.shape
-    C = sites.size
-    share_of_site = sites / sites.sum()
-    counts = np.zeros((C, 2 * h, 2 * w), np.float32)
-    for e in range(k.size):
-        if cell[e] >= 0:
-            row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-            counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e] * weight[e]
-    by_row = _views_of_blocks(rows, H, 2 * h)
-    by_col = _views_of_blocks(cols, W, 2 * w)
-    views = np.empty((1, 2 * h, 2 * w), np.float32)
-    for a in range(2 * h):
-        for b in range(2 * w):
-            views[0, a, b] = by_row[a] * by_col[b] * share_seen[a // 2, b // 2]
-    totals = np.zeros((1, 2 * h, 2 * w), np.float32)
-    for c in range(C):
-        totals[0] += counts[c]
-    everywhere = totals.sum() / max(views.sum(), np.float32(1e-6))
-    seen = [_smoothed(views)]
-    light = [_smoothed(totals)]
-    coloured = [counts[:, :1, :1].copy()]  # finer than the colour scale no colour is smoothed on its own
-    for scale in range(1, SCALES):
-        counts, totals, views = _halved(counts), _halved(totals), _halved(views)
-        seen.append(_smoothed(views))
-        light.append(_smoothed(totals))
-        coloured.append(_smoothed(counts) if scale >= COLOUR_SCALE else counts[:, :1, :1].copy())
+    by_row = _views_of_blocks(rows, size[0], 2 * h)
+    by_col = _views_of_blocks(cols, size[1], 2 * w)
+    scales = _scales(
+        k, l, i, j, colour, n, weight, cell, rows, cols, by_row, by_col, sites.size, share_seen, 0
+    )
+    asked = np.ones(k.size, np.bool_)
+    _predict_events(
+        0, k.size, asked, k, l, i, j, colour, weight, cell, rows, cols, sites, prior, scales, 0, rate, base
+    )
+    _predict_cells(0, h, by_row, by_col, prior, scales, 0, samples, mean, blurred)
 
-    for e in range(k.size):
-        if cell[e] < 0:
-            rate[e] = base[e] = 0.0
-            continue
-        c = colour[e]
-        row, col = i[e] + rows[k[e]] + 0.5, j[e] + cols[l[e]] + 0.5
-        share = share_of_site[c]
-        coarser = everywhere * share / sites[c]
-        total = 0.0
-        widest = 0.0
-        for reverse in range(SCALES):
-            scale = SCALES - 1 - reverse
-            if scale == 0:  # a block is its own best estimate: nothing between centres
-                low_i, share_i, own_i = int(row) // BLOCK_PX, 0.0, CENTRE
-                low_j, share_j, own_j = int(col) // BLOCK_PX, 0.0, CENTRE
-            else:
-                width = float(BLOCK_PX << scale)
-                low_i, share_i, own_i = _between(row / width, light[scale].shape[1])
-                low_j, share_j, own_j = _between(col / width, light[scale].shape[2])
-            own = own_i * own_j * weight[e]
-            there = _at(seen[scale], 0, low_i, share_i, low_j, share_j) * sites[c]
-            others = max(_at(light[scale], 0, low_i, share_i, low_j, share_j) - own, 0.0)
-            if scale >= COLOUR_SCALE:
-                same = max(_at(coloured[scale], c, low_i, share_i, low_j, share_j) - own, 0.0)
-                share = (same + COLOUR_PRIOR * share_of_site[c]) / (others + COLOUR_PRIOR)
-            coarser = (others * share + prior * coarser) / max(there + prior, 1e-6)
-            total += coarser / SCALES
-            if scale == BASE_SCALE:
-                widest = max(coarser, 1e-12)
-        rate[e] = (1 - BASE_SHARE) * total + BASE_SHARE * widest
-        base[e] = widest
 
-    for a in range(h):
-        for b in range(w):
-            mean[a, b] = blurred[a, b] = 0.0
-            samples[a, b] = by_row[2 * a : 2 * a + 2].sum() * by_col[2 * b : 2 * b + 2].sum()
-            if samples[a, b] <= 0:
-                continue
-            coarser = everywhere
-            total = 0.0
-            for reverse in range(SCALES - 1):
-                scale = SCALES - 1 - reverse
-                width = float(BLOCK_PX << scale)
-                low_i, share_i, _ = _between((a + 0.5) * CELL_PX / width, light[scale].shape[1])
-                low_j, share_j, _ = _between((b + 0.5) * CELL_PX / width, light[scale].shape[2])
-                there = _at(seen[scale], 0, low_i, share_i, low_j, share_j)
-                others = _at(light[scale], 0, low_i, share_i, low_j, share_j)
-                coarser = (others + prior * coarser) / max(there + prior, 1e-6)
-                total += coarser / SCALES
-                if scale == BASE_SCALE:
-                    blurred[a, b] = coarser
-            for u in range(2):
-                for v in range(2):
-                    if by_row[2 * a + u] * by_col[2 * b + v] > 0:
-                        there = seen[0][0, 2 * a + u, 2 * b + v] + prior
-                        block = (light[0][0, 2 * a + u, 2 * b + v] + prior * coarser) / there
-                        total += block / (4 * SCALES)
-            mean[a, b] = (1 - BASE_SHARE) * total + BASE_SHARE * blurred[a, b]
+@compiled
+def predict_shared(
+    parts: int,
+    asked: np.ndarray,
+    finest: int,
+    k: np.ndarray,
+    l: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    n: np.ndarray,
+    weight: np.ndarray,
+    cell: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    size: tuple[int, int],
+    sites: np.ndarray,
+    share_seen: np.ndarray,
+    prior: float,
+    rate: np.ndarray,
+    base: np.ndarray,
+    samples: np.ndarray,
+    mean: np.ndarray,
+    blurred: np.ndarray,
+) -> None:
+    """The same, shared among threads in so many `parts`, for those events alone that are `asked` for (N,).
+
+    With `finest` = BASE_SCALE the widest window alone is looked at: `base` and `blurred` are right, `rate`
+    and `mean` mean nothing.
+    """
+    h, w = mean.shape
+    by_row = _views_of_blocks(rows, size[0], 2 * h)
+    by_col = _views_of_blocks(cols, size[1], 2 * w)
+    scales = _scales(
+        k, l, i, j, colour, n, weight, cell, rows, cols, by_row, by_col, sites.size, share_seen, finest
+    )
+    for part in nb.prange(parts):
+        this, beyond = k.size * part // parts, k.size * (part + 1) // parts
+        _predict_events(
+            this, beyond, asked, k, l, i, j, colour, weight, cell,
+            rows, cols, sites, prior, scales, finest, rate, base,
+        )  # fmt: skip
+        top, bottom = h * part // parts, h * (part + 1) // parts
+        _predict_cells(top, bottom, by_row, by_col, prior, scales, finest, samples, mean, blurred)

@@ -5,11 +5,12 @@ import pytest
 from twins import bayer_photons, blocky_texture, intersection_over_union, patch_views, unit_grid
 
 from pcii import PhotonCounts, layer_kernels, layer_search, layers, segment
+from pcii.bayer import sites_of_colours
 from pcii.cells import CELL_PX
 from pcii.geometry import disparity_spread_px
 from pcii.layer_search import layered
 from pcii.outline_kernels import least_outline, shorten_outline
-from pcii.prediction_kernels import land, predict
+from pcii.prediction_kernels import BASE_SCALE, land, predict, predict_shared
 
 GRID = unit_grid(7, 7, 256, 256)
 CARD_DISPARITY, BAR_DISPARITY = 4, 8
@@ -227,25 +228,43 @@ def test_who_hides_what_is_counted_as_pixel_by_pixel():
     # Shifts of every remainder, and one by which nothing is seen.
     rng = np.random.default_rng(3)
     V, (h, w), rows, cols = 6, (7, 5), np.array([-11, 2]), np.array([8, 1, -33])
-    mask, light = (rng.random((h, w)) < 0.5).astype(np.float32), rng.random((h, w)).astype(np.float32)
-    mask[:2] = 0
-    before = rng.integers(0, 2, (V, h, w)).astype(np.float32)
+    mask, light = rng.random((h, w)) < 0.5, rng.random((h, w)).astype(np.float32)
+    mask[:2] = mask[:, 4] = False
+    before = rng.integers(0, 24, (V, h, w)).astype(np.uint16)
     behind = rng.random((V, h, w)).astype(np.float32)
     shifts = list(itertools.product(rows, cols))
-    total = np.ones((h, w), np.float32)
-    layer_kernels.from_views(behind, rows, cols, total)
-    expected = sum(moved(behind[v], -down, -right) for v, (down, right) in enumerate(shifts))
-    np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6)
+    seen = 1 - np.minimum(before / CELL_PX**2, 1)
+    views, through = np.ones((2, h, w), np.float32)
+    layer_kernels.views_of(before, rows, cols, views)
+    layer_kernels.light_of(behind, before, rows, cols, through)
+    for total, each in ((views, seen), (through, seen * behind)):
+        expected = sum(moved(each[v], -down, -right) for v, (down, right) in enumerate(shifts))
+        np.testing.assert_allclose(total, expected, rtol=1e-5, atol=1e-6)
     covered, painted = before.copy(), behind.copy()
     layer_kernels.cover(mask, rows, cols, 1, covered)
     layer_kernels.paint(mask, light, rows, cols, painted)
     for v, (down, right) in enumerate(shifts):
         share = moved(mask, down, right)
-        np.testing.assert_array_equal(covered[v], before[v] + share)
+        np.testing.assert_array_equal(covered[v], before[v] + CELL_PX**2 * share)
         own = moved(mask * light, down, right)
         np.testing.assert_allclose(painted[v], behind[v] * (1 - share) + own, rtol=1e-5, atol=1e-6)
     layer_kernels.cover(mask, rows, cols, -1, covered)
     np.testing.assert_array_equal(covered, before)
+    layer_kernels.cover(np.zeros_like(mask), rows, cols, 1, covered)
+    layer_kernels.paint(np.zeros_like(mask), light, rows, cols, painted)
+    np.testing.assert_array_equal(covered, before)
+
+
+@pytest.mark.parametrize("height", [1, 15, 16, 17, 33])
+def test_films_of_any_height_are_added_up_in_bands(height):
+    rng = np.random.default_rng(7)
+    rows, cols = np.array([-37, -2, 0, 5]), np.array([0, 3])
+    covered = rng.integers(0, 20, (8, height, 4)).astype(np.uint16)
+    views = np.ones((height, 4), np.float32)
+    layer_kernels.views_of(covered, rows, cols, views)
+    seen = 1 - np.minimum(covered / CELL_PX**2, 1)
+    each = [moved(seen[v], -down, -right) for v, (down, right) in enumerate(itertools.product(rows, cols))]
+    np.testing.assert_allclose(views, np.sum(each, axis=0), rtol=1e-5, atol=1e-6)
 
 
 def test_all_light_of_the_views_is_gathered_somewhere():
@@ -283,6 +302,50 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
         assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
     # A hidden event is predicted, too, and takes no part in it: those beside it are all alike.
     assert abs(own[hidden].mean() / rate - 1) < 0.02
+
+
+def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
+    counts = bar_before_card(40)
+    events, (K, L, H, W) = counts.events, counts.grid.shape_KLHW
+    N, (h, w), rng = events.n.size, (H // CELL_PX, W // CELL_PX), np.random.default_rng(4)
+    rows, cols = 19 * np.arange(K, dtype=np.int32) - 50, 2 * np.arange(L, dtype=np.int32) - 5
+    where = events.k, events.l, events.i, events.j
+    cell = np.zeros(N, np.int32)
+    land(*where, rows, cols, (H, W), cell)
+    assert (cell < 0).any()
+    weight, seen = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
+    colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)
+    about = *where, colours, n, weight, cell, rows, cols, (H, W), sites, seen, 1.0
+
+    def outputs():
+        return (*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
+
+    whole = outputs()
+    predict(*about, *whole)
+    asked = rng.random(N) < 0.5
+    for parts in (1, 3):
+        rate, base, samples, mean, blurred = outputs()
+        predict_shared(parts, asked, 0, *about, rate, base, samples, mean, blurred)
+        for found, expected in ((rate, whole[0]), (base, whole[1])):
+            np.testing.assert_array_equal(found, np.where(asked, expected, -1))
+        for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
+            np.testing.assert_array_equal(found, expected)
+        rate, base, samples, mean, blurred = outputs()
+        predict_shared(parts, asked, BASE_SCALE, *about, rate, base, samples, mean, blurred)
+        np.testing.assert_array_equal(base, np.where(asked, whole[1], -1))
+        np.testing.assert_array_equal(blurred, whole[4])
+
+
+def test_energy_hangs_on_the_masks_alone():
+    # Most events are predicted by one layer only: what was predicted of them before must not come in.
+    found = layers.Layers(bar_before_card(100), SPREAD_PX, (1e-4, 1e-3))
+    card, bar = truth()
+    found.put(np.stack([cells_of(card | bar), cells_of(bar)]))
+    energy = found.energy()
+    for stale in (found.rate, found.base, found.light, found.blurred, found.free):
+        stale[:] = np.nan
+    np.testing.assert_array_equal(found.energy(), energy)
+    assert np.isfinite(energy).all()
 
 
 def test_going_on_is_as_good_as_more_steps_at_once():
