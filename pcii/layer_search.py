@@ -18,7 +18,7 @@ from pcii.cells import CELL_PX
 from pcii.foreground import box_around, connected_pieces, dilated
 from pcii.geometry import whole_shifts_px
 from pcii.layers import AREA_NATS, BESIDE_SHARE, LENGTH_NATS, STEPS, Layers, dark_of
-from pcii.photon_counts import PhotonCounts
+from pcii.photon_counts import PhotonCounts, drawn
 from pcii.types import CameraGrid
 
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
@@ -56,10 +56,11 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
     lit = np.max(starts, axis=0) >= 0
     if not lit.any():
         return starts[0]
-    drawn = _drawn(counts)
-    dark = dark_of(drawn, float(spread_px[len(spread_px) // 2]))
-    box = _box_of_light(lit, drawn.grid, spread_px)
-    cut = _cut_out(drawn, box)
+    grid = counts.grid
+    few = drawn(counts, max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width))
+    dark = dark_of(few, float(spread_px[len(spread_px) // 2]))
+    box = _box_of_light(lit, grid, spread_px)
+    cut = _cut_out(few, box)
     layers = Layers(cut, spread_px, dark)
     different: list[np.ndarray] = []
     for start in starts:
@@ -94,19 +95,6 @@ def _cut_out(counts: PhotonCounts, box: tuple[slice, slice]) -> PhotonCounts:
     inside = (events.i >= top) & (events.i < bottom) & (events.j >= left) & (events.j < right)
     k, l, i, j, n = (getattr(events, name)[inside] for name in "klijn")
     return PhotonCounts.from_events(k, l, i - top, j - left, n, film, cfa=counts.cfa)
-
-
-def _drawn(counts: PhotonCounts) -> PhotonCounts:
-    """The counts, or where there are many photons a fair draw of them (always the same)."""
-    events, grid = counts.events, counts.grid
-    most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
-    share = most / max(float(events.n.sum()), 1.0)
-    if share >= 1:
-        return counts
-    n = np.random.default_rng(0).binomial(events.n.astype(np.int64), share)
-    kept = n > 0
-    k, l, i, j = (getattr(events, name)[kept] for name in "klij")
-    return PhotonCounts.from_events(k, l, i, j, n[kept], grid, cfa=counts.cfa)
 
 
 def _settled(layers: Layers, start: np.ndarray) -> tuple[float, np.ndarray]:

@@ -151,6 +151,17 @@ class PhotonCounts:
         return channel_count(self.cfa)
 
 
+def drawn(counts: PhotonCounts, most: float) -> PhotonCounts:
+    """About `most` of the photons, fairly drawn and always the same; the counts if there are no more."""
+    if counts.total <= most:
+        return counts
+    events = counts.events
+    n = np.random.default_rng(0).binomial(events.n, most / counts.total)
+    kept = n > 0
+    where = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
+    return PhotonCounts(counts.grid, counts.cfa, _events=_events(where, n[kept]))
+
+
 def check_depth_counts(value: object) -> None:
     """Raise `InputError` unless `value` is `PhotonCounts` of at least two views, which depth needs."""
     if not isinstance(value, PhotonCounts):

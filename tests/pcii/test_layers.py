@@ -197,22 +197,6 @@ def test_tiny_films_have_an_answer(size, cfa):
     assert np.isin(seen, [-1, 0, 1]).all()
 
 
-def test_many_photons_are_drawn_from_fairly_and_always_alike():
-    counts = bar_before_card(20_000)
-    drawn = layer_search._drawn(counts)
-    n, kept = counts.events.n.sum(), drawn.events.n.sum()
-    most = layer_search.MOST_PHOTONS
-    assert n > 3 * most
-    assert abs(kept - most) < 5 * np.sqrt(most)
-    # Views keep their shares: chi square of 48 degrees of freedom, 5 deviations of its mean of 48.
-    views = np.bincount(counts.events.k * 7 + counts.events.l, counts.events.n, 49) * kept / n
-    chi2 = ((np.bincount(drawn.events.k * 7 + drawn.events.l, drawn.events.n, 49) - views) ** 2 / views).sum()
-    assert chi2 < 48 + 5 * np.sqrt(96)
-    np.testing.assert_array_equal(drawn.events.n, layer_search._drawn(counts).events.n)
-    few = bar_before_card(50)
-    assert layer_search._drawn(few) is few
-
-
 def moved(cells: np.ndarray, down: int, right: int) -> np.ndarray:
     """Cells (h, w) of what is seen at (i, j) and belongs to (i + down, j + right), pixel by pixel; else 0."""
     pixels = cells.repeat(CELL_PX, axis=0).repeat(CELL_PX, axis=1).astype(np.float64)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from twins import unit_grid
 
 from pcii.errors import InputError
-from pcii.photon_counts import PhotonCounts
+from pcii.photon_counts import PhotonCounts, drawn
 from pcii.reconstruct import reconstruct
 
 
@@ -142,3 +142,24 @@ def test_a_camera_that_is_not_there_has_no_view(where):
     for counts in (dense, sparse):
         with pytest.raises(InputError, match="no camera"):
             counts.view(*where)
+
+
+def test_photons_are_drawn_fairly_and_always_alike() -> None:
+    grid, rng = unit_grid(7, 7, 32, 32), np.random.default_rng(6)
+    many = rng.poisson(rng.uniform(0, 4, 49)[:, None], (49, 1024)).reshape(grid.shape_KLHW)
+    counts = PhotonCounts.from_dense(many, grid, cfa="GRBG")
+    most = counts.total / 5
+    few = drawn(counts, most)
+    assert (few.grid, few.cfa) == (grid, "GRBG")
+    assert abs(few.total - most) < 5 * np.sqrt(most)
+    kept = np.stack([few.view(k, l) for k in range(7) for l in range(7)]).reshape(many.shape)
+    assert (kept <= many).all()
+    # Views keep their shares: chi square of 48 degrees of freedom, 5 deviations of its mean of 48.
+    by_view, expected = kept.sum(axis=(2, 3)), many.sum(axis=(2, 3)) / 5
+    chi2 = ((by_view - expected) ** 2 / (0.8 * expected)).sum()
+    assert 48 - 5 * np.sqrt(96) < chi2 < 48 + 5 * np.sqrt(96)
+    again = PhotonCounts.from_events(*(getattr(few.events, name) for name in "klijn"), grid, cfa="GRBG")
+    for name in "klijn":
+        np.testing.assert_array_equal(getattr(few.events, name), getattr(again.events, name))
+        np.testing.assert_array_equal(getattr(few.events, name), getattr(drawn(counts, most).events, name))
+    assert drawn(counts, counts.total) is counts
