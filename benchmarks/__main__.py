@@ -1,6 +1,6 @@
 """Print the tables; `make bench` calls this, with names of tables for some of them.
 
-Without names all but "removal", which takes hours (see there for how to make it smaller).
+Without names all but "removal", which takes days (see there for how to make it smaller).
 """
 
 import sys

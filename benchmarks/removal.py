@@ -1,6 +1,6 @@
 """Removal of defocused points by every method: the scenes of corpus.toml, many seeds, many photon budgets.
 
-At full size this takes hours. Environment variables make it smaller or share it:
+At full size this takes a day or two. Environment variables make it smaller or share it:
 
 BENCH_SEEDS    datasets of each scene, 20
 BENCH_BUDGETS  photons per view, "30 100 300 1000 3000 10000 300000", the last of which stands for full light;

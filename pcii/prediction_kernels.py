@@ -25,8 +25,8 @@ BASE_SCALE = 4
 """What a plane that shows nothing of its own would predict: the rate smoothed over 32 px."""
 BASE_SHARE = 0.05
 """Least share of the base in a prediction, so that a single photon in the dark cannot decide."""
-
 AT_ONCE = 512
+"""Events that are taken through the scales together."""
 
 # Smoothing is by the binomial weights 1/4, 1/2, 1/4 along both axes, then linear between centres.
 CENTRE, SIDE = 0.5, 0.25
