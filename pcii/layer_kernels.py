@@ -21,32 +21,30 @@ BAND = 16
 
 
 @helper
-def _add_times(weight: np.float32 | np.uint16, source: np.ndarray, cells: int, line: np.ndarray) -> None:
-    """Adds `weight` times a row (W,), moved by whole `cells`, to a `line` (W,)."""
-    first, last = max(0, -cells), max(0, min(line.size, source.size - cells))
-    # Slices, so that the compiler sees that all of it exists and takes several at a time.
-    there, part = source[first + cells : last + cells], line[first:last]
-    for j in range(part.size):
-        part[j] += weight * there[j]
+def _add_row(source: np.ndarray, right: int, times: float, line: np.ndarray) -> None:
+    """Adds a row of cells (W,), moved by `right` px, to a `line` (W,): `times` for each column of px."""
+    for x in range(2):
+        cells, wide = right // CELL_PX + x, right % CELL_PX if x else CELL_PX - right % CELL_PX
+        if wide > 0:
+            first, last = max(0, -cells), max(0, min(line.size, source.size - cells))
+            # Slices, so that the compiler sees that all of it exists and takes several at a time.
+            there, part = source[first + cells : last + cells], line[first:last]
+            weight = line.dtype.type(times * wide)
+            for j in range(part.size):
+                part[j] += weight * there[j]
 
 
 @helper
-def _add_row(source: np.ndarray, right: int, share: float, line: np.ndarray) -> None:
-    """Adds `share` times a row of cells (W,), moved by `right` px, to a `line` (W,) of cells."""
-    b, q = right // CELL_PX, right % CELL_PX
-    _add_times(np.float32(share * (CELL_PX - q) / CELL_PX), source, b, line)
-    if q > 0:
-        _add_times(np.float32(share * q / CELL_PX), source, b + 1, line)
+def _add_moved(values: np.ndarray, down: int, right: int, row: int, times: float, line: np.ndarray) -> None:
+    """Adds what `values` (H, W), moved by `down` and `right` px, show in a `row` to its `line` (W,).
 
-
-@helper
-def _add_moved(values: np.ndarray, down: int, right: int, row: int, line: np.ndarray) -> None:
-    """Adds to `line` (W,) what `values` (H, W) show there: cells of `row`, moved by `down` and `right` px."""
+    `times` for each px that a cell shows of another.
+    """
     a, p = row + down // CELL_PX, down % CELL_PX
     for u in range(2):
-        share = (p if u else CELL_PX - p) / CELL_PX
-        if share > 0 and 0 <= a + u < values.shape[0]:
-            _add_row(values[a + u], right, share, line)
+        high = p if u else CELL_PX - p
+        if high > 0 and 0 <= a + u < values.shape[0]:
+            _add_row(values[a + u], right, times * high, line)
 
 
 @helper
@@ -69,13 +67,6 @@ def _seen(first: int, last: int, moved: int, size: int) -> tuple[int, int]:
 
 
 @helper
-def _rows_under(top: int, size: int, down: int, height: int) -> tuple[int, int]:
-    """First and last row + 1 of a view that show any of `size` rows from `top` on, moved by `down` px."""
-    first = top + down // CELL_PX
-    return max(0, first), max(0, min(height, first + size + 1))
-
-
-@helper
 def _open(covered: np.ndarray, share: np.ndarray) -> None:
     """The `share` (W,) of each cell that is not `covered` (W,)."""
     for j in range(share.size):
@@ -84,13 +75,33 @@ def _open(covered: np.ndarray, share: np.ndarray) -> None:
 
 
 @helper
-def _add_to_band(source: np.ndarray, row: int, down: int, right: int, band: np.ndarray) -> None:
-    """Adds what a view's `row` (W,), counted from the band's first, shows to the rows (n, W) of a band."""
-    a, p = row - down // CELL_PX, down % CELL_PX
-    if 0 <= a - 1 < band.shape[0] and p > 0:
-        _add_row(source, right, p / CELL_PX, band[a - 1])
-    if 0 <= a < band.shape[0]:
-        _add_row(source, right, (CELL_PX - p) / CELL_PX, band[a])
+def _look_through(
+    covered: np.ndarray,
+    behind: np.ndarray | None,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    top: int,
+    band: np.ndarray,
+) -> None:
+    """What all views see past what is `covered` (V, H, W) from the row `top` on: `band` (n, W), overwritten.
+
+    Of what is `behind` (V, H, W), or themselves if that is not given.
+    """
+    V, H, W = covered.shape
+    seen = np.empty(W, np.float32)
+    band[:] = 0
+    for v in range(V):
+        down, right = rows[v // cols.size], -cols[v % cols.size]
+        for row in range(*_seen(top, top + band.shape[0], down, H)):
+            _open(covered[v, row], seen)
+            if behind is not None:
+                light = behind[v, row]
+                for j in range(W):
+                    seen[j] *= light[j]
+            for u in range(2):  # the row lies over two of the layer's
+                at, high = row + down // CELL_PX + u - top, down % CELL_PX if u else CELL_PX - down % CELL_PX
+                if high > 0 and 0 <= at < band.shape[0]:
+                    _add_row(seen, right, high / PARTS, band[at])
 
 
 @compiled
@@ -101,16 +112,10 @@ def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, cover
     cells = mask[top:bottom, left:right].astype(np.uint16)
     for view in nb.prange(covered.shape[0]):
         v = np.int64(view)
-        down, over = rows[v // cols.size], cols[v % cols.size]
+        # What is cut out lies that much nearer to the frame.
+        down, over = rows[v // cols.size], cols[v % cols.size] - left * CELL_PX
         for i in range(*_seen(top, bottom, down, H)):
-            for u in range(2):
-                a, high = i + down // CELL_PX + u - top, down % CELL_PX if u else CELL_PX - down % CELL_PX
-                if high == 0 or a < 0 or a >= cells.shape[0]:
-                    continue
-                for x in range(2):
-                    wide = over % CELL_PX if x else CELL_PX - over % CELL_PX
-                    moved = over // CELL_PX + x - left
-                    _add_times(np.uint16(step * high * wide), cells[a], moved, covered[v, i])
+            _add_moved(cells, down - top * CELL_PX, over, i, step, covered[v, i])
 
 
 @compiled
@@ -127,13 +132,12 @@ def paint(
         down, over = rows[v // cols.size], cols[v % cols.size]
         first, last = _seen(left, right, over, W)
         own, share = np.empty(last - first, np.float32), np.empty(last - first, np.float32)
-        # What is cut out lies that much nearer to the frame.
         moved = over + (first - left) * CELL_PX
         for i in range(*_seen(top, bottom, down, H)):
             own[:] = 0
             share[:] = 0
-            _add_moved(shown, down - top * CELL_PX, moved, i, own)
-            _add_moved(there, down - top * CELL_PX, moved, i, share)
+            _add_moved(shown, down - top * CELL_PX, moved, i, 1 / PARTS, own)
+            _add_moved(there, down - top * CELL_PX, moved, i, 1 / PARTS, share)
             line = behind[v, i, first:last]
             for j in range(line.size):
                 line[j] = line[j] * (1 - share[j]) + own[j]
@@ -142,16 +146,9 @@ def paint(
 @compiled
 def views_of(covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray) -> None:
     """How many views see a layer's cells past what is `covered` (V, H, W): `total` (H, W), overwritten."""
-    V, H, W = covered.shape
-    for part in nb.prange((H + BAND - 1) // BAND):
+    for part in nb.prange((total.shape[0] + BAND - 1) // BAND):
         top = int(np.int64(part) * BAND)
-        band, seen = total[top : top + BAND], np.empty(W, np.float32)
-        band[:] = 0
-        for v in range(V):
-            down, right = -rows[v // cols.size], -cols[v % cols.size]
-            for row in range(*_rows_under(top, band.shape[0], down, H)):
-                _open(covered[v, row], seen)
-                _add_to_band(seen, row - top, down, right, band)
+        _look_through(covered, None, rows, cols, top, total[top : top + BAND])
 
 
 @compiled
@@ -159,19 +156,9 @@ def light_of(
     behind: np.ndarray, covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray
 ) -> None:
     """What they see there of what is `behind` (V, H, W), all views together: `total` (H, W), overwritten."""
-    V, H, W = covered.shape
-    for part in nb.prange((H + BAND - 1) // BAND):
+    for part in nb.prange((total.shape[0] + BAND - 1) // BAND):
         top = int(np.int64(part) * BAND)
-        band, seen = total[top : top + BAND], np.empty(W, np.float32)
-        band[:] = 0
-        for v in range(V):
-            down, right = -rows[v // cols.size], -cols[v % cols.size]
-            for row in range(*_rows_under(top, band.shape[0], down, H)):
-                _open(covered[v, row], seen)
-                light = behind[v, row]
-                for j in range(W):
-                    seen[j] *= light[j]
-                _add_to_band(seen, row - top, down, right, band)
+        _look_through(covered, behind, rows, cols, top, total[top : top + BAND])
 
 
 @compiled
