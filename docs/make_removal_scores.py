@@ -127,17 +127,25 @@ def scores(groups: list[Group], entries: Mapping[str, Entry]) -> Table:
     return Table("", header, tuple(rows), words=4)
 
 
-def times(groups: list[Group]) -> Table:
-    """Mean IoU and seconds over all scenes, by method and photons per view."""
-    found = defaultdict[tuple[str, float], list[tuple[float, float]]](list)
+def mean_scores(groups: list[Group]) -> dict[str, np.ndarray]:
+    """Photons per view, mean IoU and mean seconds (3, B) of each method over all scenes."""
+    found = defaultdict[str, dict[float, list[tuple[float, float]]]](lambda: defaultdict(list))
     for group in groups:
         for method, budget, iou, seconds in measured(group):
-            found[method, budget].append((iou, seconds))
-    budgets, rows = budgets_of(groups), []
-    for method in sorted({method for method, _ in found}):
-        means = [np.mean(found[method, budget], axis=0) for budget in budgets]
-        rows.append((method, *(f"{iou:.2f}, {seconds:.1f} s" for iou, seconds in means)))
-    return Table("", ("method", *(f"{budget:g}" for budget in budgets)), tuple(rows))
+            found[method][budget].append((iou, seconds))
+    return {
+        method: np.array([(budget, *np.mean(own[budget], axis=0)) for budget in sorted(own)]).T
+        for method, own in sorted(found.items())
+    }
+
+
+def times(groups: list[Group]) -> Table:
+    """Mean IoU and seconds over all scenes, by method and photons per view."""
+    rows = [
+        (method, *(f"{iou:.2f}, {seconds:.1f} s" for _, iou, seconds in means.T))
+        for method, means in mean_scores(groups).items()
+    ]
+    return Table("", ("method", *(f"{budget:g}" for budget in budgets_of(groups))), tuple(rows))
 
 
 def depths(groups: list[Group]) -> Table:
@@ -172,16 +180,9 @@ def falls(groups: list[Group]) -> Iterator[str]:
 def draw(groups: list[Group], entries: Mapping[str, Entry], file: Path) -> None:
     """Mean IoU of each kind against photons (above) and against seconds (below)."""
     figure, axes = plt.subplots(2, len(KINDS), figsize=(12, 5.6), sharey=True, layout="constrained")
-    methods = sorted({method for group in groups for method, _, _, _ in measured(group)})
     for column, kind in enumerate(KINDS):
-        found = defaultdict[tuple[str, float], list[tuple[float, float]]](list)
-        for group in groups:
-            if entries[group["title"]].kind == kind:
-                for method, budget, iou, seconds in measured(group):
-                    found[method, budget].append((iou, seconds))
-        for number, method in enumerate(methods):
-            budgets = sorted(budget for name, budget in found if name == method)
-            iou, seconds = np.array([np.mean(found[method, budget], axis=0) for budget in budgets]).T
+        own = [group for group in groups if entries[group["title"]].kind == kind]
+        for number, (method, (budgets, iou, seconds)) in enumerate(mean_scores(own).items()):
             style = {"color": COLOURS[number], "marker": MARKERS[number], "markersize": 4, "linewidth": 1.3}
             axes[0, column].plot(budgets, iou, label=method, **style)
             axes[1, column].plot(seconds, iou, **style)
