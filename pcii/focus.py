@@ -101,10 +101,9 @@ def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[F
         own_cell, own_rate, base = np.empty(N, np.int32), np.empty(N, np.float32), np.empty(N, np.float32)
         samples, mean, blurred = np.empty((3, h, w), np.float32)
         land(*place, rows[z], cols[z], film, own_cell)
-        predict(
-            *place, counts.event_colours, n, believed, own_cell,
-            rows[z], cols[z], film, sites, everywhere, 0.0, own_rate, base, samples, mean, blurred,
-        )  # fmt: skip
+        seen = (*place, counts.event_colours, n, believed, own_cell)
+        section = (rows[z], cols[z], *film, sites, everywhere, 0.0)
+        predict(seen, section, (own_rate, base, samples, mean, blurred))
         gain[z] = samples * (blurred - mean)
         kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, gain[z], photons[z])
         if keep:

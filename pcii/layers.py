@@ -227,12 +227,17 @@ class Layers:
             weight *= share.ravel()[np.maximum(cell, 0)]
         if asked is None:
             asked = np.ones(self.n.size, dtype=bool)
-        predict_shared(
-            threads(), asked, BASE_SCALE if blurred else 0,
-            *self.place, self.colours, self.n, weight, self.cells[layer],
-            self.rows[layer], self.cols[layer], self.film, self.sites, seen.astype(np.float32), PRIOR_SAMPLES,
-            self.rate, self.base, self.samples, self.light, self.blurred,
-        )  # fmt: skip
+        events = (*self.place, self.colours, self.n, weight, self.cells[layer])
+        section = (
+            self.rows[layer],
+            self.cols[layer],
+            *self.film,
+            self.sites,
+            seen.astype(np.float32),
+            PRIOR_SAMPLES,
+        )
+        told = (self.rate, self.base, self.samples, self.light, self.blurred)
+        predict_shared(threads(), asked, BASE_SCALE if blurred else 0, events, section, told)
         for light in (self.light, self.blurred):
             light *= 4  # from blocks to cells
 

@@ -32,6 +32,22 @@ AT_ONCE = 512
 CENTRE, SIDE = 0.5, 0.25
 
 
+Events = tuple[np.ndarray, ...]
+"""Pixels that caught photons, (N,) each: camera k, l and pixel i, j; colour; number of photons; weight, 0 to
+1, how far they are believed; cell, see `land`."""
+Section = tuple[np.ndarray, np.ndarray, int, int, np.ndarray, np.ndarray, float]
+"""A depth, and what is believed there: whole shifts of the rows (K,) and columns (L,) of cameras; height and
+width of the film in px; sites (C,) of each colour in a block; of the views that cover a cell the share that
+is believed (H, W); how many samples a coarser scale is worth."""
+Predicted = tuple[np.ndarray, ...]
+"""What a section says, overwritten. Of events: rate, photons per sample of its pixel by all other events, and
+base, the same by the widest window alone. Of cells: samples, the views of all its blocks; mean, photons per
+block and view, and blurred, the same by the widest window alone."""
+Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
+"""A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
+how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks."""
+
+
 @helper
 def _smoothed(values: np.ndarray) -> np.ndarray:
     """Each plane of (C, H, W) smoothed along both axes; nothing comes in across borders."""
@@ -146,25 +162,13 @@ def land(
 
 
 @helper
-def _scales(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-    weight: np.ndarray,
-    cell: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    by_row: np.ndarray,
-    by_col: np.ndarray,
-    colours: int,
-    share_seen: np.ndarray,
-    finest: int,
-) -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float]:
-    """Views and photons (1, H, W), photons by colour (C, H, W), smoothed, at each scale; the mean rate."""
-    counts = np.zeros((colours, by_row.size, by_col.size), np.float32)
+def _scales(events: Events, section: Section, finest: int) -> Scales:
+    """The section at the scales from the `finest` on."""
+    k, l, i, j, colour, n, weight, cell = events
+    rows, cols, H, W, sites, share_seen, _ = section
+    h, w = share_seen.shape
+    by_row, by_col = _views_of_blocks(rows, H, 2 * h), _views_of_blocks(cols, W, 2 * w)
+    counts = np.zeros((sites.size, by_row.size, by_col.size), np.float32)
     for e in range(k.size):
         if cell[e] >= 0:
             row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
@@ -174,7 +178,7 @@ def _scales(
         for b in range(by_col.size):
             views[0, a, b] = by_row[a] * by_col[b] * share_seen[a // 2, b // 2]
     totals = np.zeros((1, by_row.size, by_col.size), np.float32)
-    for c in range(colours):
+    for c in range(sites.size):
         totals[0] += counts[c]
     everywhere = totals.sum() / max(views.sum(), np.float32(1e-6))
     seen, light, coloured = [], [], []
@@ -186,7 +190,7 @@ def _scales(
         seen.append(_smoothed(views if whole else views[:, :1, :1].copy()))
         light.append(_smoothed(totals if whole else totals[:, :1, :1].copy()))
         coloured.append(_smoothed(counts if by_colour else counts[:, :1, :1].copy()))
-    return seen, light, coloured, everywhere
+    return seen, light, coloured, everywhere, by_row, by_col
 
 
 @helper
@@ -194,24 +198,17 @@ def _predict_events(
     first: int,
     last: int,
     asked: np.ndarray,
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    weight: np.ndarray,
-    cell: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    sites: np.ndarray,
-    prior: float,
-    scales: tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float],
     finest: int,
-    rate: np.ndarray,
-    base: np.ndarray,
+    events: Events,
+    section: Section,
+    scales: Scales,
+    told: Predicted,
 ) -> None:
-    """The `rate` and `base` (N,) of those events from `first` to `last` that are `asked` for (N,)."""
-    seen, light, coloured, everywhere = scales
+    """The `rate` and `base` of those events from `first` to `last` that are `asked` for (N,)."""
+    k, l, i, j, colour, _, weight, cell = events
+    rows, cols, _, _, sites, _, prior = section
+    seen, light, coloured, everywhere, _, _ = scales
+    rate, base, _, _, _ = told
     share_of_site = sites / sites.sum()
     # Scale by scale for some events at a time: to take an array from a list costs as much as to look one up.
     which = np.empty(AT_ONCE, np.int64)
@@ -261,19 +258,12 @@ def _predict_events(
 
 @helper
 def _predict_cells(
-    first: int,
-    last: int,
-    by_row: np.ndarray,
-    by_col: np.ndarray,
-    prior: float,
-    scales: tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float],
-    finest: int,
-    samples: np.ndarray,
-    mean: np.ndarray,
-    blurred: np.ndarray,
+    first: int, last: int, finest: int, section: Section, scales: Scales, told: Predicted
 ) -> None:
-    """The `samples`, `mean` and `blurred` light (H, W) of the rows from `first` to `last`."""
-    seen, light, _, everywhere = scales
+    """The `samples`, `mean` and `blurred` light of the rows from `first` to `last`."""
+    prior = section[6]
+    seen, light, _, everywhere, by_row, by_col = scales
+    _, _, samples, mean, blurred = told
     coarsers, sums = np.empty((2, mean.shape[1]), np.float64)
     for a in range(first, last):
         coarsers[:] = everywhere
@@ -309,90 +299,27 @@ def _predict_cells(
 
 
 @helper
-def predict(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-    weight: np.ndarray,
-    cell: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    size: tuple[int, int],
-    sites: np.ndarray,
-    share_seen: np.ndarray,
-    prior: float,
-    rate: np.ndarray,
-    base: np.ndarray,
-    samples: np.ndarray,
-    mean: np.ndarray,
-    blurred: np.ndarray,
-) -> None:
-    """What a section says of every event and cell; all outputs are overwritten. One thread's part.
-
-    Events (N,) with their `colour`, number `n`, `weight` (0 to 1, how far they are believed) and `cell` (see
-    `land`); whole shifts `rows` (K,) and `cols` (L,); `size` of the film in px; `sites` (C,) of each colour
-    in a block; `share_seen` (H, W), of the views that cover a cell the share that is believed; `prior`, how
-    many samples a coarser scale is worth. For events: the `rate`, photons per sample of its pixel by all
-    other events, and the same by the widest window alone, `base`. For cells: the views of all its blocks,
-    `samples`; photons per block and view, `mean` and `blurred` likewise.
-    """
-    h, w = mean.shape
-    by_row = _views_of_blocks(rows, size[0], 2 * h)
-    by_col = _views_of_blocks(cols, size[1], 2 * w)
-    scales = _scales(
-        k, l, i, j, colour, n, weight, cell, rows, cols, by_row, by_col, sites.size, share_seen, 0
-    )
-    asked = np.ones(k.size, np.bool_)
-    _predict_events(
-        0, k.size, asked, k, l, i, j, colour, weight, cell, rows, cols, sites, prior, scales, 0, rate, base
-    )
-    _predict_cells(0, h, by_row, by_col, prior, scales, 0, samples, mean, blurred)
+def predict(events: Events, section: Section, told: Predicted) -> None:
+    """What a section says of every event and cell. One thread's part."""
+    N, h = events[0].size, told[3].shape[0]
+    scales = _scales(events, section, 0)
+    _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, told)
+    _predict_cells(0, h, 0, section, scales, told)
 
 
 @compiled
 def predict_shared(
-    parts: int,
-    asked: np.ndarray,
-    finest: int,
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-    weight: np.ndarray,
-    cell: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    size: tuple[int, int],
-    sites: np.ndarray,
-    share_seen: np.ndarray,
-    prior: float,
-    rate: np.ndarray,
-    base: np.ndarray,
-    samples: np.ndarray,
-    mean: np.ndarray,
-    blurred: np.ndarray,
+    parts: int, asked: np.ndarray, finest: int, events: Events, section: Section, told: Predicted
 ) -> None:
     """The same, shared among threads in so many `parts`, for those events alone that are `asked` for (N,).
 
     With `finest` = BASE_SCALE the widest window alone is looked at: `base` and `blurred` are right, `rate`
     and `mean` mean nothing.
     """
-    h, w = mean.shape
-    by_row = _views_of_blocks(rows, size[0], 2 * h)
-    by_col = _views_of_blocks(cols, size[1], 2 * w)
-    scales = _scales(
-        k, l, i, j, colour, n, weight, cell, rows, cols, by_row, by_col, sites.size, share_seen, finest
-    )
+    N, h = events[0].size, told[3].shape[0]
+    scales = _scales(events, section, finest)
     for part in nb.prange(parts):
-        this, beyond = k.size * part // parts, k.size * (part + 1) // parts
-        _predict_events(
-            this, beyond, asked, k, l, i, j, colour, weight, cell,
-            rows, cols, sites, prior, scales, finest, rate, base,
-        )  # fmt: skip
+        this, beyond = N * part // parts, N * (part + 1) // parts
+        _predict_events(this, beyond, asked, finest, events, section, scales, told)
         top, bottom = h * part // parts, h * (part + 1) // parts
-        _predict_cells(top, bottom, by_row, by_col, prior, scales, finest, samples, mean, blurred)
+        _predict_cells(top, bottom, finest, section, scales, told)

@@ -280,7 +280,8 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     weight = (~hidden).astype(np.float32)
     sites = np.array([4.0])
     land(*where[:4], none, none, (64, 64), cell)
-    predict(*where, weight, cell, none, none, (64, 64), sites, seen, 1.0, own, base, samples, mean, blurred)
+    section = (none, none, 64, 64, sites, seen, 1.0)
+    predict((*where, weight, cell), section, (own, base, samples, mean, blurred))
     for part in (np.s_[:, :8], np.s_[:, 8:]):
         photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
         assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
@@ -299,23 +300,23 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     assert (cell < 0).any()
     weight, seen = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
     colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)
-    about = *where, colours, n, weight, cell, rows, cols, (H, W), sites, seen, 1.0
+    about = (*where, colours, n, weight, cell), (rows, cols, H, W, sites, seen, 1.0)
 
     def outputs():
         return (*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
 
     whole = outputs()
-    predict(*about, *whole)
+    predict(*about, whole)
     asked = rng.random(N) < 0.5
     for parts in (1, 3):
-        rate, base, samples, mean, blurred = outputs()
-        predict_shared(parts, asked, 0, *about, rate, base, samples, mean, blurred)
+        rate, base, samples, mean, blurred = told = outputs()
+        predict_shared(parts, asked, 0, *about, told)
         for found, expected in ((rate, whole[0]), (base, whole[1])):
             np.testing.assert_array_equal(found, np.where(asked, expected, -1))
         for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
             np.testing.assert_array_equal(found, expected)
-        rate, base, samples, mean, blurred = outputs()
-        predict_shared(parts, asked, BASE_SCALE, *about, rate, base, samples, mean, blurred)
+        rate, base, samples, mean, blurred = told = outputs()
+        predict_shared(parts, asked, BASE_SCALE, *about, told)
         np.testing.assert_array_equal(base, np.where(asked, whole[1], -1))
         np.testing.assert_array_equal(blurred, whole[4])
 
