@@ -7,6 +7,9 @@ plain       two or three solids of one colour each, one before the border of ano
 textured    the same, with patterns
 cards       16 to 40 small cards at three depths, over and under one another
 room        two or three solids before a wall of detail, on a desk or not: the film is bright all over
+crossing    something plain across the middle of something else of nearly the same colour
+leaves      a thing of detail behind 24 to 48 small leaves, all of them of one material
+checks      two or three solids of coarse checks, one before the middle of the other
 """
 
 from collections.abc import Callable
@@ -22,12 +25,15 @@ REFERENCE_MM = 560.0
 PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
 LEAST_APART_MM = 80
 
-Kind = Literal["plain", "textured", "cards", "room"]
+Kind = Literal["plain", "textured", "cards", "room", "crossing", "leaves", "checks"]
 KINDS: dict[Kind, Literal["untextured", "textured", "cluttered"]] = {
     "plain": "untextured",
     "textured": "textured",
     "cards": "cluttered",
     "room": "cluttered",
+    "crossing": "untextured",
+    "leaves": "cluttered",
+    "checks": "textured",
 }
 """What is hard about each, in the words of corpus.toml."""
 
@@ -49,11 +55,21 @@ def write_drawn(folder: Path, kind: Kind, number: int) -> Path:
 
 def _things(random: Random, kind: Kind) -> tuple[list[str], list[int]]:
     """The objects as TOML, and the depths in mm that they are at."""
-    if kind == "cards":
-        return _cards(random)
-    if kind == "room":
-        return _room(random)
-    return _solids(random, _plain if kind == "plain" else _pattern)
+    match kind:
+        case "plain":
+            return _solids(random, _plain)
+        case "textured":
+            return _solids(random, _pattern)
+        case "cards":
+            return _cards(random)
+        case "room":
+            return _room(random)
+        case "crossing":
+            return _crossing(random)
+        case "leaves":
+            return _leaves(random)
+        case "checks":
+            return _checked(random)
 
 
 def _recipe(name: str, number: int, planes_mm: list[int]) -> str:
@@ -137,6 +153,65 @@ def _room(random: Random) -> tuple[list[str], list[int]]:
     return objects, [*planes, wall]
 
 
+def _crossing(random: Random) -> tuple[list[str], list[int]]:
+    near, far = planes = _two_planes(random)
+    colour = [random.uniform(0.3, 0.7) for _ in range(3)]
+    alike = [", ".join(f"{part + random.uniform(-0.04, 0.04):.2f}" for part in colour) for _ in planes]
+    behind, across = (f"reflectance = [{own}]" for own in alike)
+    x, y = random.uniform(-20, 20), random.uniform(-20, 20)
+    radius, scale = random.uniform(50, 65), far / REFERENCE_MM
+    place = x * scale, y * scale, far + 0.6 * radius * scale
+    objects = [_solid(random, "behind", place, radius * scale, behind)]
+    scale = near / REFERENCE_MM
+    r, long = random.uniform(11, 17) * scale, random.uniform(170, 230) * scale
+    # Each with how far its middle is behind what is seen of it.
+    shape, depth = random.choice(
+        [
+            (f'type = "cylinder", radius_mm = {r:.1f}, length_mm = {long:.1f}', 0.6 * r),
+            (f'type = "box", width_mm = {2 * r:.1f}, height_mm = {long:.1f}, depth_mm = 8.0', 4.0),
+            (f'type = "sphere", radius_mm = {2.4 * r:.1f}', 1.4 * r),
+        ]
+    )
+    turned = random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(0, 180)
+    place = (x + random.uniform(-25, 25)) * scale, (y + random.uniform(-25, 25)) * scale, near + depth
+    return [*objects, _object("across", place, turned, shape, across)], list(planes)
+
+
+def _leaves(random: Random) -> tuple[list[str], list[int]]:
+    near, far = planes = _two_planes(random)
+    radius, scale = random.uniform(50, 70), far / REFERENCE_MM
+    place = random.uniform(-20, 20) * scale, random.uniform(-20, 20) * scale, far + 0.6 * radius * scale
+    objects = [_solid(random, "thing", place, radius * scale, _pattern(random))]
+    green, scale = _noise(random, _colour(random, 0.3, 0.7)), near / REFERENCE_MM
+    for number in range(random.randrange(24, 49)):
+        long = random.uniform(14, 32) * scale
+        shape = f'type = "card", width_mm = {long:.1f}, height_mm = {long * random.uniform(0.4, 0.8):.1f}'
+        x, y = (random.uniform(-100, 100) * scale for _ in range(2))
+        turned = random.uniform(-40, 40), random.uniform(-40, 40), random.uniform(0, 180)
+        objects.append(
+            _object(f"leaf-{number}", (x, y, near + random.uniform(-12, 12)), turned, shape, green)
+        )
+    return objects, list(planes)
+
+
+def _checked(random: Random) -> tuple[list[str], list[int]]:
+    planes = _planes(random, random.choice([2, 2, 3]))
+    objects, x = [], -15.0 * len(planes)
+    for number, z in enumerate(random.sample(planes, len(planes))):
+        scale, radius = z / REFERENCE_MM, random.uniform(40, 60)
+        place = x * scale, random.uniform(-30, 30) * scale, z + 0.6 * radius * scale
+        material = _checks(random, fewest=2, most=5)
+        objects.append(_solid(random, f"solid-{number}", place, radius * scale, material))
+        x += random.uniform(30, 60)
+    return objects, planes
+
+
+def _two_planes(random: Random) -> tuple[int, int]:
+    """From 90 to 140 mm apart, the nearer first."""
+    near = random.randrange(470, 531)
+    return near, near + random.randrange(90, 141)
+
+
 def _solid(
     random: Random, name: str, place_mm: tuple[float, float, float], radius_mm: float, material: str
 ) -> str:
@@ -188,8 +263,12 @@ def _noise(random: Random, colour: str) -> str:
 def _pattern(random: Random) -> str:
     if random.random() < 0.6:
         return _noise(random, _colour(random, 0.3, 0.7))
+    return _checks(random)
+
+
+def _checks(random: Random, fewest: int = 4, most: int = 8) -> str:
     colours = f"{_colour(random, 0.15, 0.85)}, {_colour(random, 0.15, 0.85)}"
-    rows, columns = random.randrange(4, 9), random.randrange(4, 9)
+    rows, columns = random.randint(fewest, most), random.randint(fewest, most)
     return f'texture = {{ type = "checks", rows = {rows}, columns = {columns}, colours = [{colours}] }}'
 
 
