@@ -1,23 +1,22 @@
 """The search for the opaque layers of least energy: from several starts, then guess by guess.
 
 Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
-nothing behind it can show that it is there. So whole pieces are guessed, put in place and fitted with
-everything else; where that costs less around the piece, it stays. Guessed are pieces that a layer in front
-would explain, and that a border between two layers lies farther on. Surfaces are compared with the light of
-each told by itself; a piece that differs from what is around it would then save something at any depth, so it
-must also be better than the same piece at the depth where it was.
+nothing behind it can show that it is there. So whole pieces are guessed (`pcii.guesses`), put in place and
+fitted with everything else; where that costs less around the piece, it stays. Surfaces are compared with the
+light of each told by itself; a piece that differs from what is around it would then save something at any
+depth, so the piece must also be better told by itself where it is than told by itself where it was.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import permutations
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from pcii.cells import CELL_PX
-from pcii.foreground import box_around, connected_pieces, dilated
+from pcii.foreground import box_around
 from pcii.geometry import whole_shifts_px
-from pcii.layers import AREA_NATS, BESIDE_SHARE, LENGTH_NATS, STEPS, Layers, dark_of
+from pcii.guesses import AROUND_CELLS, Guess, guesses_of
+from pcii.layers import BESIDE_SHARE, Layers, dark_of
 from pcii.photon_counts import PhotonCounts, drawn
 from pcii.types import CameraGrid
 
@@ -26,25 +25,11 @@ MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
 are round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
-FAVOURS_NATS = (0.0, 0.3, 0.8)
-"""What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
-BEYOND_CELLS = 8
-"""How far a border may lie farther on: the fit that follows takes back what is too much."""
-SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
-"""Less light than that cannot save what a guess must."""
-AROUND_CELLS = 8
-"""A guess is judged by what changes within 32 px of it: parallax brings it there."""
+PRIOR_SHARE = 0.5
+"""Of what outlines and cells cost so much counts for guesses: a fit that follows noise pays in full, but of
+pieces that are guessed there are few."""
 LEAST_NATS, BACKWARD_NATS = 3.0, 0.12
 """What a guess must save, and for each cell in which something nearer goes: the starts had evidence of it."""
-
-
-@dataclass(frozen=True)
-class _Guess:
-    """That `layer` is what is seen in `cells`; judged in `around` (both (h, w) bool)."""
-
-    layer: int
-    cells: np.ndarray
-    around: np.ndarray
 
 
 def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
@@ -121,7 +106,7 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
             layers.sweep()
         energy = _energy_of(doubled, layers.masks)
         # Where nothing has changed since, the same guess would fail again.
-        guesses = [guess for guess in _guesses(layers) if (guess.around & changed).any()]
+        guesses = [guess for guess in guesses_of(layers) if (guess.around & changed).any()]
         changed = np.zeros_like(changed)
         for together in _apart(guesses):
             energy, kept = _tried(layers, doubled, together, energy)
@@ -132,42 +117,9 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
     return layers.visible()
 
 
-def _guesses(layers: Layers) -> Iterator[_Guess]:
-    """Connected pieces of what may be another layer's, each of them once."""
-    told: set[bytes] = set()
-    photons = [layers.photons(layer).ravel() for layer in range(len(layers.masks))]
-    for layer, where in _supposed(layers):
-        pieces = connected_pieces(where)
-        enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
-        enough &= np.bincount(pieces.ravel(), photons[layer]) >= FEWEST_PHOTONS
-        enough[0] = False
-        for number in np.flatnonzero(enough):
-            cells = pieces == number
-            name = bytes([layer]) + np.packbits(cells).tobytes()
-            if name not in told:
-                told.add(name)
-                yield _Guess(layer, cells, dilated(cells, AROUND_CELLS))
-
-
-def _supposed(layers: Layers) -> Iterator[tuple[int, np.ndarray]]:
-    """Layers, and where (h, w) bool they may be instead of what is seen there now."""
-    from pcii.outline_kernels import least_outline
-
-    seen = layers.visible()
-    for layer, other in permutations(range(len(layers.masks)), 2):
-        yield layer, dilated(seen == layer, BEYOND_CELLS) & (seen == other)
-    near_light = dilated(seen >= 0, 2)
-    for layer, gain in enumerate(layers.in_the_open()):
-        for favour in FAVOURS_NATS:
-            inside = np.empty_like(gain)
-            granted = gain + np.float32(favour - AREA_NATS)
-            least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
-            yield layer, (inside > 0.5) & (seen != layer) & near_light
-
-
-def _apart(guesses: Sequence[_Guess]) -> list[list[_Guess]]:
+def _apart(guesses: Sequence[Guess]) -> list[list[Guess]]:
     """The guesses in groups in which no two have to do with each other."""
-    groups: list[tuple[np.ndarray, list[_Guess]]] = []
+    groups: list[tuple[np.ndarray, list[Guess]]] = []
     for guess in guesses:
         for taken, group in groups:
             if not (taken & guess.around).any():
@@ -180,8 +132,8 @@ def _apart(guesses: Sequence[_Guess]) -> list[list[_Guess]]:
 
 
 def _tried(
-    layers: Layers, doubled: Layers, guesses: Sequence[_Guess], energy: np.ndarray
-) -> tuple[np.ndarray, list[_Guess]]:
+    layers: Layers, doubled: Layers, guesses: Sequence[Guess], energy: np.ndarray
+) -> tuple[np.ndarray, list[Guess]]:
     """The energy after those of the guesses were kept that lessen it, and which they are."""
     before, seen = layers.masks.copy(), layers.visible()
     guessed = before.copy()
@@ -200,12 +152,13 @@ def _tried(
         if saved[guess.around].sum()
         > LEAST_NATS + BACKWARD_NATS * np.count_nonzero(seen[guess.cells] > guess.layer)
     ]
-    kept: list[_Guess] = []
+    kept: list[Guess] = []
     if cheaper:
-        # Is it the depth that is better, or that the piece is told by itself?
-        around = np.any([guess.around for guess in cheaper], axis=0)
-        moved = around & (layers.visible() != seen)
-        saved = _energy_of(doubled, before, before & moved & _masks_of(seen, len(before))) - energy_after
+        # Is it the depth that is better, or that the piece is told by itself? So it may be where it was, too.
+        around, shown = np.any([guess.around for guess in cheaper], axis=0), layers.visible()
+        moved = around & (shown != seen)
+        was, now = (moved & _masks_of(where, len(before)) for where in (seen, shown))
+        saved = _energy_of(doubled, before, was) - _energy_of(doubled, after, now)
         kept = [guess for guess in cheaper if saved[guess.around].sum() > LEAST_NATS]
     for guess in kept:
         before[:, guess.around] = after[:, guess.around]
@@ -218,7 +171,7 @@ def _energy_of(doubled: Layers, masks: np.ndarray, parted: np.ndarray | None = N
     both = np.zeros_like(doubled.masks)
     both[::2] = masks
     if parted is not None:
-        both[::2] &= ~parted
+        # In front of its own layer, which goes on behind it: through a seam the dark would show.
         both[1::2] = parted
     doubled.put(both)
-    return doubled.energy(beside=BESIDE_SHARE)
+    return doubled.energy(beside=BESIDE_SHARE, prior=PRIOR_SHARE)

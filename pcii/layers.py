@@ -125,17 +125,19 @@ class Layers:
         return np.where(self.masks.any(axis=0), D - 1 - np.argmax(self.masks[::-1], axis=0), -1)
 
     def photons(self, layer: int) -> np.ndarray:
-        """How many photons land in each cell (h, w) of a layer, whatever hides it."""
-        cells, shape = self.cells[layer], self.light.shape
-        inside = cells >= 0
-        return np.bincount(cells[inside], self.n[inside], self.light.size).reshape(shape)
+        """How many photons of each colour land in each cell (C, h, w) of a layer, whatever hides it."""
+        (h, w), C, inside = self.light.shape, self.sites.size, self.cells[layer] >= 0
+        where = self.colours[inside].astype(np.int64) * (h * w) + self.cells[layer][inside]
+        return np.bincount(where, self.n[inside], C * h * w).reshape(C, h, w)
 
     def sweep(self) -> None:
         """Fit each layer's mask to the others, from far to near."""
         self._compose(fit=True)
 
-    def energy(self, *, beside: float = 1.0) -> np.ndarray:
+    def energy(self, *, beside: float = 1.0, prior: float = 1.0) -> np.ndarray:
         """E of the masks as they are, in nats, by the cell (h, w) that it has to do with.
+
+        Of what their outlines and cells cost the `prior` counts, a share.
 
         Light counts where the middle layer would show it. What lands `beside` a mask tells so much of its
         light: at less than 1 borders between surfaces cost nothing but their length, yet parting one surface
@@ -150,7 +152,7 @@ class Layers:
         fit = np.bincount(self.home, self.n * np.log(rate), h * w).reshape(h, w) - expected
         edge = np.pad(self.masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
         length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
-        return -fit + LENGTH_NATS * CELL_PX * length + AREA_NATS * self.masks.sum(axis=0)
+        return -fit + prior * (LENGTH_NATS * CELL_PX * length + AREA_NATS * self.masks.sum(axis=0))
 
     def in_the_open(self) -> list[np.ndarray]:
         """Nats (h, w) that each layer would gain over what is believed now, were it in front of all."""

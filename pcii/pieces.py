@@ -67,6 +67,20 @@ def cheapest_planes(
     return np.array(planes[: len(cost)], dtype=np.int64)
 
 
+def pieces_alike(pieces: np.ndarray, photons: np.ndarray) -> Iterator[np.ndarray]:
+    """Masks (H, W) bool of the pieces, and of what they become as those whose light is most alike are merged.
+
+    `photons` (C, H, W) by colour. Two are alike if one rate for both, in each colour, costs little
+    log-likelihood for the length of their border (after Koepfler, Lopez and Morel 1994).
+    """
+    tree = _MergingByLight(pieces, photons)
+    members = [[piece] for piece in range(len(tree.areas))]
+    for a, b, _, _ in tree.weakest_first(lambda one, other: True):
+        members.append(members[a] + members[b])
+    for own in members[1:]:  # piece 0 is none
+        yield np.isin(pieces, own)
+
+
 class _Merging:
     """Pieces, their areas and the borders between them, while they are merged."""
 
@@ -77,11 +91,16 @@ class _Merging:
         self.queue: list[tuple[float, int, int]] = []
         for a, b, height, length in _borders(pieces, edges):
             self.borders[a][b] = self.borders[b][a] = (height, length)
-            self.queue.append((height / length, a, b))
+            self.queue.append((self.strength(a, b), a, b))
         heapq.heapify(self.queue)
 
+    def strength(self, a: int, b: int) -> float:
+        """How much parts two neighbours: the mean height of their border."""
+        height, length = self.borders[a][b]
+        return height / length
+
     def weakest_first(self, may_merge: Callable[[float, float], bool]) -> Iterator[tuple[int, int, int, int]]:
-        """Merge across the border of the least mean height whose two areas may merge, over and over.
+        """Merge across the weakest border whose two areas may merge, over and over.
 
         Gives both pieces, the number of what they become, and the length of the border in pixel pairs.
         """
@@ -106,7 +125,33 @@ class _Merging:
         self.borders.append(around)
         for other, (height, length) in around.items():
             self.borders[other][joined] = (height, length)
-            heapq.heappush(self.queue, (height / length, other, joined))
+            heapq.heappush(self.queue, (self.strength(other, joined), other, joined))
+
+
+class _MergingByLight(_Merging):
+    """The same, where what parts two pieces is how different their light is."""
+
+    def __init__(self, pieces: np.ndarray, photons: np.ndarray) -> None:
+        own, count = pieces.ravel(), int(pieces.max()) + 1
+        each = [np.bincount(own, colour.ravel(), count) for colour in photons]
+        self.photons = list(np.stack(each, axis=-1))
+        super().__init__(pieces, np.zeros(pieces.shape), np.bincount(own).tolist())
+
+    def strength(self, a: int, b: int) -> float:
+        """Nats that one rate for both costs, for each pair of pixels along their border."""
+        apart = _likelihood(self.photons[a], self.areas[a]) + _likelihood(self.photons[b], self.areas[b])
+        together = _likelihood(self.photons[a] + self.photons[b], self.areas[a] + self.areas[b])
+        return (apart - together) / self.borders[a][b][1]
+
+    def _merge(self, a: int, b: int) -> None:
+        self.photons.append(self.photons[a] + self.photons[b])
+        super()._merge(a, b)
+
+
+def _likelihood(photons: np.ndarray, area: float) -> float:
+    """Log likelihood of photons (C,) on an area at the rate that fits them best, but for a constant."""
+    some = photons[photons > 0]
+    return float((some * np.log(some / area)).sum())
 
 
 def _borders(pieces: np.ndarray, edges: np.ndarray) -> Iterator[tuple[int, int, float, int]]:

@@ -33,6 +33,7 @@ PCII_LEVELS = [
     {"statistics", "edge_entropy"},
     {"focus", "outline"},
     {"regions", "layers"},
+    {"guesses"},
     {"layer_search"},
     {"duel"},
     {"likelihood"},

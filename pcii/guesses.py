@@ -1,0 +1,116 @@
+"""Pieces that may belong to another layer than the one that is seen there now.
+
+Guessed are pieces that a layer in front of all would explain, pieces of one light in the section at its
+depth, the hulls of what is seen of it already, for what crosses something is seen on both sides of it, and
+that a border between two layers lies farther on. Whether a guess is right is told by what it saves
+(`pcii.layer_search`); here it only must not be missed.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+
+from pcii.cells import CELL_PX
+from pcii.focus import PICTURE_CELLS
+from pcii.foreground import connected_pieces, dilated, roberts_magnitude
+from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers
+from pcii.pieces import pieces_alike, pieces_along_ridges
+
+FAVOURS_NATS = (0.0, 0.3, 0.8)
+"""What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
+BEYOND_CELLS = 8
+"""How far a border may lie farther on: the fit that follows takes back what is too much."""
+ALIKE_CELLS, MOST_ALIKE, SAME_SHARE = 40, 8, 0.8
+"""Of pieces of one light those of 25 x 25 px and more that a layer would explain best; of two that share four
+fifths of what they cover one."""
+LEAST_OPEN_NATS = -0.2
+"""What a layer in front of all would gain per cell, at least: it has only a part of the piece's light now."""
+MOST_HULLS = 3
+"""Hulls are of so many of the largest pieces of a layer, and of each two of them."""
+SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
+"""Less light than that cannot save what a guess must."""
+AROUND_CELLS = 8
+"""A guess is judged by what changes within 32 px of it: parallax brings it there."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """That `layer` is what is seen in `cells`; judged in `around` (both (h, w) bool)."""
+
+    layer: int
+    cells: np.ndarray
+    around: np.ndarray
+
+
+def guesses_of(layers: Layers) -> Iterator[Guess]:
+    """Connected pieces of what may be another layer's, each of them once."""
+    told: set[bytes] = set()
+    photons = [layers.photons(layer) for layer in range(len(layers.masks))]
+    for layer, where in _supposed(layers, photons):
+        pieces = connected_pieces(where)
+        enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
+        enough &= np.bincount(pieces.ravel(), photons[layer].sum(axis=0).ravel()) >= FEWEST_PHOTONS
+        enough[0] = False
+        for number in np.flatnonzero(enough):
+            cells = pieces == number
+            name = bytes([layer]) + np.packbits(cells).tobytes()
+            if name not in told:
+                told.add(name)
+                yield Guess(layer, cells, dilated(cells, AROUND_CELLS))
+
+
+def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, np.ndarray]]:
+    """Layers, and where (h, w) bool they may be instead of what is seen there now."""
+    from pcii.outline_kernels import least_outline
+
+    seen = layers.visible()
+    for layer, other in permutations(range(len(layers.masks)), 2):
+        yield layer, dilated(seen == layer, BEYOND_CELLS) & (seen == other)
+    near_light = dilated(seen >= 0, 2)
+    for layer, gain in enumerate(layers.in_the_open()):
+        whole = [hull & (seen != layer) & near_light for hull in _hulls(seen == layer)]
+        whole += _alike(photons[layer], seen, layer, gain)
+        yield from ((layer, piece) for piece in whole if gain[piece].sum() > LEAST_OPEN_NATS * piece.sum())
+        for favour in FAVOURS_NATS:
+            inside = np.empty_like(gain)
+            granted = gain + np.float32(favour - AREA_NATS)
+            least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
+            yield layer, (inside > 0.5) & (seen != layer) & near_light
+
+
+def _hulls(mask: np.ndarray) -> Iterator[np.ndarray]:
+    """Convex hulls (h, w) bool of the largest pieces of a mask, and of each two of them."""
+    from skimage.morphology import convex_hull_image
+
+    pieces = connected_pieces(mask)
+    cells = np.bincount(pieces.ravel())
+    cells[0] = 0
+    large = [piece for piece in np.argsort(-cells)[:MOST_HULLS] if cells[piece] >= ALIKE_CELLS]
+    for some in (*combinations(large, 1), *combinations(large, 2)):
+        yield np.asarray(convex_hull_image(np.isin(pieces, some)))
+
+
+def _alike(photons: np.ndarray, seen: np.ndarray, layer: int, gain: np.ndarray) -> Iterator[np.ndarray]:
+    """Pieces (h, w) bool of one light, in a layer's section, that it would explain best of those not its own.
+
+    `photons` (C, h, w) are the section's, `gain` (h, w) the nats that the layer would gain in front of all.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    # Of the square root of a count the noise is the same everywhere.
+    edges = roberts_magnitude(np.sqrt(gaussian_filter(photons.sum(axis=0), PICTURE_CELLS)))
+    pieces = pieces_along_ridges(seen >= 0, edges, ALIKE_CELLS)
+    others = [piece & (seen != layer) for piece in pieces_alike(pieces, photons)]
+    large = [piece for piece in others if np.count_nonzero(piece) >= ALIKE_CELLS]
+    large.sort(key=lambda piece: -float(gain[piece].sum()))
+    given: list[np.ndarray] = []
+    for piece in large:
+        if len(given) < MOST_ALIKE and not any(_same(piece, other) for other in given):
+            given.append(piece)
+            yield piece
+
+
+def _same(one: np.ndarray, other: np.ndarray) -> bool:
+    return bool(np.count_nonzero(one & other) >= SAME_SHARE * np.count_nonzero(one | other))
