@@ -13,6 +13,7 @@ checks      two or three solids of coarse checks, one before the middle of the o
 """
 
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from random import Random
@@ -69,7 +70,11 @@ def _things(random: Random, kind: Kind) -> tuple[list[str], list[int]]:
         case "leaves":
             return _leaves(random)
         case "checks":
-            return _checked(random)
+            coarse = partial(_checks, fewest=2, most=5)
+            # Close together, so that borders run through the middle of what is behind.
+            return _solids(
+                random, coarse, first_mm=(-30, -45), apart_mm=(30, 60), radius_mm=(40, 60), high_mm=30
+            )
 
 
 def _recipe(name: str, number: int, planes_mm: list[int]) -> str:
@@ -106,14 +111,23 @@ def _planes(random: Random, count: int) -> list[int]:
             return planes
 
 
-def _solids(random: Random, material: Callable[[Random], str]) -> tuple[list[str], list[int]]:
+def _solids(
+    random: Random,
+    material: Callable[[Random], str],
+    *,
+    first_mm: tuple[float, float] = (-60, -80),
+    apart_mm: tuple[float, float] = (50, 85),
+    radius_mm: tuple[float, float] = (36, 58),
+    high_mm: float = 25,
+) -> tuple[list[str], list[int]]:
+    """From left to right; the first of two or of three is at `first_mm`, up or down by at most `high_mm`."""
     planes = _planes(random, random.choice([2, 2, 3]))
-    objects, x = [], -20.0 - 20 * len(planes)
+    objects, x = [], first_mm[len(planes) - 2]
     for number, z in enumerate(random.sample(planes, len(planes))):
-        scale, radius = z / REFERENCE_MM, random.uniform(36, 58)
-        place = (x * scale, random.uniform(-25, 25) * scale, z + 0.6 * radius * scale)
+        scale, radius = z / REFERENCE_MM, random.uniform(*radius_mm)
+        place = x * scale, random.uniform(-high_mm, high_mm) * scale, z + 0.6 * radius * scale
         objects.append(_solid(random, f"solid-{number}", place, radius * scale, material(random)))
-        x += random.uniform(50, 85)
+        x += random.uniform(*apart_mm)
     return objects, planes
 
 
@@ -192,18 +206,6 @@ def _leaves(random: Random) -> tuple[list[str], list[int]]:
             _object(f"leaf-{number}", (x, y, near + random.uniform(-12, 12)), turned, shape, green)
         )
     return objects, list(planes)
-
-
-def _checked(random: Random) -> tuple[list[str], list[int]]:
-    planes = _planes(random, random.choice([2, 2, 3]))
-    objects, x = [], -15.0 * len(planes)
-    for number, z in enumerate(random.sample(planes, len(planes))):
-        scale, radius = z / REFERENCE_MM, random.uniform(40, 60)
-        place = x * scale, random.uniform(-30, 30) * scale, z + 0.6 * radius * scale
-        material = _checks(random, fewest=2, most=5)
-        objects.append(_solid(random, f"solid-{number}", place, radius * scale, material))
-        x += random.uniform(30, 60)
-    return objects, planes
 
 
 def _two_planes(random: Random) -> tuple[int, int]:

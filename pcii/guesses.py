@@ -48,10 +48,11 @@ def guesses_of(layers: Layers) -> Iterator[Guess]:
     """Connected pieces of what may be another layer's, each of them once."""
     told: set[bytes] = set()
     photons = [layers.photons(layer) for layer in range(len(layers.masks))]
+    light = [own.sum(axis=0).ravel() for own in photons]
     for layer, where in _supposed(layers, photons):
         pieces = connected_pieces(where)
         enough = np.bincount(pieces.ravel()) >= SMALLEST_CELLS
-        enough &= np.bincount(pieces.ravel(), photons[layer].sum(axis=0).ravel()) >= FEWEST_PHOTONS
+        enough &= np.bincount(pieces.ravel(), light[layer]) >= FEWEST_PHOTONS
         enough[0] = False
         for number in np.flatnonzero(enough):
             cells = pieces == number

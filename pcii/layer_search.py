@@ -144,8 +144,7 @@ def _tried(
     for _ in range(SWEEPS_OF_A_GUESS):
         layers.sweep()
     after = layers.masks.copy()
-    energy_after = _energy_of(doubled, after)
-    saved = energy - energy_after
+    saved = energy - _energy_of(doubled, after)
     cheaper = [
         guess
         for guess in guesses

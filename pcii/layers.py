@@ -137,7 +137,7 @@ class Layers:
     def energy(self, *, beside: float = 1.0, prior: float = 1.0) -> np.ndarray:
         """E of the masks as they are, in nats, by the cell (h, w) that it has to do with.
 
-        Of what their outlines and cells cost the `prior` counts, a share.
+        What their outlines and cells cost counts by the share `prior`.
 
         Light counts where the middle layer would show it. What lands `beside` a mask tells so much of its
         light: at less than 1 borders between surfaces cost nothing but their length, yet parting one surface
