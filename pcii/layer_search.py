@@ -13,10 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from pcii.cells import CELL_PX
-from pcii.foreground import box_around
+from pcii.foreground import box_around, dilated
 from pcii.geometry import whole_shifts_px
 from pcii.guesses import AROUND_CELLS, Guess, guesses_of
-from pcii.layers import BESIDE_SHARE, Layers, dark_of
+from pcii.layers import BESIDE_SHARE, Layers, dark_of, masks_cost
 from pcii.photon_counts import PhotonCounts, drawn
 from pcii.types import CameraGrid
 
@@ -25,11 +25,9 @@ MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
 are round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
-PRIOR_SHARE = 0.5
-"""Of what outlines and cells cost so much counts for guesses: a fit that follows noise pays in full, but of
-pieces that are guessed there are few."""
-LEAST_NATS, BACKWARD_NATS = 3.0, 0.12
-"""What a guess must save, and for each cell in which something nearer goes: the starts had evidence of it."""
+LEAST_NATS, PRIOR_SHARE = 5.0, 0.35
+"""What a guess must save; of what outlines and cells cost such a share counts for it. A fit that follows
+noise pays in full, but of pieces that are guessed there are few."""
 
 
 def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
@@ -87,7 +85,7 @@ def _settled(layers: Layers, start: np.ndarray) -> tuple[float, np.ndarray]:
     layers.put(_masks_of(start, len(layers.masks)))
     for _ in range(SWEEPS):
         layers.sweep()
-    return float(layers.energy().sum()), layers.visible()
+    return layers.energy(), layers.visible()
 
 
 def _masks_of(seen: np.ndarray, count: int) -> np.ndarray:
@@ -104,12 +102,12 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
     for _ in range(ROUNDS):
         for _ in range(SWEEPS_OF_A_GUESS):
             layers.sweep()
-        energy = _energy_of(doubled, layers.masks)
+        explained = _explained(doubled, layers.masks)
         # Where nothing has changed since, the same guess would fail again.
         guesses = [guess for guess in guesses_of(layers) if (guess.around & changed).any()]
         changed = np.zeros_like(changed)
         for together in _apart(guesses):
-            energy, kept = _tried(layers, doubled, together, energy)
+            explained, kept = _tried(layers, doubled, together, explained)
             for guess in kept:
                 changed |= guess.around
         if not changed.any():
@@ -132,9 +130,9 @@ def _apart(guesses: Sequence[Guess]) -> list[list[Guess]]:
 
 
 def _tried(
-    layers: Layers, doubled: Layers, guesses: Sequence[Guess], energy: np.ndarray
+    layers: Layers, doubled: Layers, guesses: Sequence[Guess], explained: np.ndarray
 ) -> tuple[np.ndarray, list[Guess]]:
-    """The energy after those of the guesses were kept that lessen it, and which they are."""
+    """What is explained (h, w) after those of the guesses were kept that lessen E, and which they are."""
     before, seen = layers.masks.copy(), layers.visible()
     guessed = before.copy()
     for guess in guesses:
@@ -143,34 +141,49 @@ def _tried(
     layers.put(guessed)
     for _ in range(SWEEPS_OF_A_GUESS):
         layers.sweep()
-    after = layers.masks.copy()
-    saved = energy - _energy_of(doubled, after)
-    cheaper = [
-        guess
-        for guess in guesses
-        if saved[guess.around].sum()
-        > LEAST_NATS + BACKWARD_NATS * np.count_nonzero(seen[guess.cells] > guess.layer)
-    ]
+    after, shown = layers.masks.copy(), layers.visible()
+    cheaper = PRIOR_SHARE * (masks_cost(before) - masks_cost(after))
+    saved = _explained(doubled, after) - explained + cheaper
+    better = [guess for guess in guesses if saved[guess.around].sum() > LEAST_NATS]
     kept: list[Guess] = []
-    if cheaper:
+    if better:
         # Is it the depth that is better, or that the piece is told by itself? So it may be where it was, too.
-        around, shown = np.any([guess.around for guess in cheaper], axis=0), layers.visible()
-        moved = around & (shown != seen)
+        moved = np.any([guess.around for guess in better], axis=0) & (shown != seen)
         was, now = (moved & _masks_of(where, len(before)) for where in (seen, shown))
-        saved = _energy_of(doubled, before, was) - _energy_of(doubled, after, now)
-        kept = [guess for guess in cheaper if saved[guess.around].sum() > LEAST_NATS]
+        old, new = _told_apart(doubled, before, was), _told_apart(doubled, after, now)
+        for guess in better:
+            here = guess.around
+            light = max(one[here].sum() for one in new) - max(one[here].sum() for one in old)
+            if light + cheaper[here].sum() > LEAST_NATS:
+                kept.append(guess)
     for guess in kept:
         before[:, guess.around] = after[:, guess.around]
     layers.put(before)
-    return (_energy_of(doubled, before) if kept else energy), kept
+    return (_explained(doubled, before) if kept else explained), kept
 
 
-def _energy_of(doubled: Layers, masks: np.ndarray, parted: np.ndarray | None = None) -> np.ndarray:
-    """E (h, w) of masks (D, h, w), each told by itself, and so what is `parted` (D, h, w) from them."""
-    both = np.zeros_like(doubled.masks)
-    both[::2] = masks
-    if parted is not None:
-        # In front of its own layer, which goes on behind it: through a seam the dark would show.
-        both[1::2] = parted
+def _explained(doubled: Layers, masks: np.ndarray) -> np.ndarray:
+    """How well masks (D, h, w) explain the light, in nats (h, w), each surface told by itself."""
+    return _explained_in_pairs(doubled, masks, np.zeros_like(masks))
+
+
+def _told_apart(doubled: Layers, masks: np.ndarray, piece: np.ndarray) -> list[np.ndarray]:
+    """The same if a piece (D, h, w) of the masks is told by itself: in front of the rest, and behind it.
+
+    Of what shines in from beside a surface, what is behind it takes nothing. A piece beside something bright
+    would so be better told by itself at any depth farther away.
+    """
+    # What is behind goes on under what is in front: through a seam the dark would show.
+    under = np.array([dilated(own, 1) for own in piece]) & masks
+    return [
+        _explained_in_pairs(doubled, masks, piece),
+        _explained_in_pairs(doubled, under, masks & ~piece),
+    ]
+
+
+def _explained_in_pairs(doubled: Layers, behind: np.ndarray, front: np.ndarray) -> np.ndarray:
+    """How well masks (D, h, w) explain the light, two for each depth, the one behind the other."""
+    both = np.empty_like(doubled.masks)
+    both[::2], both[1::2] = behind, front
     doubled.put(both)
-    return doubled.energy(beside=BESIDE_SHARE, prior=PRIOR_SHARE)
+    return doubled.light_explained(beside=BESIDE_SHARE)

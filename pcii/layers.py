@@ -76,6 +76,13 @@ def _views_of(
     return np.outer(*cameras)
 
 
+def masks_cost(masks: np.ndarray) -> np.ndarray:
+    """What the outlines and the cells of masks (D, h, w) cost, in nats, by the cell (h, w) of each."""
+    edge = np.pad(masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
+    length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
+    return LENGTH_NATS * CELL_PX * length + AREA_NATS * masks.sum(axis=0)
+
+
 class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
@@ -134,14 +141,16 @@ class Layers:
         """Fit each layer's mask to the others, from far to near."""
         self._compose(fit=True)
 
-    def energy(self, *, beside: float = 1.0, prior: float = 1.0) -> np.ndarray:
-        """E of the masks as they are, in nats, by the cell (h, w) that it has to do with.
+    def energy(self) -> float:
+        """E of the masks as they are, in nats."""
+        return float((masks_cost(self.masks) - self.light_explained()).sum())
 
-        What their outlines and cells cost counts by the share `prior`.
+    def light_explained(self, *, beside: float = 1.0) -> np.ndarray:
+        """Log likelihood of all photons but for a constant, in nats, by cell (h, w) of the middle layer.
 
-        Light counts where the middle layer would show it. What lands `beside` a mask tells so much of its
-        light: at less than 1 borders between surfaces cost nothing but their length, yet parting one surface
-        into two along the edges that it shows saves something.
+        What lands `beside` a mask tells so much of its light: at less than 1 borders between surfaces cost
+        nothing but their length, yet parting one surface into two along the edges that it shows explains
+        something.
         """
         from pcii.layer_kernels import gathered
 
@@ -149,10 +158,7 @@ class Layers:
         middle, (h, w) = len(self.masks) // 2, self.light.shape
         expected = np.empty((h, w))
         gathered(behind, in_cells(self.rows[middle]), in_cells(self.cols[middle]), expected)
-        fit = np.bincount(self.home, self.n * np.log(rate), h * w).reshape(h, w) - expected
-        edge = np.pad(self.masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
-        length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
-        return -fit + prior * (LENGTH_NATS * CELL_PX * length + AREA_NATS * self.masks.sum(axis=0))
+        return np.bincount(self.home, self.n * np.log(rate), h * w).reshape(h, w) - expected
 
     def in_the_open(self) -> list[np.ndarray]:
         """Nats (h, w) that each layer would gain over what is believed now, were it in front of all."""
