@@ -150,7 +150,7 @@ def _tried(
         # Is it the depth that is better, or that the piece is told by itself? So it may be where it was, too.
         moved = np.any([guess.around for guess in better], axis=0) & (shown != seen)
         was, now = (moved & _masks_of(where, len(before)) for where in (seen, shown))
-        old, new = _told_apart(doubled, before, was), _told_apart(doubled, after, now)
+        old, new = _told_by_itself(doubled, before, was), _told_by_itself(doubled, after, now)
         for guess in better:
             here = guess.around
             light = max(one[here].sum() for one in new) - max(one[here].sum() for one in old)
@@ -167,7 +167,7 @@ def _explained(doubled: Layers, masks: np.ndarray) -> np.ndarray:
     return _explained_in_pairs(doubled, masks, np.zeros_like(masks))
 
 
-def _told_apart(doubled: Layers, masks: np.ndarray, piece: np.ndarray) -> list[np.ndarray]:
+def _told_by_itself(doubled: Layers, masks: np.ndarray, piece: np.ndarray) -> list[np.ndarray]:
     """The same if a piece (D, h, w) of the masks is told by itself: in front of the rest, and behind it.
 
     Of what shines in from beside a surface, what is behind it takes nothing. A piece beside something bright

@@ -134,14 +134,14 @@ def test_a_piece_that_stands_out_stays_at_its_depth(monkeypatch: pytest.MonkeyPa
     counts, spread_px, card = card_before_card(1000, nearer=False)
     moved = layered(counts, spread_px, [card]) == 1
     assert np.count_nonzero(moved) < 0.01 * np.count_nonzero(card >= 0)
-    compared = layer_search._told_apart
+    compared = layer_search._told_by_itself
 
     def without_the_same_piece(
         doubled: layers.Layers, masks: np.ndarray, piece: np.ndarray
     ) -> list[np.ndarray]:
         return compared(doubled, masks, np.zeros_like(piece) if piece[0].any() else piece)
 
-    monkeypatch.setattr(layer_search, "_told_apart", without_the_same_piece)
+    monkeypatch.setattr(layer_search, "_told_by_itself", without_the_same_piece)
     moved = layered(counts, spread_px, [card]) == 1
     assert np.count_nonzero(moved) > 0.2 * np.count_nonzero(card >= 0)
 
@@ -154,10 +154,25 @@ def test_what_is_told_by_itself_at_its_own_layer_leaves_no_seam():
     masks[0, 8:-8, 8:-8] = True
     piece[0, 24:40, 24:40] = True
     whole = layer_search._explained(doubled, masks)
-    for apart in layer_search._told_apart(doubled, masks, piece):
+    for apart in layer_search._told_by_itself(doubled, masks, piece):
         # A piece alone has less light to be told of, which costs a little; through a seam of 64 cells, where
         # each of 49 views expects a quarter of 16 photons less, thousands of nats would be gained.
         assert abs((apart - whole).sum()) < 20
+
+
+def test_what_is_told_by_itself_leaves_hardly_a_seam_where_shifts_are_no_whole_cells():
+    counts = PhotonCounts.from_dense(np.full(GRID.shape_KLHW, 1), GRID, cfa=None)
+    spread_px = disparity_spread_px(GRID, 1 / np.array([4, 6]))
+    doubled = layers.Layers(counts, np.repeat(spread_px, 2), (1e-3, 1e-2))
+    masks, piece = np.zeros((2, 2, 64, 64), dtype=bool)
+    masks[1, 8:-8, 8:-8] = True
+    piece[1, 24:40, 24:40] = True
+    whole = layer_search._explained(doubled, masks)
+    cut = layer_search._explained_in_pairs(doubled, piece, masks & ~piece)
+    seam = (cut - whole).sum()
+    assert seam > 5000
+    for apart in layer_search._told_by_itself(doubled, masks, piece):
+        assert abs((apart - whole).sum()) < seam / 5
 
 
 def test_what_lies_beside_something_bright_is_told_best_from_behind_it():
@@ -173,8 +188,28 @@ def test_what_lies_beside_something_bright_is_told_best_from_behind_it():
     masks, piece = np.zeros((2, 2, 64, 64), dtype=bool)
     masks[1, 12:52, 12:52] = True
     piece[1, 21:43, 21:43] = True
-    front, behind = (told.sum() for told in layer_search._told_apart(doubled, masks, piece))
+    front, behind = (told.sum() for told in layer_search._told_by_itself(doubled, masks, piece))
     assert behind > front + 50
+
+
+def test_a_piece_that_is_told_better_from_behind_its_layer_stays(monkeypatch: pytest.MonkeyPatch):
+    counts, spread_px, truth = card_before_card(500)
+    everything_near = [np.where(truth >= 0, 1, -1)]
+    told, bonus = layer_search._told_by_itself, itertools.cycle([1e3, 0])
+
+    def as_it_was_from_behind(
+        doubled: layers.Layers, masks: np.ndarray, piece: np.ndarray
+    ) -> list[np.ndarray]:
+        front, behind = told(doubled, masks, piece)
+        return [front, behind + next(bonus)]  # first where the piece was, then where it is
+
+    by_guesses = layered(counts, spread_px, everything_near)
+    monkeypatch.setattr(layer_search, "_told_by_itself", as_it_was_from_behind)
+    none_kept = layered(counts, spread_px, everything_near)
+    monkeypatch.setattr(layer_search, "guesses_of", lambda layers: ())
+    without = layered(counts, spread_px, everything_near)
+    np.testing.assert_array_equal(none_kept, without)
+    assert np.count_nonzero(by_guesses != without) > 500
 
 
 def test_borders_are_supposed_to_lie_farther_on_to_both_sides():
