@@ -34,7 +34,10 @@ ROUNDS = 3
 
 @dataclass(frozen=True)
 class Region:
-    """A piece of a plane: its cells are `number` in the map; the depth where it gains most, and how much."""
+    """A piece of a plane: its cells are `number` in the map; the depth where it gains most, and how much.
+
+    `gain_nats` is what is beyond chance, which brings it about once in e^gain times.
+    """
 
     number: int
     plane: int
@@ -152,7 +155,8 @@ def regions_of(
             own_depths = planes.within(int(own)) if own >= 0 else nowhere
             best = int(np.argmax(np.where(own_depths, evidence, -np.inf)))
             elsewhere = evidence[nowhere].max() if nowhere.any() else -np.inf
-            is_there = own >= 0 and evidence[best] > SURE_NATS and evidence[~nowhere].max() >= elsewhere
+            sure_nats = _beyond_chance(evidence, nowhere)
+            is_there = own >= 0 and sure_nats[best] > SURE_NATS and evidence[~nowhere].max() >= elsewhere
             number = len(found) + 1
             numbers[box][piece] = number
             if not is_there and elsewhere > evidence[best]:
@@ -163,7 +167,7 @@ def regions_of(
                     int(own) if is_there else -1,
                     int(piece.sum()),
                     float(planes.spread_px[best]),
-                    float(evidence[best]),
+                    float(sure_nats[best]),
                     bool(is_there),
                 )
             )
@@ -190,3 +194,18 @@ def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright:
     """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
     around = dilated(piece, HALO_CELLS) & (~bright[box] | piece)
     return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)
+
+
+def _beyond_chance(evidence: np.ndarray, nowhere: np.ndarray) -> np.ndarray:
+    """How sure the evidence (Z,) of each depth is: chance brings it about once in e^nats times.
+
+    Where a section shows only noise it predicts worse than a blurred one, by m on average and with the
+    variance 2 m: so much that e^evidence is 1 on average. Of many photons m exceeds what is to be found, and
+    is told by the depths of no plane; s standard deviations above -m are s^2 / 2 nats. Of few it is not, and
+    chance is not normal: then the evidence itself is what is sure.
+    """
+    noise = -float(np.median(evidence[nowhere])) if nowhere.any() else 0.0
+    if noise <= SURE_NATS:
+        return evidence
+    above = evidence + noise
+    return above * np.abs(above) / (4 * noise)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from pcii.focus import Focus
+from pcii.focus import Focus, focus_of
+from pcii.photon_counts import PhotonCounts
 from pcii.regions import HALO_CELLS, SMALLEST_CELLS, SURE_NATS, Planes, bright_cells, regions_of, settled
+from pcii.types import CameraGrid
 
 SHAPE = (30, 40)
 # Two planes, at 20 and 40 px of spread, among five searched depths.
@@ -150,3 +152,45 @@ def test_pieces_are_numbered_and_specks_left_out():
     numbers, regions = regions_of(plane, one | other | speck, focus, PLANES)
     assert [region.plane for region in regions] == [0, 1]
     np.testing.assert_array_equal(numbers, one + 2 * other)
+
+
+NOISE_NATS = 1000.0  # what noise costs at each depth, give or take sqrt(2000) = 45
+
+
+@pytest.mark.parametrize(("sigmas", "is_there"), [(4.0, False), (5.0, True)])
+def test_a_large_dim_region_is_there_if_its_depth_stands_out_of_the_noise(sigmas, is_there):
+    # 10 nats are e^-(s^2 / 2) = e^-10, s = 4.5 standard deviations.
+    piece = box(5, 5, 20, 30)
+    costs = [(depth, piece, -NOISE_NATS) for depth in range(SPREAD_PX.size)]
+    focus = focus_with(*costs, (FIRST, piece, sigmas * np.sqrt(2 * NOISE_NATS)))
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    assert region.is_there == is_there
+    assert region.gain_nats == pytest.approx(sigmas**2 / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize("elsewhere", [-SURE_NATS, -3.0, 0.0])
+def test_of_few_photons_the_evidence_itself_counts(elsewhere):
+    piece = box(10, 10, 6, 6)
+    focus = focus_with((FIRST, piece, 7.0), *((depth, piece, elsewhere) for depth in (0, BETWEEN, 4)))
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    assert not region.is_there
+
+
+@pytest.mark.parametrize("photons_per_px", [0.02, 0.1, 1.0])
+def test_noise_alone_is_never_sure(photons_per_px):
+    # The whole of a film on which nothing is: about a hundred nats of noise at each of 11 depths that may be
+    # a plane's. Five films are at most 55 trials, of which e^-10 is not one.
+    size, spread_px = 256, np.arange(60.0, 140.0, 2.0)
+    away = np.abs(spread_px - 100)
+    planes = Planes(spread_px, np.zeros(away.size, np.int64), away, near_px=4.5, far_px=10.0)
+    everything = np.ones((size // 4, size // 4), dtype=bool)
+    grid = CameraGrid(
+        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=size, width=size
+    )
+    for seed in range(5):
+        random = np.random.default_rng(seed)
+        events = random.poisson(photons_per_px / 100, (10, 10, size, size))
+        focus = focus_of(PhotonCounts.from_dense(events, grid, cfa="GRBG"), spread_px)
+        _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes)
+        assert np.median(focus.gain.sum(axis=(1, 2))) < -50
+        assert region.gain_nats < SURE_NATS
