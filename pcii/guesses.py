@@ -1,12 +1,12 @@
 """Pieces that may belong to another layer than the one that is seen there now.
 
-Guessed are pieces that a layer in front of all would explain, pieces of one light in the section at its
-depth, the hulls of what is seen of it already, for what crosses something is seen on both sides of it, and
-that a border between two layers lies farther on. Whether a guess is right is told by what it saves
-(`pcii.layer_search`); here it only must not be missed.
+Guessed are pieces that a layer in front of all would explain, discs where it would gain most, pieces of one
+light in the section at its depth, the hulls of what is seen of it already, for what crosses something is seen
+on both sides of it, and that a border between two layers lies farther on. Whether a guess is right is told
+by what it saves (`pcii.layer_search`); here it only must not be missed.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from pcii.cells import CELL_PX
 from pcii.focus import PICTURE_CELLS
-from pcii.foreground import connected_pieces, dilated, roberts_magnitude
+from pcii.foreground import box_around, connected_pieces, dilated, roberts_magnitude
 from pcii.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers
 from pcii.pieces import pieces_alike, pieces_along_ridges
 
@@ -27,8 +27,10 @@ ALIKE_CELLS, MOST_ALIKE, SAME_SHARE = 40, 8, 0.8
 fifths of what they cover one."""
 LEAST_OPEN_NATS = -0.2
 """What a layer in front of all would gain per cell, at least: it has only a part of the piece's light now."""
-MOST_HULLS = 3
-"""Hulls are of so many of the largest pieces of a layer, and of each two of them."""
+MOST_HULLS, MOST_PAIRED, MOST_HULLS_OF_TWO = 3, 14, 8
+"""Hulls are of so many of the largest pieces of a layer; and of two of so many, the best of them."""
+DISC_CELLS, MOST_DISCS = (6.0, 9.0, 13.5), 6
+"""Discs of 24, 36 and 54 px, so many of each where most is gained: the fit that follows outlines them."""
 SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
 """Less light than that cannot save what a guess must."""
 AROUND_CELLS = 8
@@ -71,7 +73,8 @@ def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, 
         yield layer, dilated(seen == layer, BEYOND_CELLS) & (seen == other)
     near_light = dilated(seen >= 0, 2)
     for layer, gain in enumerate(layers.in_the_open()):
-        whole = [hull & (seen != layer) & near_light for hull in _hulls(seen == layer)]
+        other = (seen != layer) & near_light
+        whole = [piece & other for piece in (*_hulls(seen == layer, gain), *_discs(gain, other))]
         whole += _alike(photons[layer], seen, layer, gain)
         yield from ((layer, piece) for piece in whole if gain[piece].sum() > LEAST_OPEN_NATS * piece.sum())
         for favour in FAVOURS_NATS:
@@ -81,16 +84,41 @@ def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, 
             yield layer, (inside > 0.5) & (seen != layer) & near_light
 
 
-def _hulls(mask: np.ndarray) -> Iterator[np.ndarray]:
-    """Convex hulls (h, w) bool of the largest pieces of a mask, and of each two of them."""
-    from skimage.morphology import convex_hull_image
+def _hulls(mask: np.ndarray, gain: np.ndarray) -> Iterator[np.ndarray]:
+    """Convex hulls (h, w) bool of the largest pieces of a mask, and of two of them where that gains most.
 
+    `gain` (h, w) is in nats, of what the hull adds to the mask.
+    """
     pieces = connected_pieces(mask)
     cells = np.bincount(pieces.ravel())
     cells[0] = 0
-    large = [piece for piece in np.argsort(-cells)[:MOST_HULLS] if cells[piece] >= ALIKE_CELLS]
-    for some in (*combinations(large, 1), *combinations(large, 2)):
-        yield np.asarray(convex_hull_image(np.isin(pieces, some)))
+    large = [piece for piece in np.argsort(-cells)[:MOST_PAIRED] if cells[piece] >= ALIKE_CELLS]
+    for piece in large[:MOST_HULLS]:
+        yield _hull(pieces == piece)
+    pairs = [_hull((pieces == one) | (pieces == other)) for one, other in combinations(large, 2)]
+    pairs.sort(key=lambda hull: -float(gain[hull & ~mask].sum()))
+    yield from _different(pairs, MOST_HULLS_OF_TWO)
+
+
+def _hull(mask: np.ndarray) -> np.ndarray:
+    from skimage.morphology import convex_hull_image
+
+    hull, box = mask.copy(), box_around(mask)
+    hull[box] = convex_hull_image(mask[box])
+    return hull
+
+
+def _discs(gain: np.ndarray, where: np.ndarray) -> Iterator[np.ndarray]:
+    """Discs (h, w) bool around places `where` (h, w) bool that gain (h, w) more than those around them."""
+    from scipy.ndimage import gaussian_filter, maximum_filter
+
+    i, j = np.indices(gain.shape)
+    for radius in DISC_CELLS:
+        blur = radius / 1.5
+        smooth = gaussian_filter(np.where(where, gain, 0), blur)
+        rows, cols = np.nonzero(where & (smooth == maximum_filter(smooth, int(2 * blur) | 1)))
+        for best in np.argsort(-smooth[rows, cols])[:MOST_DISCS]:
+            yield (i - rows[best]) ** 2 + (j - cols[best]) ** 2 <= radius**2
 
 
 def _alike(photons: np.ndarray, seen: np.ndarray, layer: int, gain: np.ndarray) -> Iterator[np.ndarray]:
@@ -106,11 +134,16 @@ def _alike(photons: np.ndarray, seen: np.ndarray, layer: int, gain: np.ndarray) 
     others = [piece & (seen != layer) for piece in pieces_alike(pieces, photons)]
     large = [piece for piece in others if np.count_nonzero(piece) >= ALIKE_CELLS]
     large.sort(key=lambda piece: -float(gain[piece].sum()))
+    yield from _different(large, MOST_ALIKE)
+
+
+def _different(pieces: Sequence[np.ndarray], most: int) -> list[np.ndarray]:
+    """The first of some pieces (h, w) bool, at `most` so many, without those that are nearly another one."""
     given: list[np.ndarray] = []
-    for piece in large:
-        if len(given) < MOST_ALIKE and not any(_same(piece, other) for other in given):
+    for piece in pieces:
+        if len(given) < most and not any(_same(piece, other) for other in given):
             given.append(piece)
-            yield piece
+    return given
 
 
 def _same(one: np.ndarray, other: np.ndarray) -> bool:

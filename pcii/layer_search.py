@@ -16,7 +16,7 @@ from pcii.cells import CELL_PX
 from pcii.foreground import box_around, dilated
 from pcii.geometry import whole_shifts_px
 from pcii.guesses import AROUND_CELLS, Guess, guesses_of
-from pcii.layers import BESIDE_SHARE, Layers, dark_of, masks_cost
+from pcii.layers import BESIDE_SHARE, Layers, dark_of
 from pcii.photon_counts import PhotonCounts, drawn
 from pcii.types import CameraGrid
 
@@ -25,9 +25,13 @@ MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
 are round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
 ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
+LIT_NATS = 0.1
+"""Two thirds of what cells cost, while pieces are guessed: else the middle of a thing before something bright
+is not worth its cells, since what it hides costs as much as before. Not from the start: where that is wrong
+in front of all, what is wrong is to go."""
 LEAST_NATS, PRIOR_SHARE = 5.0, 0.35
-"""What a guess must save; of what outlines and cells cost such a share counts for it. A fit that follows
-noise pays in full, but of pieces that are guessed there are few."""
+"""What a guess must save; of what outlines cost, and cells that else were dark, such a share counts for it. A
+fit that follows noise pays in full, but of pieces that are guessed there are few."""
 
 
 def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
@@ -97,6 +101,7 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
 
     `doubled` has each of the `layers` twice, for surfaces that are told by themselves at the same depth.
     """
+    layers.lit_nats = LIT_NATS
     layers.put(_masks_of(seen, len(layers.masks)))
     changed = np.ones(seen.shape, dtype=bool)
     for _ in range(ROUNDS):
@@ -133,7 +138,7 @@ def _tried(
     layers: Layers, doubled: Layers, guesses: Sequence[Guess], explained: np.ndarray
 ) -> tuple[np.ndarray, list[Guess]]:
     """What is explained (h, w) after those of the guesses were kept that lessen E, and which they are."""
-    before, seen = layers.masks.copy(), layers.visible()
+    before, seen, cost = layers.masks.copy(), layers.visible(), layers.cost_seen()
     guessed = before.copy()
     for guess in guesses:
         guessed[:, guess.cells] = False
@@ -142,7 +147,7 @@ def _tried(
     for _ in range(SWEEPS_OF_A_GUESS):
         layers.sweep()
     after, shown = layers.masks.copy(), layers.visible()
-    cheaper = PRIOR_SHARE * (masks_cost(before) - masks_cost(after))
+    cheaper = PRIOR_SHARE * (cost - layers.cost_seen())
     saved = _explained(doubled, after) - explained + cheaper
     better = [guess for guess in guesses if saved[guess.around].sum() > LEAST_NATS]
     kept: list[Guess] = []

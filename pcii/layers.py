@@ -7,8 +7,10 @@ photon predicted by all other photons. The masks sought are those of least
 
     E = - log likelihood of all photons + LENGTH_NATS per px of outline + AREA_NATS per cell.
 
-The last term is Occam's: where a nearer surface explains nothing better, the one behind goes on. Layers are
-fitted one by one, from far to near, each outline the best one given the others (total variation,
+The last term is Occam's: where a nearer surface explains nothing better, the one behind goes on. While masks
+are fitted `lit_nats` of it may be asked for rays alone that would else end in the dark: a piece is then not
+too dear because it hides another.
+Layers are fitted one by one, from far to near, each outline the best one given the others (total variation,
 `outline_kernels`), again and again.
 
 Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
@@ -76,17 +78,11 @@ def _views_of(
     return np.outer(*cameras)
 
 
-def masks_cost(masks: np.ndarray) -> np.ndarray:
-    """What the outlines and the cells of masks (D, h, w) cost, in nats, by the cell (h, w) of each."""
-    edge = np.pad(masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
-    length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
-    return LENGTH_NATS * CELL_PX * length + AREA_NATS * masks.sum(axis=0)
-
-
 class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
     `spread_px` (D,) ascends, from far to near; `dark` is the least and the most light behind all (`dark_of`).
+    `lit_nats`, from 0 to AREA_NATS, may be set at any time.
     """
 
     def __init__(self, counts: PhotonCounts, spread_px: np.ndarray, dark: tuple[float, float]) -> None:
@@ -94,6 +90,7 @@ class Layers:
 
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
+        self.lit_nats = 0.0
         self.least_dark, self.most_dark = dark
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
         self.n = events.n.astype(np.float32)
@@ -143,7 +140,24 @@ class Layers:
 
     def energy(self) -> float:
         """E of the masks as they are, in nats."""
-        return float((masks_cost(self.masks) - self.light_explained()).sum())
+        return float((self._outlines() + AREA_NATS * self.masks.sum(axis=0) - self.light_explained()).sum())
+
+    def cost_seen(self) -> np.ndarray:
+        """What outlines cost, and cells for the rays alone that end on any of them, in nats (h, w)."""
+        from pcii.layer_kernels import gathered
+
+        middle, lit = len(self.masks) // 2, np.zeros(self.covered.shape, np.float32)
+        for layer in range(len(self.masks)):
+            self._light_up(layer, lit)
+        rays = np.empty(self.light.shape)
+        gathered(lit, in_cells(self.rows[middle]), in_cells(self.cols[middle]), rays)
+        return self._outlines() + AREA_NATS / len(lit) * rays
+
+    def _outlines(self) -> np.ndarray:
+        """What the outlines of the masks cost, in nats, by the cell (h, w) of each."""
+        edge = np.pad(self.masks, ((0, 0), (0, 1), (0, 1)), mode="edge").astype(np.float32)
+        length = np.hypot(np.diff(edge, axis=1)[:, :, :-1], np.diff(edge, axis=2)[:, :-1]).sum(axis=0)
+        return LENGTH_NATS * CELL_PX * length
 
     def light_explained(self, *, beside: float = 1.0) -> np.ndarray:
         """Log likelihood of all photons but for a constant, in nats, by cell (h, w) of the middle layer.
@@ -182,6 +196,7 @@ class Layers:
         behind = np.full(self.covered.shape, self.least_dark, np.float32)
         dark = np.clip(self.blurred, self.least_dark, self.most_dark)
         kernels.paint(np.ones(dark.shape, dtype=bool), dark, self.rows[0], self.cols[0], behind)
+        lit = np.zeros(behind.shape, np.float32)
         for layer in range(len(self.masks)):
             mask = self.masks[layer]
             if not fit and not mask.any():
@@ -189,21 +204,42 @@ class Layers:
             self._cover(layer, -1)
             self._predict(layer, None if fit else self._claimed(layer), beside=beside)
             if fit:
-                self._fit(layer, rate, behind)
+                self._fit(layer, rate, behind, lit)
+                if self.lit_nats > 0:
+                    self._light_up(layer, lit)
             kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
         return rate, behind
 
-    def _fit(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> None:
+    def _fit(self, layer: int, rate: np.ndarray, behind: np.ndarray, lit: np.ndarray) -> None:
         """The layer's best mask in front of what is behind it."""
         from pcii.outline_kernels import shorten_outline
 
         gain = self._gain(layer, rate, behind)
         seen = self.free / (MOSTLY_HIDDEN * len(self.covered))
-        gain -= (AREA_NATS * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
+        gain -= ((AREA_NATS - self.lit_nats) * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
+        if self.lit_nats > 0:
+            gain -= np.float32(self.lit_nats) * self._lit_by(layer, lit)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
+
+    def _lit_by(self, layer: int, lit: np.ndarray) -> np.ndarray:
+        """Of the rays to each cell (h, w) the share that ends in the dark but for this layer.
+
+        `lit` (V, h, w) is the share of each view's cell that ends on what is behind it.
+        """
+        from pcii.layer_kernels import light_of
+
+        elsewhere = np.empty(self.light.shape, np.float32)
+        light_of(lit, self.covered, self.rows[layer], self.cols[layer], elsewhere)
+        return (self.free - elsewhere) / np.maximum(self.within[layer], 1)
+
+    def _light_up(self, layer: int, lit: np.ndarray) -> None:
+        """Add what ends on a layer to `lit` (V, h, w)."""
+        from pcii.layer_kernels import paint
+
+        paint(self.masks[layer], np.ones_like(self.light), self.rows[layer], self.cols[layer], lit)
 
     def _gain(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> np.ndarray:
         """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""

@@ -242,13 +242,75 @@ def test_what_crosses_something_is_supposed_between_what_is_seen_of_it():
     rod[30:34, 4:60] = True
     beside = rod.copy()
     beside[:, 20:44] = False
-    hulls = list(guesses._hulls(beside))
+    hulls = list(guesses._hulls(beside, np.zeros(beside.shape)))
     assert any(np.array_equal(hull, rod) for hull in hulls)
     # Alone each side is its own hull; crumbs have none.
     assert len(hulls) == 3
     crumbs = np.zeros_like(rod)
     crumbs[::8, ::8] = True
-    assert not list(guesses._hulls(crumbs))
+    assert not list(guesses._hulls(crumbs, np.zeros(crumbs.shape)))
+
+
+def test_of_many_pieces_those_two_are_joined_between_which_most_is_gained():
+    # Five bars of which the ends are seen: 45 pairs. Between the ends of the narrowest there is a gain.
+    bars = np.zeros((64, 64), dtype=bool)
+    for number, wide in enumerate((6, 6, 4, 6, 6)):
+        bars[4:60, 12 * number + 2 : 12 * number + 2 + wide] = True
+    ends, smallest = bars.copy(), np.zeros_like(bars)
+    ends[16:48] = False
+    smallest[4:60, 26:30] = True
+    gain = np.where(smallest & ~ends, 1.0, -1.0)
+    *_, first, second = list(guesses._hulls(ends, gain))[: guesses.MOST_HULLS + 2]
+    np.testing.assert_array_equal(first, smallest)
+    assert not np.array_equal(second, smallest)
+
+
+@pytest.mark.parametrize("radius", guesses.DISC_CELLS)
+def test_discs_are_guessed_where_most_is_gained(radius: float, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(guesses, "DISC_CELLS", (radius,))
+    i, j = np.indices((64, 64))
+    gain = np.full((64, 64), -1.0)
+    for row, column in ((20, 30), (44, 44)):
+        gain[(i - row) ** 2 + (j - column) ** 2 < 7**2] = 1.0
+    gain[:, 4:10] = 100.0  # what is the layer's already
+    discs = list(guesses._discs(gain, j > 12))
+    assert 2 <= len(discs) <= guesses.MOST_DISCS
+    for row, column in ((20, 30), (44, 44)):
+        # What is the layer's already pulls the widest by two cells, since it counts for nothing.
+        away = [np.hypot(*(np.argwhere(disc).mean(axis=0) - (row, column))) for disc in discs[:2]]
+        assert min(away) < 2.1
+    assert discs[0].sum() == pytest.approx(np.pi * radius**2, rel=0.05)
+
+
+def test_what_hides_another_costs_its_outline_and_what_is_lit_its_cells():
+    # A card of 32 x 32 cells, one of 20 x 20 before its middle, and the same where half of it is in the dark.
+    found = layers.Layers(bar_before_card(100), SPREAD_PX[:1].repeat(2), (1e-4, 1e-3))
+    card, middle, beside = np.zeros((3, 64, 64), dtype=bool)
+    card[16:48, 16:48] = middle[22:42, 22:42] = beside[22:42, 38:58] = True
+    found.put(np.stack([card, np.zeros_like(card)]))
+    alone = found.cost_seen().sum()
+    for front, lit_cells in ((middle, 0), (beside, 20 * 10)):
+        found.put(np.stack([card, front]))
+        outline = layers.LENGTH_NATS * CELL_PX * 4 * 20
+        more = found.cost_seen().sum() - alone
+        # A corner's outline is cut off: sqrt(2) cells instead of two.
+        assert more == pytest.approx(outline + layers.AREA_NATS * lit_cells, abs=layers.LENGTH_NATS * CELL_PX)
+
+
+def test_a_piece_before_another_is_fitted_at_the_price_of_what_it_lights(monkeypatch: pytest.MonkeyPatch):
+    # Both are at one depth, so that neither explains more.
+    priced: list[np.ndarray] = []
+    monkeypatch.setattr("pcii.outline_kernels.shorten_outline", lambda gain, *_: priced.append(gain.copy()))
+    found = layers.Layers(bar_before_card(100), SPREAD_PX[:1].repeat(2), (1e-4, 1e-3))
+    card = np.zeros((64, 64), dtype=bool)
+    card[16:48, 16:48] = True
+    for lit_nats in (0.0, 0.1):
+        found.lit_nats = lit_nats
+        found.put(np.stack([card, np.zeros_like(card)]))
+        found.sweep()
+    (_, dear, _, cheap), inside, outside = priced, np.s_[20:44, 20:44], np.s_[2:10, 20:44]
+    np.testing.assert_allclose((cheap - dear)[inside], 0.1, atol=1e-3)
+    np.testing.assert_allclose((cheap - dear)[outside], 0.0, atol=1e-3)
 
 
 def test_a_film_that_is_dark_around_is_cut_to_what_is_lit(monkeypatch: pytest.MonkeyPatch):
