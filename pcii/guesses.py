@@ -87,7 +87,7 @@ def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, 
 def _hulls(mask: np.ndarray, gain: np.ndarray) -> Iterator[np.ndarray]:
     """Convex hulls (h, w) bool of the largest pieces of a mask, and of two of them where that gains most.
 
-    `gain` (h, w) is in nats, of what the hull adds to the mask.
+    `gain` (h, w) is what the layer would gain in each cell; that of what a hull adds to the mask counts.
     """
     pieces = connected_pieces(mask)
     cells = np.bincount(pieces.ravel())

@@ -9,9 +9,8 @@ photon predicted by all other photons. The masks sought are those of least
 
 The last term is Occam's: where a nearer surface explains nothing better, the one behind goes on. While masks
 are fitted `lit_nats` of it may be asked for rays alone that would else end in the dark: a piece is then not
-too dear because it hides another.
-Layers are fitted one by one, from far to near, each outline the best one given the others (total variation,
-`outline_kernels`), again and again.
+too dear because it hides another. Layers are fitted one by one, from far to near, each outline the best one
+given the others (total variation, `outline_kernels`), again and again.
 
 Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
 """
