@@ -10,6 +10,7 @@ room        two or three solids before a wall of detail, on a desk or not: the f
 crossing    something plain across the middle of something else of nearly the same colour
 leaves      a thing of detail behind 24 to 48 small leaves, all of them of one material
 checks      two or three solids of coarse checks, one before the middle of the other
+shiny       two or three solids of plastic or metal, glossy or dull, each by itself
 """
 
 from collections.abc import Callable
@@ -26,7 +27,7 @@ REFERENCE_MM = 560.0
 PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
 LEAST_APART_MM = 80
 
-Kind = Literal["plain", "textured", "cards", "room", "crossing", "leaves", "checks"]
+Kind = Literal["plain", "textured", "cards", "room", "crossing", "leaves", "checks", "shiny"]
 KINDS: dict[Kind, Literal["untextured", "textured", "cluttered"]] = {
     "plain": "untextured",
     "textured": "textured",
@@ -35,6 +36,7 @@ KINDS: dict[Kind, Literal["untextured", "textured", "cluttered"]] = {
     "crossing": "untextured",
     "leaves": "cluttered",
     "checks": "textured",
+    "shiny": "untextured",
 }
 """What is hard about each, in the words of corpus.toml."""
 
@@ -74,6 +76,10 @@ def _things(random: Random, kind: Kind) -> tuple[list[str], list[int]]:
             # Close together, so that borders run through the middle of what is behind.
             return _solids(
                 random, coarse, first_mm=(-30, -45), apart_mm=(30, 60), radius_mm=(40, 60), high_mm=30
+            )
+        case "shiny":
+            return _solids(
+                random, _shiny, first_mm=(-60, -105), apart_mm=(95, 115), radius_mm=(30, 48), high_mm=60
             )
 
 
@@ -260,6 +266,14 @@ def _noise(random: Random, colour: str) -> str:
         f'texture = {{ type = "noise", exponent = {exponent:.2f}, contrast = {contrast:.2f}, '
         f"colour = {colour}, chroma = {random.uniform(0, 0.4):.2f}, seed = {random.randrange(1000)} }}"
     )
+
+
+def _shiny(random: Random) -> str:
+    roughness = f"roughness = {10 ** random.uniform(-1.4, -0.3):.2f}"
+    if random.random() < 0.5:
+        return f'{_plain(random)}, finish = {{ type = "plastic", {roughness} }}'
+    metal = random.choice(["Ag", "Al", "Au", "Cr", "Cu", "W"])
+    return f'finish = {{ type = "metal", name = "{metal}", {roughness} }}'
 
 
 def _pattern(random: Random) -> str:

@@ -101,12 +101,11 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
 
     `doubled` has each of the `layers` twice, for surfaces that are told by themselves at the same depth.
     """
-    layers.lit_nats = LIT_NATS
     layers.put(_masks_of(seen, len(layers.masks)))
     changed = np.ones(seen.shape, dtype=bool)
     for _ in range(ROUNDS):
         for _ in range(SWEEPS_OF_A_GUESS):
-            layers.sweep()
+            layers.sweep(LIT_NATS)
         explained = _explained(doubled, layers.masks)
         # Where nothing has changed since, the same guess would fail again.
         guesses = [guess for guess in guesses_of(layers) if (guess.around & changed).any()]
@@ -145,7 +144,7 @@ def _tried(
         guessed[guess.layer, guess.cells] = True
     layers.put(guessed)
     for _ in range(SWEEPS_OF_A_GUESS):
-        layers.sweep()
+        layers.sweep(LIT_NATS)
     after, shown = layers.masks.copy(), layers.visible()
     cheaper = PRIOR_SHARE * (cost - layers.cost_seen())
     saved = _explained(doubled, after) - explained + cheaper

@@ -8,7 +8,7 @@ photon predicted by all other photons. The masks sought are those of least
     E = - log likelihood of all photons + LENGTH_NATS per px of outline + AREA_NATS per cell.
 
 The last term is Occam's: where a nearer surface explains nothing better, the one behind goes on. While masks
-are fitted `lit_nats` of it may be asked for rays alone that would else end in the dark: a piece is then not
+are fitted some of it may be asked for rays alone that would else end in the dark: a piece is then not
 too dear because it hides another. Layers are fitted one by one, from far to near, each outline the best one
 given the others (total variation, `outline_kernels`), again and again.
 
@@ -81,7 +81,6 @@ class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
     `spread_px` (D,) ascends, from far to near; `dark` is the least and the most light behind all (`dark_of`).
-    `lit_nats`, from 0 to AREA_NATS, may be set at any time.
     """
 
     def __init__(self, counts: PhotonCounts, spread_px: np.ndarray, dark: tuple[float, float]) -> None:
@@ -89,7 +88,6 @@ class Layers:
 
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
-        self.lit_nats = 0.0
         self.least_dark, self.most_dark = dark
         self.rows, self.cols = whole_shifts_px(grid, spread_px)
         self.n = events.n.astype(np.float32)
@@ -133,9 +131,12 @@ class Layers:
         where = self.colours[inside].astype(np.int64) * (h * w) + self.cells[layer][inside]
         return np.bincount(where, self.n[inside], C * h * w).reshape(C, h, w)
 
-    def sweep(self) -> None:
-        """Fit each layer's mask to the others, from far to near."""
-        self._compose(fit=True)
+    def sweep(self, lit_nats: float = 0.0) -> None:
+        """Fit each layer's mask to the others, from far to near.
+
+        `lit_nats`, of the AREA_NATS, are asked for rays alone that would else end in the dark.
+        """
+        self._compose(fit=True, lit_nats=lit_nats)
 
     def energy(self) -> float:
         """E of the masks as they are, in nats."""
@@ -184,7 +185,9 @@ class Layers:
         self._cover_all(1)
         return gains
 
-    def _compose(self, *, fit: bool, beside: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    def _compose(
+        self, *, fit: bool, beside: float = 1.0, lit_nats: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rates (N,) of the events and light (V, h, w) of the views, all layers in front of the dark."""
         from pcii import layer_kernels as kernels
 
@@ -203,25 +206,27 @@ class Layers:
             self._cover(layer, -1)
             self._predict(layer, None if fit else self._claimed(layer), beside=beside)
             if fit:
-                self._fit(layer, rate, behind, lit)
-                if self.lit_nats > 0:
-                    self._light_up(layer, lit)
+                self._fit(layer, rate, behind, lit_nats, lit)
             kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
         return rate, behind
 
-    def _fit(self, layer: int, rate: np.ndarray, behind: np.ndarray, lit: np.ndarray) -> None:
-        """The layer's best mask in front of what is behind it."""
+    def _fit(
+        self, layer: int, rate: np.ndarray, behind: np.ndarray, lit_nats: float, lit: np.ndarray
+    ) -> None:
+        """The layer's best mask in front of what is behind it; what ends on it is added to `lit`."""
         from pcii.outline_kernels import shorten_outline
 
         gain = self._gain(layer, rate, behind)
         seen = self.free / (MOSTLY_HIDDEN * len(self.covered))
-        gain -= ((AREA_NATS - self.lit_nats) * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
-        if self.lit_nats > 0:
-            gain -= np.float32(self.lit_nats) * self._lit_by(layer, lit)
+        gain -= ((AREA_NATS - lit_nats) * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
+        if lit_nats > 0:
+            gain -= np.float32(lit_nats) * self._lit_by(layer, lit)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
+        if lit_nats > 0:
+            self._light_up(layer, lit)
 
     def _lit_by(self, layer: int, lit: np.ndarray) -> np.ndarray:
         """Of the rays to each cell (h, w) the share that ends in the dark but for this layer.

@@ -24,6 +24,9 @@ BRIGHT_SHARE = 0.1
 SKIRT_CELLS = 17
 """Bright is what exceeds the dark by 6 standard deviations and by a tenth of the brightest within 32 px, of
 which it may be a blurred skirt."""
+AS_BRIGHT_SHARE, AROUND_CELLS = 0.5, 33
+"""What a highlight is on goes on around it, though far darker: half as bright as is typical of what is bright
+within 64 px is no skirt."""
 STRAY_SHARE = 0.1
 """Nor is it much darker than what half of the photons come from, which single photons in the dark are."""
 OWN_OPINION_CELLS = 25
@@ -89,7 +92,18 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     order = np.argsort(smooth, axis=None)
     half = float(smooth.ravel()[order[np.searchsorted(np.cumsum(photons.ravel()[order]), total / 2)]])
     least = max(BRIGHT_SIGMAS * noise, STRAY_SHARE * (half - dark))
-    return smooth > dark + np.maximum(least, BRIGHT_SHARE * (nearby - dark))
+    bright = smooth > dark + np.maximum(least, BRIGHT_SHARE * (nearby - dark))
+    return bright | (smooth > dark + np.maximum(least, AS_BRIGHT_SHARE * (_typical(smooth, bright) - dark)))
+
+
+def _typical(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """The geometric mean of the values > 0 (h, w) that are `where` (h, w) around each; inf if none is."""
+    from scipy.ndimage import uniform_filter
+
+    share = uniform_filter(where.astype(np.float64), AROUND_CELLS)
+    logarithm = uniform_filter(np.log(values, where=where, out=np.zeros(where.shape)), AROUND_CELLS)
+    some = share > 0.5 / AROUND_CELLS**2
+    return np.exp(np.divide(logarithm, share, where=some, out=np.full(where.shape, np.inf)))
 
 
 def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes) -> np.ndarray:

@@ -1,4 +1,5 @@
 import itertools
+from typing import Any
 
 import numpy as np
 import pytest
@@ -212,6 +213,54 @@ def test_a_piece_that_is_told_better_from_behind_its_layer_stays(monkeypatch: py
     assert np.count_nonzero(by_guesses != without) > 500
 
 
+class Still:
+    """Layers that are as they were put: two of 20 x 20 cells, of which the nearer is empty at first."""
+
+    def __init__(self) -> None:
+        self.masks = np.zeros((2, 20, 20), dtype=bool)
+        self.masks[0] = True
+
+    def put(self, masks: np.ndarray) -> None:
+        self.masks = masks.copy()
+
+    def visible(self) -> np.ndarray:
+        return np.where(self.masks[1], 1, 0)
+
+    def cost_seen(self) -> np.ndarray:
+        return np.zeros((20, 20))
+
+    def sweep(self, lit_nats: float) -> None:
+        pass
+
+
+@pytest.mark.parametrize(
+    ("told_apart", "by_itself", "kept"),
+    [
+        (20, 20, True),
+        (4, 20, False),
+        (20, 4, False),  # it is no better by itself: what stands out saves at any depth
+    ],
+)
+def test_a_guess_must_be_better_told_apart_and_better_by_itself(
+    monkeypatch: pytest.MonkeyPatch, told_apart: float, by_itself: float, *, kept: bool
+):
+    def explained(doubled: object, masks: np.ndarray) -> np.ndarray:
+        return told_apart * masks[1] / 25
+
+    def told_by_itself(doubled: object, masks: np.ndarray, piece: np.ndarray) -> list[np.ndarray]:
+        return [by_itself * piece[1] / 25, np.zeros((20, 20))]
+
+    monkeypatch.setattr(layer_search, "_explained", explained)
+    monkeypatch.setattr(layer_search, "_told_by_itself", told_by_itself)
+    still: Any = Still()
+    cells = np.zeros((20, 20), dtype=bool)
+    cells[5:10, 5:10] = True
+    guess = guesses.Guess(1, cells, np.ones_like(cells))
+    _, found = layer_search._tried(still, still, [guess], np.zeros((20, 20)))
+    assert found == ([guess] if kept else [])
+    assert still.masks[1].any() == kept
+
+
 def test_borders_are_supposed_to_lie_farther_on_to_both_sides():
     counts, spread_px, truth = card_before_card(500)
     fitted = layers.Layers(counts, spread_px, (1e-3, 1e-2))
@@ -305,9 +354,8 @@ def test_a_piece_before_another_is_fitted_at_the_price_of_what_it_lights(monkeyp
     card = np.zeros((64, 64), dtype=bool)
     card[16:48, 16:48] = True
     for lit_nats in (0.0, 0.1):
-        found.lit_nats = lit_nats
         found.put(np.stack([card, np.zeros_like(card)]))
-        found.sweep()
+        found.sweep(lit_nats)
     (_, dear, _, cheap), inside, outside = priced, np.s_[20:44, 20:44], np.s_[2:10, 20:44]
     np.testing.assert_allclose((cheap - dear)[inside], 0.1, atol=1e-3)
     np.testing.assert_allclose((cheap - dear)[outside], 0.0, atol=1e-3)

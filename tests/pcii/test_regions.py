@@ -72,6 +72,24 @@ def test_one_lamp_does_not_put_out_the_rest():
     assert bright[here].mean() > 0.9
 
 
+def test_around_a_highlight_goes_on_what_it_is_on(monkeypatch: pytest.MonkeyPatch):
+    # A disc of 20 photons per cell with a highlight fifty times as bright, and a lamp by itself.
+    from scipy.ndimage import gaussian_filter
+
+    i, j = np.indices((80, 160))
+    disc = np.hypot(i - 40, j - 40) < 26
+    lamps = (np.hypot(i - 32, j - 46) < 3) | (np.hypot(i - 40, j - 120) < 1.5)
+    photons = np.where(disc, 20.0, 0.05) + gaussian_filter(np.where(lamps, 1000.0, 0.0), 1.5)
+    photons = np.random.default_rng(4).poisson(photons).astype(np.float32)
+    inner, alone = np.hypot(i - 40, j - 40) < 24, np.s_[:, 80:]
+    bright = bright_cells(photons)
+    assert bright[inner].mean() > 0.99
+    monkeypatch.setattr("pcii.regions.AS_BRIGHT_SHARE", np.inf)
+    parted = bright_cells(photons)
+    assert parted[inner].mean() < 0.9
+    np.testing.assert_array_equal(bright[alone], parted[alone])
+
+
 def test_a_dim_but_even_surround_is_dark():
     # A thing of 160 photons per cell before a wall of 40: the wall is as bright as parts of things may be,
     # but even. One that is lit from the side is not, and is seen as a thing.
