@@ -2,7 +2,7 @@
 
 A region is a connected piece of what is bright and has one label. Its evidence is summed over it and the
 dark around it, where a blurred outline would show. A piece that its neighbour's plane explains as well is
-its neighbour's; a region that some depth far from every plane explains better is defocused.
+its neighbour's; a region that some depth far from every plane explains surely better is defocused.
 """
 
 from dataclasses import dataclass
@@ -93,10 +93,11 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     half = float(smooth.ravel()[order[np.searchsorted(np.cumsum(photons.ravel()[order]), total / 2)]])
     least = max(BRIGHT_SIGMAS * noise, STRAY_SHARE * (half - dark))
     bright = smooth > dark + np.maximum(least, BRIGHT_SHARE * (nearby - dark))
-    return bright | (smooth > dark + np.maximum(least, AS_BRIGHT_SHARE * (_typical(smooth, bright) - dark)))
+    lit = AS_BRIGHT_SHARE * (_typical_around(smooth, bright) - dark)
+    return bright | (smooth > dark + np.maximum(least, lit))
 
 
-def _typical(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+def _typical_around(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     """The geometric mean of the values > 0 (h, w) that are `where` (h, w) around each; inf if none is."""
     from scipy.ndimage import uniform_filter
 
@@ -170,7 +171,10 @@ def regions_of(
             best = int(np.argmax(np.where(own_depths, evidence, -np.inf)))
             elsewhere = evidence[nowhere].max() if nowhere.any() else -np.inf
             sure_nats = _beyond_chance(evidence, nowhere)
-            is_there = own >= 0 and sure_nats[best] > SURE_NATS and evidence[~nowhere].max() >= elsewhere
+            # Planes are where things are looked for: that one is elsewhere must be sure, too; not of a speck.
+            doubt_nats = SURE_NATS if piece.sum() >= OWN_OPINION_CELLS else 0.0
+            in_focus = evidence[~nowhere].max() >= elsewhere - doubt_nats
+            is_there = own >= 0 and sure_nats[best] > SURE_NATS and in_focus
             number = len(found) + 1
             numbers[box][piece] = number
             if not is_there and elsewhere > evidence[best]:

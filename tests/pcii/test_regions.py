@@ -149,11 +149,19 @@ def test_a_region_is_at_the_depth_that_gains_most_with_the_dark_around_it():
 @pytest.mark.parametrize("depth", [0, BETWEEN, 4])
 def test_a_region_that_another_depth_explains_better_is_not_there(depth):
     piece = box(10, 10, 6, 6)
-    focus = focus_with((FIRST, piece, 40.0), (depth, piece, 50.0))
+    focus = focus_with((FIRST, piece, 40.0), (depth, piece, 41.0 + SURE_NATS))
     _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
     assert not region.is_there
     assert region.plane == -1
     assert region.spread_px == SPREAD_PX[depth]
+
+
+@pytest.mark.parametrize(("side_cells", "is_there"), [(6, True), (4, False)])
+def test_noise_does_not_put_a_region_out_of_focus_unless_it_is_a_speck(side_cells, is_there):
+    piece = box(10, 10, side_cells, side_cells)
+    focus = focus_with((FIRST, piece, 40.0), (BETWEEN, piece, 39.0 + SURE_NATS))
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    assert region.is_there == is_there
 
 
 @pytest.mark.parametrize(("nats", "is_there"), [(SURE_NATS - 1, False), (SURE_NATS + 1, True)])
