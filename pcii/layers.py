@@ -198,7 +198,7 @@ class Layers:
         behind = np.full(self.covered.shape, self.least_dark, np.float32)
         dark = np.clip(self.blurred, self.least_dark, self.most_dark)
         kernels.paint(np.ones(dark.shape, dtype=bool), dark, self.rows[0], self.cols[0], behind)
-        lit = np.zeros(behind.shape, np.float32) if lit_nats > 0 else None
+        lit = np.zeros(behind.shape, np.float32)
         for layer in range(len(self.masks)):
             mask = self.masks[layer]
             if not fit and not mask.any():
@@ -213,19 +213,19 @@ class Layers:
         return rate, behind
 
     def _fit(
-        self, layer: int, rate: np.ndarray, behind: np.ndarray, lit_nats: float, lit: np.ndarray | None
+        self, layer: int, rate: np.ndarray, behind: np.ndarray, lit_nats: float, lit: np.ndarray
     ) -> None:
-        """The layer's best mask in front of what is behind it; what ends on it is added to any `lit`."""
+        """The layer's best mask in front of what is behind it; what ends on it is added to `lit`."""
         from pcii.outline_kernels import shorten_outline
 
         gain = self._gain(layer, rate, behind)
         seen = self.free / (MOSTLY_HIDDEN * len(self.covered))
         gain -= ((AREA_NATS - lit_nats) * np.clip(seen, HIDDEN_SHARE, 1)).astype(np.float32)
-        if lit is not None:
+        if lit_nats > 0:
             gain -= np.float32(lit_nats) * self._lit_by(layer, lit)
         shorten_outline(gain, LENGTH_NATS * CELL_PX, STEPS, *self.relaxed[layer])
         self.masks[layer] = self.relaxed[layer, 0] > 0.5
-        if lit is not None:
+        if lit_nats > 0:
             self._light_up(layer, lit)
 
     def _lit_by(self, layer: int, lit: np.ndarray) -> np.ndarray:

@@ -4,8 +4,8 @@
    is evidence of focus (`pcii.focus`), summed over windows that stop at the edges that the section shows.
 2. Each cell of 4 px takes the requested plane that has most of it, and every change costs (`best_labels`).
 3. Connected pieces of what is bright are judged as wholes: a piece without evidence of its own joins its
-   neighbour, and one that a depth far from every plane explains surely better is defocused
-   (`pcii.regions`).
+   neighbour, and one that a depth far from every plane explains surely better is defocused.
+   (`pcii.regions`)
 4. Where pieces of several planes touch they are compared photon by photon: what does each of their depths
    predict of it that the others do not? (`pcii.duel`)
 5. There, and everywhere if light is scarce, opaque layers are fitted to all photons together: what a nearer

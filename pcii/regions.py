@@ -30,7 +30,8 @@ within 64 px is no skirt."""
 STRAY_SHARE = 0.1
 """Nor is it much darker than what half of the photons come from, which single photons in the dark are."""
 OWN_OPINION_CELLS = 25
-"""A piece of less than 20 x 20 px within something larger is narrower than the windows that put it there."""
+"""A piece of less than 20 x 20 px within something larger is narrower than the windows that put it there; one
+by itself has the evidence of the dark around it, and no benefit of doubt about whether it is in focus."""
 SMALLEST_CELLS = 6
 ROUNDS = 3
 
@@ -93,8 +94,8 @@ def bright_cells(photons: np.ndarray) -> np.ndarray:
     half = float(smooth.ravel()[order[np.searchsorted(np.cumsum(photons.ravel()[order]), total / 2)]])
     least = max(BRIGHT_SIGMAS * noise, STRAY_SHARE * (half - dark))
     bright = smooth > dark + np.maximum(least, BRIGHT_SHARE * (nearby - dark))
-    lit = AS_BRIGHT_SHARE * (_typical_around(smooth, bright) - dark)
-    return bright | (smooth > dark + np.maximum(least, lit))
+    half_as_bright = AS_BRIGHT_SHARE * (_typical_around(smooth, bright) - dark)
+    return bright | (smooth > dark + np.maximum(least, half_as_bright))
 
 
 def _typical_around(values: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -164,7 +165,8 @@ def regions_of(
     nowhere = planes.away_px > planes.far_px
     for own in np.unique(plane[bright]):
         for box, piece in _pieces(bright & (plane == own)):
-            if piece.sum() < SMALLEST_CELLS:
+            cells = int(piece.sum())
+            if cells < SMALLEST_CELLS:
                 continue
             evidence = _evidence(focus, box, piece, bright)
             own_depths = planes.within(int(own)) if own >= 0 else nowhere
@@ -172,7 +174,7 @@ def regions_of(
             elsewhere = evidence[nowhere].max() if nowhere.any() else -np.inf
             sure_nats = _beyond_chance(evidence, nowhere)
             # Planes are where things are looked for: that one is elsewhere must be sure, too; not of a speck.
-            doubt_nats = SURE_NATS if piece.sum() >= OWN_OPINION_CELLS else 0.0
+            doubt_nats = SURE_NATS if cells >= OWN_OPINION_CELLS else 0.0
             in_focus = evidence[~nowhere].max() >= elsewhere - doubt_nats
             is_there = own >= 0 and sure_nats[best] > SURE_NATS and in_focus
             number = len(found) + 1
@@ -183,7 +185,7 @@ def regions_of(
                 Region(
                     number,
                     int(own) if is_there else -1,
-                    int(piece.sum()),
+                    cells,
                     float(planes.spread_px[best]),
                     float(sure_nats[best]),
                     bool(is_there),
