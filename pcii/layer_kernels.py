@@ -48,6 +48,30 @@ def _add_moved(values: np.ndarray, down: int, right: int, row: int, times: float
 
 
 @helper
+def _views_at(rows: np.ndarray, cols: np.ndarray, p: int, q: int) -> np.ndarray:
+    """The views (n,) whose shifts are p px down and q px to the right of whole cells."""
+    views = np.empty(rows.size * cols.size, np.int64)
+    found = 0
+    for v in range(views.size):
+        if rows[v // cols.size] % CELL_PX == p and cols[v % cols.size] % CELL_PX == q:
+            views[found] = v
+            found += 1
+    return views[:found]
+
+
+@helper
+def _moved_in_parts(values: np.ndarray, p: int, q: int, times: float) -> np.ndarray:
+    """What cells show of `values` (H, W) that lie p px above and q px left of them: (H + 1, W + 1).
+
+    Its first row and column lie before the first of the values. Views that differ by whole cells share it.
+    """
+    moved = np.zeros((values.shape[0] + 1, values.shape[1] + 1), values.dtype)
+    for row in range(moved.shape[0]):
+        _add_moved(values, p - CELL_PX, q - CELL_PX, row, times, moved[row])
+    return moved
+
+
+@helper
 def _filled(mask: np.ndarray) -> tuple[int, int, int, int]:
     """First and last row + 1, first and last column + 1 in which a mask (H, W) has anything."""
     H, W = mask.shape
@@ -67,14 +91,6 @@ def _seen(first: int, last: int, moved: int, size: int) -> tuple[int, int]:
 
 
 @helper
-def _open(covered: np.ndarray, share: np.ndarray) -> None:
-    """The `share` (W,) of each cell that is not `covered` (W,)."""
-    for j in range(share.size):
-        px = max(np.int32(PARTS) - np.int32(covered[j]), np.int32(0))
-        share[j] = np.float32(1 / PARTS) * np.float32(px)
-
-
-@helper
 def _look_through(
     covered: np.ndarray,
     behind: np.ndarray | None,
@@ -87,35 +103,63 @@ def _look_through(
 
     Of what is `behind` (V, H, W), or themselves if that is not given.
     """
-    V, H, W = covered.shape
-    seen = np.empty(W, np.float32)
+    _, H, W = covered.shape
+    n = band.shape[0]
     band[:] = 0
-    for v in range(V):
-        down, right = rows[v // cols.size], -cols[v % cols.size]
-        for row in range(*_seen(top, top + band.shape[0], down, H)):
-            _open(covered[v, row], seen)
-            if behind is not None:
-                light = behind[v, row]
-                for j in range(W):
-                    seen[j] *= light[j]
-            for u in range(2):  # the row lies over two of the layer's
-                at, high = row + down // CELL_PX + u - top, down % CELL_PX if u else CELL_PX - down % CELL_PX
-                if high > 0 and 0 <= at < band.shape[0]:
-                    _add_row(seen, right, high / PARTS, band[at])
+    for part in range(PARTS):
+        p, q = part // CELL_PX, part % CELL_PX
+        views = _views_at(rows, -cols, p, q)
+        if views.size == 0:
+            continue
+        # Views that differ by whole cells are added up first, from a row before the band on.
+        seen = np.zeros((n + 1, W + 1), np.float32)
+        for v in views:
+            down, right = rows[v // cols.size] // CELL_PX, -cols[v % cols.size] // CELL_PX
+            first = min(max(0, -right), W + 1)
+            last = max(first, min(W + 1, W - right))
+            for row in range(max(0, top - 1 - down), min(H, top + n - down)):
+                line = seen[row + down - top + 1, first:last]
+                hidden = covered[v, row, first + right : last + right]
+                if behind is not None:
+                    light = behind[v, row, first + right : last + right]
+                    for j in range(line.size):
+                        line[j] += (
+                            np.float32(max(np.int32(PARTS) - np.int32(hidden[j]), np.int32(0))) * light[j]
+                        )
+                else:
+                    for j in range(line.size):
+                        line[j] += np.float32(max(np.int32(PARTS) - np.int32(hidden[j]), np.int32(0)))
+        for u in range(2):
+            for x in range(2):
+                high, wide = p if u else CELL_PX - p, q if x else CELL_PX - q
+                weight = np.float32(high * wide / PARTS**2)
+                for i in range(n):
+                    line, there = band[i], seen[i + 1 - u, x : x + W]
+                    for j in range(W):
+                        line[j] += weight * there[j]
 
 
 @compiled
 def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, covered: np.ndarray) -> None:
     """Adds `step` times the px of a `mask` (H, W) in each cell of the views to `covered` (V, H, W) uint16."""
-    H = mask.shape[0]
+    _, H, W = covered.shape
     top, bottom, left, right = _filled(mask)
     cells = mask[top:bottom, left:right].astype(np.uint16)
-    for view in nb.prange(covered.shape[0]):
-        v = np.int64(view)
-        # What is cut out lies that much nearer to the frame.
-        down, over = rows[v // cols.size], cols[v % cols.size] - left * CELL_PX
-        for i in range(*_seen(top, bottom, down, H)):
-            _add_moved(cells, down - top * CELL_PX, over, i, step, covered[v, i])
+    for part in nb.prange(PARTS):
+        p, q = np.int64(part) // CELL_PX, np.int64(part) % CELL_PX
+        views = _views_at(rows, cols, p, q)
+        if views.size == 0:
+            continue
+        moved = _moved_in_parts(cells, p, q, step)
+        for v in views:
+            down, over = rows[v // cols.size], cols[v % cols.size]
+            first, last = _seen(left, right, over, W)
+            begin = first + over // CELL_PX + 1 - left
+            for i in range(*_seen(top, bottom, down, H)):
+                line, row = covered[v, i, first:last], i + down // CELL_PX + 1 - top
+                there = moved[row, begin : begin + line.size]
+                for j in range(line.size):
+                    line[j] += there[j]
 
 
 @compiled
@@ -123,24 +167,25 @@ def paint(
     mask: np.ndarray, light: np.ndarray, rows: np.ndarray, cols: np.ndarray, behind: np.ndarray
 ) -> None:
     """Where a layer's `mask` (H, W) is, views show its `light` (H, W) before what is `behind` (V, H, W)."""
-    H, W = mask.shape
+    _, H, W = behind.shape
     top, bottom, left, right = _filled(mask)
     there = mask[top:bottom, left:right].astype(np.float32)
     shown = there * light[top:bottom, left:right]
-    for view in nb.prange(behind.shape[0]):
-        v = np.int64(view)
-        down, over = rows[v // cols.size], cols[v % cols.size]
-        first, last = _seen(left, right, over, W)
-        own, share = np.empty(last - first, np.float32), np.empty(last - first, np.float32)
-        moved = over + (first - left) * CELL_PX
-        for i in range(*_seen(top, bottom, down, H)):
-            own[:] = 0
-            share[:] = 0
-            _add_moved(shown, down - top * CELL_PX, moved, i, 1 / PARTS, own)
-            _add_moved(there, down - top * CELL_PX, moved, i, 1 / PARTS, share)
-            line = behind[v, i, first:last]
-            for j in range(line.size):
-                line[j] = line[j] * (1 - share[j]) + own[j]
+    for part in nb.prange(PARTS):
+        p, q = np.int64(part) // CELL_PX, np.int64(part) % CELL_PX
+        views = _views_at(rows, cols, p, q)
+        if views.size == 0:
+            continue
+        shares, lights = _moved_in_parts(there, p, q, 1 / PARTS), _moved_in_parts(shown, p, q, 1 / PARTS)
+        for v in views:
+            down, over = rows[v // cols.size], cols[v % cols.size]
+            first, last = _seen(left, right, over, W)
+            begin = first + over // CELL_PX + 1 - left
+            for i in range(*_seen(top, bottom, down, H)):
+                line, row = behind[v, i, first:last], i + down // CELL_PX + 1 - top
+                share, own = shares[row, begin : begin + line.size], lights[row, begin : begin + line.size]
+                for j in range(line.size):
+                    line[j] = line[j] * (1 - share[j]) + own[j]
 
 
 @compiled
@@ -178,9 +223,17 @@ def gathered(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, result: np.
                 first = 0
             if a == H - 1:
                 last = H - 1
+            # Of a view's columns those before `begin` land at the first, those from `end` on at the last.
+            begin, end = min(max(0, -right), W), max(min(W, W - right), 0)
             for i in range(max(0, first), min(H - 1, last) + 1):
-                for j in range(W):
-                    result[a, min(max(j + right, 0), W - 1)] += values[v, i, j]
+                row = values[v, i]
+                for j in range(begin):
+                    result[a, 0] += row[j]
+                within, there = result[a, begin + right : end + right], row[begin:end]
+                for j in range(there.size):
+                    within[j] += there[j]
+                for j in range(end, W):
+                    result[a, W - 1] += row[j]
 
 
 @helper

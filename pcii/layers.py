@@ -77,6 +77,12 @@ def _views_of(
     return np.outer(*cameras)
 
 
+def _filled_rows(mask: np.ndarray) -> tuple[int, int]:
+    """The first row and the last + 1 in which a mask (h, w) has anything."""
+    rows = np.flatnonzero(mask.any(axis=1))
+    return int(rows[0]), int(rows[-1]) + 1
+
+
 class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
@@ -204,9 +210,11 @@ class Layers:
             if not fit and not mask.any():
                 continue
             self._cover(layer, -1)
-            self._predict(layer, None if fit else self._claimed(layer), beside=beside)
             if fit:
+                self._predict(layer)
                 self._fit(layer, rate, behind, lit_nats, lit)
+            else:
+                self._predict(layer, self._claimed(layer), _filled_rows(mask), beside=beside)
             kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
@@ -256,12 +264,18 @@ class Layers:
         return gain
 
     def _predict(
-        self, layer: int, asked: np.ndarray | None = None, *, beside: float = 1.0, blurred: bool = False
+        self,
+        layer: int,
+        asked: np.ndarray | None = None,
+        asked_rows: tuple[int, int] | None = None,
+        *,
+        beside: float = 1.0,
+        blurred: bool = False,
     ) -> None:
         """What the rays that reach a layer say of its light; those `beside` its mask count so much.
 
-        Rates are wanted of the events that are `asked` for (N,), of all if not given; if `blurred`, by the
-        widest window alone.
+        Rates are wanted of the events that are `asked` for (N,), light of the cells in `asked_rows`, the
+        first and the last + 1; of all if not given. If `blurred`, by the widest window alone.
         """
         from pcii.kernels import threads
         from pcii.prediction_kernels import BASE_SCALE, predict_shared
@@ -275,6 +289,7 @@ class Layers:
             weight *= share.ravel()[np.maximum(cell, 0)]
         if asked is None:
             asked = np.ones(self.n.size, dtype=bool)
+        first, last = asked_rows or (0, len(self.light))
         events = (*self.place, self.colours, self.n, weight, self.cells[layer])
         section = (
             self.rows[layer],
@@ -285,9 +300,10 @@ class Layers:
             PRIOR_SAMPLES,
         )
         told = (self.rate, self.base, self.samples, self.light, self.blurred)
-        predict_shared(threads(), asked, BASE_SCALE if blurred else 0, events, section, told)
+        finest = BASE_SCALE if blurred else 0
+        predict_shared(threads(), asked, (first, last), finest, events, section, told)
         for light in (self.light, self.blurred):
-            light *= 4  # from blocks to cells
+            light[first:last] *= 4  # from blocks to cells
 
     def _claimed(self, layer: int) -> np.ndarray:
         """Which events (N,) land in the layer's mask and in none that is nearer."""

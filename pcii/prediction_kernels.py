@@ -168,23 +168,26 @@ def _scales(events: Events, section: Section, finest: int) -> Scales:
     rows, cols, H, W, sites, share_seen, _ = section
     h, w = share_seen.shape
     by_row, by_col = _views_of_blocks(rows, H, 2 * h), _views_of_blocks(cols, W, 2 * w)
-    counts = np.zeros((sites.size, by_row.size, by_col.size), np.float32)
+    totals = np.zeros((1, by_row.size, by_col.size), np.float32)
+    # Of colours nobody asks at the finer scales.
+    wide = BLOCK_PX << COLOUR_SCALE
+    counts = np.zeros((sites.size, -(-2 * h * BLOCK_PX // wide), -(-2 * w * BLOCK_PX // wide)), np.float32)
     for e in range(k.size):
         if cell[e] >= 0:
-            row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-            counts[colour[e], row // BLOCK_PX, col // BLOCK_PX] += n[e] * weight[e]
+            row, col, photons = i[e] + rows[k[e]], j[e] + cols[l[e]], n[e] * weight[e]
+            totals[0, row // BLOCK_PX, col // BLOCK_PX] += photons
+            counts[colour[e], row // wide, col // wide] += photons
     views = np.empty((1, by_row.size, by_col.size), np.float32)
     for a in range(by_row.size):
         for b in range(by_col.size):
             views[0, a, b] = by_row[a] * by_col[b] * share_seen[a // 2, b // 2]
-    totals = np.zeros((1, by_row.size, by_col.size), np.float32)
-    for c in range(sites.size):
-        totals[0] += counts[c]
     everywhere = totals.sum() / max(views.sum(), np.float32(1e-6))
     seen, light, coloured = [], [], []
     for scale in range(SCALES):
         if scale > 0:
-            counts, totals, views = _halved(counts), _halved(totals), _halved(views)
+            totals, views = _halved(totals), _halved(views)
+        if scale > COLOUR_SCALE:
+            counts = _halved(counts)
         # A scale that nobody looks at is there in name only.
         whole, by_colour = scale >= finest, scale >= max(COLOUR_SCALE, finest)
         seen.append(_smoothed(views if whole else views[:, :1, :1].copy()))
@@ -309,17 +312,24 @@ def predict(events: Events, section: Section, told: Predicted) -> None:
 
 @compiled
 def predict_shared(
-    parts: int, asked: np.ndarray, finest: int, events: Events, section: Section, told: Predicted
+    parts: int,
+    asked: np.ndarray,
+    asked_rows: tuple[int, int],
+    finest: int,
+    events: Events,
+    section: Section,
+    told: Predicted,
 ) -> None:
     """The same, shared among threads in so many `parts`, for those events alone that are `asked` for (N,).
 
-    With `finest` = BASE_SCALE the widest window alone is looked at: `base` and `blurred` are right, `rate`
-    and `mean` mean nothing.
+    Of cells those in the `asked_rows`, first and last + 1. With `finest` = BASE_SCALE the widest window alone
+    is looked at: `base` and `blurred` are right, `rate` and `mean` mean nothing.
     """
-    N, h = events[0].size, told[3].shape[0]
+    N, (first, last) = events[0].size, asked_rows
     scales = _scales(events, section, finest)
     for part in nb.prange(parts):
         this, beyond = N * part // parts, N * (part + 1) // parts
         _predict_events(this, beyond, asked, finest, events, section, scales, told)
-        top, bottom = h * part // parts, h * (part + 1) // parts
+        top = first + (last - first) * part // parts
+        bottom = first + (last - first) * (part + 1) // parts
         _predict_cells(top, bottom, finest, section, scales, told)
