@@ -146,12 +146,13 @@ def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, cover
     top, bottom, left, right = _filled(mask)
     cells = mask[top:bottom, left:right].astype(np.uint16)
     for part in nb.prange(PARTS):
-        p, q = np.int64(part) // CELL_PX, np.int64(part) % CELL_PX
+        p, q = int(np.int64(part) // CELL_PX), int(np.int64(part) % CELL_PX)
         views = _views_at(rows, cols, p, q)
         if views.size == 0:
             continue
         moved = _moved_in_parts(cells, p, q, step)
-        for v in views:
+        for number in range(views.size):
+            v = np.int64(views[number])
             down, over = rows[v // cols.size], cols[v % cols.size]
             first, last = _seen(left, right, over, W)
             begin = first + over // CELL_PX + 1 - left
@@ -172,12 +173,13 @@ def paint(
     there = mask[top:bottom, left:right].astype(np.float32)
     shown = there * light[top:bottom, left:right]
     for part in nb.prange(PARTS):
-        p, q = np.int64(part) // CELL_PX, np.int64(part) % CELL_PX
+        p, q = int(np.int64(part) // CELL_PX), int(np.int64(part) % CELL_PX)
         views = _views_at(rows, cols, p, q)
         if views.size == 0:
             continue
         shares, lights = _moved_in_parts(there, p, q, 1 / PARTS), _moved_in_parts(shown, p, q, 1 / PARTS)
-        for v in views:
+        for number in range(views.size):
+            v = np.int64(views[number])
             down, over = rows[v // cols.size], cols[v % cols.size]
             first, last = _seen(left, right, over, W)
             begin = first + over // CELL_PX + 1 - left

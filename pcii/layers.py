@@ -120,11 +120,13 @@ class Layers:
 
     def put(self, masks: np.ndarray) -> None:
         """Go on from these masks (D, h, w)."""
-        self._cover_all(-1)
-        self.masks[:] = masks
+        for layer, mask in enumerate(masks):
+            if not np.array_equal(mask, self.masks[layer]):
+                self._cover(layer, -1)
+                self.masks[layer] = mask
+                self._cover(layer, 1)
         self.relaxed[:, :2] = masks[:, None]
         self.relaxed[:, 2:] = 0
-        self._cover_all(1)
 
     def visible(self) -> np.ndarray:
         """The nearest layer (h, w) in each cell of the virtual centre, -1 for none."""
