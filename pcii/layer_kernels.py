@@ -72,7 +72,7 @@ def _moved_in_parts(values: np.ndarray, p: int, q: int, times: float) -> np.ndar
 
 
 @helper
-def _filled(mask: np.ndarray) -> tuple[int, int, int, int]:
+def filled(mask: np.ndarray) -> tuple[int, int, int, int]:
     """First and last row + 1, first and last column + 1 in which a mask (H, W) has anything."""
     H, W = mask.shape
     top, bottom, left, right = H, 0, W, 0
@@ -84,10 +84,19 @@ def _filled(mask: np.ndarray) -> tuple[int, int, int, int]:
 
 
 @helper
-def _seen(first: int, last: int, moved: int, size: int) -> tuple[int, int]:
-    """The cells along an axis of a view, moved by so many px, that show anything of `first` to `last`."""
-    start = max(0, first - moved // CELL_PX - 1)
-    return start, max(start, min(size, last - moved // CELL_PX))
+def _shown(first: int, last: int, shift: int, size: int) -> tuple[int, int, int]:
+    """The cells along an axis of a view, shifted by so many px, that show anything of `first` to `last`.
+
+    Also how much farther on in `_moved_in_parts` of those cells lies what they show.
+    """
+    begin = max(0, first - shift // CELL_PX - 1)
+    return begin, max(begin, min(size, last - shift // CELL_PX)), shift // CELL_PX + 1 - first
+
+
+@helper
+def _open_px(hidden: int) -> np.float32:
+    """How many px of a cell are open if so many are hidden, by each nearer layer anew."""
+    return np.float32(max(np.int32(PARTS) - np.int32(hidden), np.int32(0)))
 
 
 @helper
@@ -123,12 +132,10 @@ def _look_through(
                 if behind is not None:
                     light = behind[v, row, first + right : last + right]
                     for j in range(line.size):
-                        line[j] += (
-                            np.float32(max(np.int32(PARTS) - np.int32(hidden[j]), np.int32(0))) * light[j]
-                        )
+                        line[j] += _open_px(hidden[j]) * light[j]
                 else:
                     for j in range(line.size):
-                        line[j] += np.float32(max(np.int32(PARTS) - np.int32(hidden[j]), np.int32(0)))
+                        line[j] += _open_px(hidden[j])
         for u in range(2):
             for x in range(2):
                 high, wide = p if u else CELL_PX - p, q if x else CELL_PX - q
@@ -143,7 +150,7 @@ def _look_through(
 def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, covered: np.ndarray) -> None:
     """Adds `step` times the px of a `mask` (H, W) in each cell of the views to `covered` (V, H, W) uint16."""
     _, H, W = covered.shape
-    top, bottom, left, right = _filled(mask)
+    top, bottom, left, right = filled(mask)
     cells = mask[top:bottom, left:right].astype(np.uint16)
     for part in nb.prange(PARTS):
         p, q = int(np.int64(part) // CELL_PX), int(np.int64(part) % CELL_PX)
@@ -153,12 +160,10 @@ def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, cover
         moved = _moved_in_parts(cells, p, q, step)
         for number in range(views.size):
             v = np.int64(views[number])
-            down, over = rows[v // cols.size], cols[v % cols.size]
-            first, last = _seen(left, right, over, W)
-            begin = first + over // CELL_PX + 1 - left
-            for i in range(*_seen(top, bottom, down, H)):
-                line, row = covered[v, i, first:last], i + down // CELL_PX + 1 - top
-                there = moved[row, begin : begin + line.size]
+            first, last, down = _shown(top, bottom, rows[v // cols.size], H)
+            begin, end, over = _shown(left, right, cols[v % cols.size], W)
+            for i in range(first, last):
+                line, there = covered[v, i, begin:end], moved[i + down, begin + over : end + over]
                 for j in range(line.size):
                     line[j] += there[j]
 
@@ -169,7 +174,7 @@ def paint(
 ) -> None:
     """Where a layer's `mask` (H, W) is, views show its `light` (H, W) before what is `behind` (V, H, W)."""
     _, H, W = behind.shape
-    top, bottom, left, right = _filled(mask)
+    top, bottom, left, right = filled(mask)
     there = mask[top:bottom, left:right].astype(np.float32)
     shown = there * light[top:bottom, left:right]
     for part in nb.prange(PARTS):
@@ -180,12 +185,12 @@ def paint(
         shares, lights = _moved_in_parts(there, p, q, 1 / PARTS), _moved_in_parts(shown, p, q, 1 / PARTS)
         for number in range(views.size):
             v = np.int64(views[number])
-            down, over = rows[v // cols.size], cols[v % cols.size]
-            first, last = _seen(left, right, over, W)
-            begin = first + over // CELL_PX + 1 - left
-            for i in range(*_seen(top, bottom, down, H)):
-                line, row = behind[v, i, first:last], i + down // CELL_PX + 1 - top
-                share, own = shares[row, begin : begin + line.size], lights[row, begin : begin + line.size]
+            first, last, down = _shown(top, bottom, rows[v // cols.size], H)
+            begin, end, over = _shown(left, right, cols[v % cols.size], W)
+            for i in range(first, last):
+                line = behind[v, i, begin:end]
+                share = shares[i + down, begin + over : end + over]
+                own = lights[i + down, begin + over : end + over]
                 for j in range(line.size):
                     line[j] = line[j] * (1 - share[j]) + own[j]
 

@@ -77,12 +77,6 @@ def _views_of(
     return np.outer(*cameras)
 
 
-def _filled_rows(mask: np.ndarray) -> tuple[int, int]:
-    """The first row and the last + 1 in which a mask (h, w) has anything."""
-    rows = np.flatnonzero(mask.any(axis=1))
-    return int(rows[0]), int(rows[-1]) + 1
-
-
 class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
@@ -216,7 +210,8 @@ class Layers:
                 self._predict(layer)
                 self._fit(layer, rate, behind, lit_nats, lit)
             else:
-                self._predict(layer, self._claimed(layer), _filled_rows(mask), beside=beside)
+                top, bottom, _, _ = kernels.filled(mask)
+                self._predict(layer, self._claimed(layer), (top, bottom), beside=beside)
             kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
             kernels.claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
