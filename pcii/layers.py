@@ -299,7 +299,7 @@ class Layers:
         told = (self.rate, self.base, self.samples, self.light, self.blurred)
         finest = BASE_SCALE if blurred else 0
         predict_shared(threads(), asked, (first, last), finest, events, section, told)
-        for light in (self.light, self.blurred):
+        for light in (self.blurred,) if blurred else (self.light, self.blurred):
             light[first:last] *= 4  # from blocks to cells
 
     def _claimed(self, layer: int) -> np.ndarray:

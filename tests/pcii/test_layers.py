@@ -527,6 +527,19 @@ def test_energy_hangs_on_the_masks_alone():
     assert np.isfinite(energy)
 
 
+def test_light_of_where_no_mask_is_does_not_grow():
+    # A hundred comparisons later it would have been more than float32 can tell.
+    found = layers.Layers(bar_before_card(100), SPREAD_PX, (1e-4, 1e-3))
+    found.sweep()
+    masks = found.masks.copy()
+    masks[:, : len(found.light) // 2] = False
+    found.put(masks)
+    found.light_explained()
+    before = found.light.copy()
+    found.light_explained()
+    np.testing.assert_array_equal(found.light, before)
+
+
 def test_going_on_is_as_good_as_more_steps_at_once():
     gain = np.random.default_rng(1).normal(size=(12, 9)).astype(np.float32)
     at_once = np.zeros_like(gain)
