@@ -32,7 +32,7 @@ Made by `docs/make_removal_scores.py` from one seed of each scene of the benchma
 photons.
 
 ```
-BENCH_SEEDS=1 make bench TABLES=removal     # three hours on two cores
+BENCH_SEEDS=1 make bench TABLES=removal     # an hour and a half on two cores, shared by BENCH_PART
 ```
 
 [Removal of defocused points](removal.md) tells what the methods do, what they cannot do and why; figures of
