@@ -36,8 +36,8 @@ BENCH_SEEDS=1 make bench TABLES=removal     # an hour and a half on two cores, s
 ```
 
 [Removal of defocused points](removal.md) tells what the methods do, what they cannot do and why; figures of
-many seeds, with their intervals, are there. With one seed a difference of 0.02 may be chance, and more on
-cluttered scenes. 300 000 photons per view, 0.3 per pixel, stand for full light.
+many seeds, with their intervals, are there. With one seed a difference of 0.02 may be chance, and one of 0.1
+or more where things touch or hide one another. 300 000 photons per view, 0.3 per pixel, stand for full light.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
