@@ -21,30 +21,11 @@ BAND = 16
 
 
 @helper
-def _add_row(source: np.ndarray, right: int, times: float, line: np.ndarray) -> None:
-    """Adds a row of cells (W,), moved by `right` px, to a `line` (W,): `times` for each column of px."""
-    for x in range(2):
-        cells, wide = right // CELL_PX + x, right % CELL_PX if x else CELL_PX - right % CELL_PX
-        if wide > 0:
-            first, last = max(0, -cells), max(0, min(line.size, source.size - cells))
-            # Slices, so that the compiler sees that all of it exists and takes several at a time.
-            there, part = source[first + cells : last + cells], line[first:last]
-            weight = line.dtype.type(times * wide)
-            for j in range(part.size):
-                part[j] += weight * there[j]
-
-
-@helper
-def _add_moved(values: np.ndarray, down: int, right: int, row: int, times: float, line: np.ndarray) -> None:
-    """Adds what `values` (H, W), moved by `down` and `right` px, show in a `row` to its `line` (W,).
-
-    `times` for each px that a cell shows of another.
-    """
-    a, p = row + down // CELL_PX, down % CELL_PX
-    for u in range(2):
-        high = p if u else CELL_PX - p
-        if high > 0 and 0 <= a + u < values.shape[0]:
-            _add_row(values[a + u], right, times * high, line)
+def _add(row: np.ndarray, weight: float, line: np.ndarray) -> None:
+    """Adds a `row` of cells (W,), so many times, to a `line` (W,)."""
+    times = line.dtype.type(weight)
+    for j in range(line.size):
+        line[j] += times * row[j]
 
 
 @helper
@@ -65,9 +46,13 @@ def _moved_in_parts(values: np.ndarray, p: int, q: int, times: float) -> np.ndar
 
     Its first row and column lie before the first of the values. Views that differ by whole cells share it.
     """
-    moved = np.zeros((values.shape[0] + 1, values.shape[1] + 1), values.dtype)
-    for row in range(moved.shape[0]):
-        _add_moved(values, p - CELL_PX, q - CELL_PX, row, times, moved[row])
+    H, W = values.shape
+    moved = np.zeros((H + 1, W + 1), values.dtype)
+    for u in range(2):
+        for x in range(2):
+            high, wide = p if u else CELL_PX - p, q if x else CELL_PX - q
+            for i in range(H):
+                _add(values[i], times * high * wide, moved[i + 1 - u, 1 - x : 1 - x + W])
     return moved
 
 
@@ -139,11 +124,8 @@ def _look_through(
         for u in range(2):
             for x in range(2):
                 high, wide = p if u else CELL_PX - p, q if x else CELL_PX - q
-                weight = np.float32(high * wide / PARTS**2)
                 for i in range(n):
-                    line, there = band[i], seen[i + 1 - u, x : x + W]
-                    for j in range(W):
-                        line[j] += weight * there[j]
+                    _add(seen[i + 1 - u, x : x + W], high * wide / PARTS**2, band[i])
 
 
 @compiled
