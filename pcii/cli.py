@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
-from pcii import __version__, console, results
+from pcii import __version__, console
 from pcii.console import Stages, say
 from pcii.dataset import Dataset, open_dataset
+from pcii.results import Results
 
 app = App(
     name="pcii",
@@ -96,14 +97,15 @@ def reconstruct(
 
     data = _open(dataset, budget)
     sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
-    results.claim(out, data)
-    say(f"{results.save_sections(out, sections)}")
-    for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
-        path = out / f"section_{z:g}mm.png"
-        if sections.cfa is not None:
-            estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
-        write_png(path, to_srgb8(estimate, white_level(estimate, (slice(None), slice(None)))))
-        say(f"{path}")
+    with Results(out, data).writing() as results:
+        say(f"{results.save_sections(sections)}")
+        for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
+            if sections.cfa is not None:
+                estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
+            picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))
+            with results.replacing(f"section_{z:g}mm.png") as path:
+                write_png(path, picture)
+            say(f"{out / path.name}")
 
 
 @app.command
@@ -126,9 +128,10 @@ def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
     data = _open(dataset, budget)
     z_range = depth_range_of(data)
     found = estimate_depth(data.counts, z_range)
-    results.claim(out, data)
-    say(f"{results.save_depth(out, found)}")
-    write_png(out / "depth.png", depth_image(found.z_mm, *z_range))
+    with Results(out, data).writing() as results:
+        say(f"{results.save_depth(found)}")
+        with results.replacing("depth.png") as path:
+            write_png(path, depth_image(found.z_mm, *z_range))
     say(f"{out / 'depth.png'}: {z_range[0]:g} mm yellow to {z_range[1]:g} mm violet, black no answer")
 
 
@@ -180,12 +183,12 @@ def segment(
         chosen = ThreeStep(subpixel, **dict.fromkeys(without, False))
     data = _open(dataset, budget)
     focus = remove(data.counts, planes_of(data, z_mm), method=chosen)
-    results.claim(out, data)
-    say(f"{results.save_segmented(out, focus)}")
-    for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
-        path = out / f"in_focus_{focus.method}_{z:g}mm.png"
-        write_png(path, mask_image(mask))
-        say(f"{path}: {mask.mean():.2%} of the section in focus")
+    with Results(out, data).writing() as results:
+        say(f"{results.save_segmented(focus)}")
+        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+            with results.replacing(f"in_focus_{focus.method}_{z:g}mm.png") as path:
+                write_png(path, mask_image(mask))
+            say(f"{out / path.name}: {mask.mean():.2%} of the section in focus")
 
 
 @app.command
@@ -209,8 +212,9 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
     data = _open(dataset, budget)
     if not out.is_dir():
         raise InputError(f"{out}: there is no such folder of results")
-    results.claim(out, data)
-    focus, found = results.load_segmented(out, data), results.load_depth(out)
+    results = Results(out, data)
+    results.check()
+    focus, found = results.load_segmented(), results.load_depth()
     if not focus and found is None:
         steps = "`pcii segment`, `pcii depth` or `pcii run`"
         raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
@@ -219,7 +223,8 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
     with Stages() as report:
         light = full_light_sections(data, check_z_mm(z_mm), report) if knows else None
     result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
-    say(f"{results.save_score(out, result)}")
+    with results.writing():
+        say(f"{results.save_score(result)}")
 
 
 @app.command
@@ -262,6 +267,26 @@ def evaluate(
     if result["missing"]:
         say(f"{result['missing']} rows are still to be measured, by other parts")
     say(f"report: {out / 'evaluation.html'}")
+
+
+@app.command
+def verify(folder: Path) -> None:
+    """Compare every file of a dataset, or of a folder of results, with its manifest.
+
+    Names what is missing, truncated or changed, and what the manifest does not list.
+
+    Example:  pcii verify out/paper-results
+
+    Parameters
+    ----------
+    folder
+        A dataset folder, or one of results.
+    """
+    from pcii.verify import verify as compare
+
+    with Stages() as report:
+        count = compare(folder, report)
+    say(f"{folder}: {count} files match the manifest")
 
 
 def main() -> int:

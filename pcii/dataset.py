@@ -8,22 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from pcii.bayer import check_cfa
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
+from pcii.sealed import check_file
 from pcii.store import (
     COUNTS,
-    MANIFEST,
+    COUNTS_LABELS,
     PHOTON_TRUTH,
+    PHOTON_TRUTH_LABELS,
     RADIANCE,
+    REMEDY,
     TRUTH,
-    check_file,
+    TRUTH_LABELS,
+    lists_part,
     nested_name,
     radiance_name,
     read_exr,
     read_manifest,
 )
 from pcii.types import CameraGrid, PhotonTruth, Truth, Views
+from pcii.zarr_groups import Label, read_array
 
 MORE_TRUTH = ("normal", "coverage", "visible_views")
 """Maps of the truth that a dataset may lack: old ones do."""
@@ -75,14 +79,17 @@ class Dataset:
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; `InputError` if the recipe asked for none."""
-        arrays = self._arrays(self._counts, "counts")
-        if "dense" in arrays:
-            return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
-        missing = set("klijn") - set(arrays)
-        if missing:
-            raise InputError(f"{self.path / self._counts}: lacks the array {min(missing)!r}")
-        columns = {name: arrays[name] for name in "klijn"}
-        return PhotonCounts.from_events(**columns, grid=self.grid, cfa=self.cfa)
+        part = self._counts
+        if not self.has(part):
+            raise InputError(f"{self.path}: this dataset has no counts; its recipe left them out")
+        names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
+        arrays = self._arrays(part, COUNTS_LABELS, names)
+        try:
+            if "dense" in arrays:
+                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
+            return PhotonCounts.from_events(**arrays, grid=self.grid, cfa=self.cfa)
+        except InputError as fault:
+            raise InputError(f"{self.path / part}: {fault}") from None
 
     @cached_property
     def truth(self) -> Truth | None:
@@ -90,19 +97,23 @@ class Dataset:
         if not self.has(f"{TRUTH}/z_mm"):
             return None
         more = tuple(name for name in MORE_TRUTH if self.has(f"{TRUTH}/{name}"))
-        arrays = self._arrays(TRUTH, "truth", only=("z_mm", "object_id", *more))
+        arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *more))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
-        return Truth(**arrays, names=names, photons=self._photon_truth())
+        photons = self._photon_truth()
+        try:
+            return Truth(**arrays, names=names, photons=photons)
+        except InputError as fault:
+            raise InputError(f"{self.path / TRUTH}: {fault}") from None
 
     def _photon_truth(self) -> PhotonTruth | None:
         part = nested_name(PHOTON_TRUTH, self.budget)
         if not self.has(part):
             return None
-        known = self._arrays(part, "photon truth", only=("object_id", "z_mm"))
+        known = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
         events = self.counts.events
-        where = {name: getattr(events, name).repeat(events.n) for name in "klij"}
-        if known["z_mm"].shape != where["k"].shape:
+        if known["z_mm"].shape != (self.counts.total,) or known["object_id"].shape != (self.counts.total,):
             raise InputError(f"{self.path / part}: does not belong to the counts beside it")
+        where = {name: getattr(events, name).repeat(events.n) for name in "klij"}
         return PhotonTruth(**where, **known)
 
     @cached_property
@@ -116,31 +127,26 @@ class Dataset:
 
     def has(self, part: str) -> bool:
         """Whether the manifest lists files under `part`."""
-        return any(name == part or name.startswith(f"{part}/") for name in self.manifest["files"])
+        return lists_part(self.manifest["files"], part)
 
     def check(self, name: str, *, content: bool = True) -> Path:
         """Path of a listed file, after its size (and hash, if `content`) were compared."""
         entry = self.manifest["files"].get(name)
         if entry is None:
             raise InputError(f"{self.path}: the manifest lists no {name}")
-        check_file(self.path, name, entry, content=content)
+        check_file(self.path, name, entry, REMEDY, content=content)
         return self.path / name
 
-    def _arrays(self, part: str, product: str, only: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
-        import zarr
-
-        if not self.has(part):
-            raise InputError(f"{self.path}: this dataset has no {product}; its recipe left them out")
-        keep = [part] if only is None else [f"{part}/{name}" for name in only]
-        for name in self.manifest["files"]:
-            if any(name.startswith(f"{prefix}/") for prefix in keep):
-                self.check(name)
-        group = zarr.open_group(self.path / part, mode="r", zarr_format=3)
-        names = list(group.array_keys()) if only is None else only
-        try:
-            return {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
-        except KeyError as fault:
-            raise InputError(f"{self.path / part}: lacks the array {fault}") from None
+    def _arrays(
+        self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
+    ) -> dict[str, np.ndarray]:
+        K, L, H, W = self.grid.shape_KLHW
+        sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
+        files = self.manifest["files"]
+        return {
+            name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
+            for name in names
+        }
 
 
 class _ExrStack:
@@ -153,25 +159,18 @@ class _ExrStack:
 
     def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         path = self._dataset.check(radiance_name(*index))
-        image = read_exr(path)
-        if image.shape != self.shape[2:]:
-            raise InputError(f"{path}: expected an image {self.shape[2:]}, got {image.shape}")
-        return image
+        return read_exr(path, self.shape[2:])
 
 
 def open_dataset(path: str | Path) -> Dataset:
     """Open a dataset folder; every listed file must be there and have the size it was written with.
 
-    Contents are compared with their SHA-256 when they are read. Raises `InputError` for a folder
-    that is no finished dataset, or a file that is missing or truncated.
+    Contents are compared with their SHA-256 when they are read. What the manifest does not list is not
+    read. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since it
+    was written, or a file that is missing or truncated.
     """
     root = Path(path)
     manifest = read_manifest(root)
-    try:
-        grid = CameraGrid(**manifest["grid"])
-        cfa, files = check_cfa(manifest["cfa"]), manifest["files"]
-        for name, entry in files.items():
-            check_file(root, name, entry, content=False)
-    except (KeyError, TypeError, AttributeError) as fault:
-        raise InputError(f"{root / MANIFEST}: something is missing or misspelt in it: {fault}") from None
-    return Dataset(root, manifest, grid, cfa)
+    for name, entry in manifest["files"].items():
+        check_file(root, name, entry, REMEDY, content=False)
+    return Dataset(root, manifest, CameraGrid(**manifest["grid"]), manifest["cfa"])

@@ -6,7 +6,7 @@ from typing import Any
 
 from pcii.evaluation_plots import accuracy_plots
 from pcii.evaluation_tables import budget_name, markdown, overview, tables_of, told
-from pcii.store import write_bytes_safely, write_json_safely
+from pcii.safe_files import write_bytes_safely, write_json_safely
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:

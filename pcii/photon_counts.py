@@ -10,6 +10,7 @@ from pcii.bayer import channel_count, check_cfa, colour_cells
 from pcii.errors import InputError
 from pcii.types import CameraGrid, read_only
 
+LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40
 """Photons in a pixel; millions of such pixels still add up in 64 bits."""
 
@@ -48,6 +49,7 @@ class PhotonCounts:
         counts = _whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
+        _check_total("counts", counts)
         return cls(grid, cfa, _dense=read_only(counts))
 
     @classmethod
@@ -82,6 +84,7 @@ class PhotonCounts:
         photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*where.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
+        _check_total("n", photons)
         return cls(grid, cfa, _events=_canonical_events(tuple(where.values()), photons, grid))
 
     @property
@@ -193,6 +196,16 @@ def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     if array.size and array.max() > LARGEST_COUNT:
         raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
     return array
+
+
+def _check_total(name: str, counts: np.ndarray) -> None:
+    """Raise `InputError` if the counts, each at most `LARGEST_COUNT`, add up to more than int64 holds."""
+    if counts.size == 0 or counts.size * int(counts.max()) <= LARGEST_TOTAL:
+        return
+    wide, half = counts.astype(np.uint64), np.uint64(32)
+    total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
+    if total > LARGEST_TOTAL:
+        raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")
 
 
 def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:

@@ -13,8 +13,8 @@ from pcii import __version__, picture
 from pcii.demosaic import demosaic
 from pcii.foreground import box_around
 from pcii.pipeline import Outcome, depth_range_of
+from pcii.safe_files import write_bytes_safely
 from pcii.score import object_masks, pixel_masks
-from pcii.store import write_bytes_safely
 from pcii.summary import own_planes
 from pcii.types import Sections, Truth
 

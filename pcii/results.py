@@ -1,122 +1,196 @@
 """The folder of results: what the commands leave behind, so that a later command can go on from it.
 
-results.json             which dataset it belongs to
+results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
 score.json               as in `Score.to_dict`
 *.png, report.html       to look at
+
+What replaces something is made whole beside it. Then the old one is taken off the list, the new one put in
+its place, and listed: a kill at any time leaves the old one, none, or the new one.
 """
 
-import json
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from pcii.dataset import Dataset
 from pcii.errors import InputError
 from pcii.reconstruct import reconstruct
-from pcii.store import sweep_temporaries, write_arrays_safely, write_json_safely
+from pcii.results_list import RESULTS, read_results, write_results
+from pcii.safe_files import (
+    locked,
+    replace_folder,
+    sweep_temporaries,
+    sync_folder,
+    temporary_folder,
+    write_json_safely,
+)
+from pcii.sealed import list_files
+from pcii.store import MAP_AXES, lists_part
 from pcii.types import DepthMap, Score, Sections, Segmented
+from pcii.zarr_groups import Label, read_array, write_arrays_safely
 
-MARKER = "results.json"
-FORMAT = "photon-integral-imaging results"
+REMEDY = "make it again"
+LOCK = ".results.lock"
+
+PLANE_AXES = ("plane", *MAP_AXES)
+_Z_MM = Label(("plane",), "planar depth of each section", "mm")
+SECTIONS_LABELS = {
+    "z_mm": _Z_MM,
+    "counts": Label((*PLANE_AXES, "channel"), "sum of the samples that meet at each voxel", "photons"),
+    "coverage": Label((*PLANE_AXES, "channel"), "how many samples that was", "samples"),
+}
+SEGMENTED_LABELS = {
+    "z_mm": _Z_MM,
+    "in_focus": Label(PLANE_AXES, "whether the voxel is in focus"),
+    "photon_in_focus": Label(
+        ("plane", "event"),
+        "whether the photons of each event, in (k, l, i, j) order, come from what is in focus",
+    ),
+}
+DEPTH_LABELS = {
+    "z_mm": Label(MAP_AXES, "planar depth at the virtual centre; NaN where there is no answer", "mm"),
+    "confidence": Label(MAP_AXES, "from 0 (no answer) to 1"),
+}
 
 
-def claim(out: Path, dataset: Dataset) -> None:
-    """Make `out` the results folder of `dataset`; `InputError` if it holds something else."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the results")
-    if out.resolve() == dataset.path.resolve():
-        raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-    mine = {
-        "format": FORMAT,
-        "dataset": dataset.name,
-        "identity": dataset.manifest.get("identity"),
-        "budget": dataset.budget,
-    }
-    if out.is_dir() and any(out.iterdir()):
-        held = _read_marker(out)
-        if held is None:
-            raise InputError(f"{out}: holds something else; name a new or empty folder")
-        if held != mine:
+@dataclass(frozen=True)
+class Results:
+    """A folder of results of one dataset and photon budget."""
+
+    path: Path
+    dataset: Dataset
+
+    @property
+    def _origin(self) -> dict[str, Any]:
+        """What tells whose results these are."""
+        data = self.dataset
+        return {"dataset": data.name, "identity": data.manifest.get("identity"), "budget": data.budget}
+
+    def check(self) -> None:
+        """Raise `InputError` unless the folder is new, empty, or holds results of this dataset and budget."""
+        out = self.path
+        if out.exists() and not out.is_dir():
+            raise InputError(f"{out}: this is a file; name a folder for the results")
+        if out.resolve() == self.dataset.path.resolve():
+            raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
+        if not (out / RESULTS).exists():
+            if out.is_dir() and any(path.name != LOCK for path in out.iterdir()):
+                raise InputError(f"{out}: holds something else; name a new or empty folder")
+            return
+        held = read_results(out)
+        if {name: held[name] for name in self._origin} != self._origin:
             raise InputError(
                 f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
             )
-        sweep_temporaries(out)
-    write_json_safely(out / MARKER, mine)
 
+    @contextmanager
+    def writing(self) -> Iterator["Results"]:
+        """Claim the folder, and keep other writers out of it for the length of the block."""
+        self.check()
+        self.path.mkdir(parents=True, exist_ok=True)
+        with locked(self.path / LOCK, wait=True):
+            try:
+                self.check()
+                sweep_temporaries(self.path)
+                if not (self.path / RESULTS).exists():
+                    self._list({})
+                yield self
+            finally:
+                (self.path / LOCK).unlink(missing_ok=True)
 
-def _read_marker(out: Path) -> dict[str, object] | None:
-    try:
-        held = json.loads((out / MARKER).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return held if isinstance(held, dict) and held.get("format") == FORMAT else None
+    @contextmanager
+    def replacing(self, name: str) -> Iterator[Path]:
+        """Where to write the new file or folder `name`, which takes its place at the end of the block."""
+        place = self.path / name
+        with temporary_folder(place) as temporary:
+            new = temporary / name
+            yield new
+            files = read_results(self.path)["files"]
+            others = {path: entry for path, entry in files.items() if not lists_part([path], name)}
+            if len(others) < len(files):
+                self._list(others)
+            if new.is_dir():
+                replace_folder(new, place)
+            else:
+                new.replace(place)
+                sync_folder(self.path)
+            self._list(others | list_files(self.path, [name]))
 
+    def _list(self, files: Mapping[str, Any]) -> None:
+        write_results(self.path, {**self._origin, "files": files})
 
-def save_sections(out: Path, sections: Sections) -> Path:
-    """Write the sums and the coverage; the estimate is one divided by the other."""
-    arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
-    told = {"axes": "Z, H, W, C", "unit": "photons"}
-    if sections.cfa is not None:
-        told["cfa"] = sections.cfa
-    write_arrays_safely(out / "sections.zarr", arrays, told)
-    return out / "sections.zarr"
+    def save_sections(self, sections: Sections) -> Path:
+        """Write the sums and the coverage; the estimate is one divided by the other."""
+        arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
+        pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
+        return self._save("sections.zarr", arrays, SECTIONS_LABELS, pattern)
 
+    def save_segmented(self, focus: Segmented) -> Path:
+        """Write the in-focus masks of one method, and its photons in focus if it tells them."""
+        arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
+        if focus.photon_in_focus is not None:
+            arrays["photon_in_focus"] = focus.photon_in_focus
+        return self._save(
+            f"segmented_{focus.method}.zarr", arrays, SEGMENTED_LABELS, {"method": focus.method}
+        )
 
-def save_segmented(out: Path, focus: Segmented) -> Path:
-    """Write the in-focus masks of one method, and its photons in focus if it tells them."""
-    path = out / f"segmented_{focus.method}.zarr"
-    arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
-    told = {"axes": "Z, H, W", "method": focus.method}
-    if focus.photon_in_focus is not None:
-        arrays["photon_in_focus"] = focus.photon_in_focus
-        told["photon_in_focus"] = "Z, events of the counts in (k, l, i, j) order"
-    write_arrays_safely(path, arrays, told)
-    return path
+    def save_depth(self, depth: DepthMap) -> Path:
+        """Write the depth map and its confidence."""
+        return self._save("depth.zarr", {"z_mm": depth.z_mm, "confidence": depth.confidence}, DEPTH_LABELS)
 
+    def save_score(self, result: Score) -> Path:
+        """Write score.json."""
+        with self.replacing("score.json") as path:
+            write_json_safely(path, result.to_dict())
+        return self.path / "score.json"
 
-def save_depth(out: Path, depth: DepthMap) -> Path:
-    """Write the depth map and its confidence."""
-    arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
-    write_arrays_safely(out / "depth.zarr", arrays, {"axes": "H, W", "z_mm": "NaN: no answer"})
-    return out / "depth.zarr"
+    def _save(
+        self,
+        name: str,
+        arrays: Mapping[str, np.ndarray],
+        labels: Mapping[str, Label],
+        attributes: Mapping[str, Any] | None = None,
+    ) -> Path:
+        with self.replacing(name) as path:
+            write_arrays_safely(path, arrays, labels, attributes)
+        return self.path / name
 
+    def load_segmented(self) -> list[Segmented]:
+        """The in-focus masks of every method in the folder; their sections are reconstructed anew."""
+        files = read_results(self.path)["files"]
+        tops = {name.split("/")[0] for name in files}
+        found: list[Segmented] = []
+        for top in sorted(top for top in tops if top.startswith("segmented_") and top.endswith(".zarr")):
+            tells = lists_part(files, f"{top}/photon_in_focus")
+            names = ("z_mm", "in_focus", *(["photon_in_focus"] if tells else []))
+            arrays = {name: self._read(f"{top}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
+            photons = arrays.pop("photon_in_focus", None)
+            if photons is not None and photons.shape[-1] != self.dataset.counts.events.n.size:
+                raise InputError(f"{self.path / top}: its photon_in_focus is of other counts; {REMEDY}")
+            method = top.removeprefix("segmented_").removesuffix(".zarr")
+            try:
+                sections = reconstruct(self.dataset.counts, arrays["z_mm"])
+                z_mm, in_focus = arrays["z_mm"], arrays["in_focus"]
+                found.append(Segmented(z_mm, in_focus, method, sections, photon_in_focus=photons))
+            except InputError as fault:
+                raise InputError(f"{self.path / top}: {fault}; {REMEDY}") from None
+        return found
 
-def save_score(out: Path, result: Score) -> Path:
-    """Write score.json."""
-    write_json_safely(out / "score.json", result.to_dict())
-    return out / "score.json"
+    def load_depth(self) -> DepthMap | None:
+        """The depth map in the folder, or None."""
+        files = read_results(self.path)["files"]
+        if not lists_part(files, "depth.zarr"):
+            return None
+        return DepthMap(**{n: self._read(f"depth.zarr/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
 
-
-def load_segmented(out: Path, dataset: Dataset) -> list[Segmented]:
-    """The in-focus masks of every method in the folder; their sections are reconstructed anew."""
-    found: list[Segmented] = []
-    for path in sorted(out.glob("segmented_*.zarr")):
-        arrays = _read(path, ("z_mm", "in_focus"))
-        sections = reconstruct(dataset.counts, arrays["z_mm"])
-        method = path.stem.removeprefix("segmented_")
-        photons = None
-        if (path / "photon_in_focus").is_dir():
-            photons = _read(path, ("photon_in_focus",))["photon_in_focus"]
-            if photons.shape[-1] != dataset.counts.events.n.size:
-                raise InputError(f"{path}: its photon_in_focus is of other counts; make it again")
-        found.append(Segmented(arrays["z_mm"], arrays["in_focus"], method, sections, photon_in_focus=photons))
-    return found
-
-
-def load_depth(out: Path) -> DepthMap | None:
-    """The depth map in the folder, or None."""
-    path = out / "depth.zarr"
-    return DepthMap(**_read(path, ("z_mm", "confidence"))) if path.is_dir() else None
-
-
-def _read(path: Path, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    import zarr
-
-    try:
-        group = zarr.open_group(path, mode="r", zarr_format=3)
-        return {name: np.asarray(group[name][...]) for name in names}  # type: ignore[index]
-    except (KeyError, OSError, ValueError, RuntimeError) as fault:
-        raise InputError(f"{path}: cannot be read ({fault}); make it again") from None
+    def _read(self, name: str, files: Mapping[str, Any], label: Label) -> np.ndarray:
+        grid = self.dataset.grid
+        sizes = {"row": grid.height, "col": grid.width}
+        return read_array(self.path, name, files, label, sizes, REMEDY)

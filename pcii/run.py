@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from pcii import results
 from pcii.console import Report, silent
 from pcii.dataset import Dataset
 from pcii.pipeline import Outcome, analyse, planes_of
 from pcii.report import write_report
+from pcii.results import Results
 from pcii.segment import DEFAULT_METHODS, find_method
 
 
@@ -25,12 +25,15 @@ def run(
     for method in methods:  # a misspelt name is told before the work, and leaves no folder behind
         find_method(method)
     planes_of(dataset, z_mm)
-    results.claim(out, dataset)
+    results = Results(out, dataset)
+    results.check()
     outcome = analyse(dataset, z_mm, report, methods)
-    results.save_sections(out, outcome.sections)
-    for focus in outcome.focus:
-        results.save_segmented(out, focus)
-    results.save_depth(out, outcome.depth)
-    results.save_score(out, outcome.score)
-    write_report(out / "report.html", outcome)
+    with results.writing():
+        results.save_sections(outcome.sections)
+        for focus in outcome.focus:
+            results.save_segmented(focus)
+        results.save_depth(outcome.depth)
+        results.save_score(outcome.score)
+        with results.replacing("report.html") as page:
+            write_report(page, outcome)
     return outcome

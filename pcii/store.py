@@ -1,43 +1,87 @@
-"""The dataset folder on disk: its layout, and writing that survives a kill.
+"""The dataset folder on disk: its layout, and what may be in its manifest.
 
-    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256
-    counts.zarr/             events k, l, i, j, n (N,) or dense counts (K, L, H, W)
-    truth.zarr/              z_mm, object_id, normal, coverage (H, W) of the virtual centre, and in_focus
-                             (Z, H, W); on request visible_views (H, W), and view_z_mm, view_object_id,
-                             view_normal, view_coverage (K, L, H, W); its attributes say what each is
-    photon_truth.zarr/       object_id, z_mm (photons,) of each photon's first hit, in the events' order
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
+                             its own checksum (see `pcii.sealed`)
+    counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
+    photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
+    truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
     radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
 
-A file is written beside its place, flushed to disk and renamed, so that whatever has its final name
-is whole. The manifest is written last and lists what belongs to the dataset: a dataset without a
-manifest is unfinished, and a file whose hash differs is damaged (a deleted Zarr chunk would
-otherwise read as zeros, which look like darkness).
+The manifest is written last and lists what belongs to the dataset: a dataset without a manifest is
+unfinished, a file whose hash differs is damaged, and what is not listed is not read.
 """
 
-import hashlib
-import json
 import os
-import shutil
-import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pcii.errors import InputError
+from pcii.safe_files import sync_folder
+from pcii.sealed import read_sealed, write_sealed
+from pcii.zarr_groups import Label
 
 FORMAT = "photon-integral-imaging dataset"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
 COUNTS = "counts.zarr"
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
+REMEDY = "generate the dataset again"
 
-# One Zarr chunk is at most this many elements: a view or a million events.
-CHUNK_ELEMENTS = 1 << 20
+VIEW_AXES = ("camera_row", "camera_col", "row", "col")
+CAMERA_AXES = VIEW_AXES[:2]
+MAP_AXES = VIEW_AXES[2:]
+
+COUNTS_LABELS = {
+    "k": Label(("event",), "row of the camera, from the top"),
+    "l": Label(("event",), "column of the camera, from the left"),
+    "i": Label(("event",), "row of the pixel, from the top"),
+    "j": Label(("event",), "column of the pixel, from the left"),
+    "n": Label(("event",), "photons that the pixel counted", "photons"),
+    "dense": Label(VIEW_AXES, "photons that each pixel counted", "photons"),
+}
+PHOTON_TRUTH_LABELS = {
+    "object_id": Label(
+        ("photon",),
+        "key of the manifest's objects that the photon's path hit first; 0 for the "
+        "backdrop, -1 for a count without a photon",
+    ),
+    "z_mm": Label(("photon",), "planar depth of the first hit; +inf for none", "mm"),
+}
+_MAPS = {
+    "z_mm": Label(MAP_AXES, "planar depth; +inf where nothing is hit", "mm"),
+    "object_id": Label(
+        MAP_AXES, "key of the manifest's objects; 0 for the backdrop and where nothing is hit"
+    ),
+    "normal": Label(
+        (*MAP_AXES, "axis"),
+        "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
+        "0 where nothing is hit",
+    ),
+    "coverage": Label(
+        MAP_AXES, "share of the pixel's square that belongs to the object (or to none) that its centre hits"
+    ),
+}
+TRUTH_LABELS = {
+    **_MAPS,
+    **{
+        f"view_{name}": Label((*CAMERA_AXES, *label.dims), f"of every camera: {label.meaning}", label.unit)
+        for name, label in _MAPS.items()
+    },
+    "in_focus": Label(
+        ("plane", *MAP_AXES), "blur half-extent of at most 1 px at each depth of in_focus_z_mm"
+    ),
+    "visible_views": Label(MAP_AXES, "cameras that see the point; 0 where nothing is hit", "cameras"),
+    "camera_position_mm": Label((*CAMERA_AXES, "axis"), "where the cameras really are", "mm"),
+    "camera_rotation": Label(
+        (*CAMERA_AXES, "axis", "direction"), "its columns are the cameras' right, down and forward directions"
+    ),
+}
 
 
 def radiance_name(k: int, l: int) -> str:
@@ -53,148 +97,42 @@ def nested_name(part: str, budget: float | None) -> str:
     return f"{stem}-{budget:.12g}.{suffix}"
 
 
-def write_bytes_safely(path: Path, content: bytes) -> None:
-    """Write a file so that it is either whole under its name or not there at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
-    sync_folder(path.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush a folder's entries (new names, renames) to disk."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-def write_json_safely(path: Path, value: Any) -> None:
-    """Write indented JSON safely; infinities and NaN are refused, since JSON has none."""
-    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
-    write_bytes_safely(path, (text + "\n").encode())
-
-
-def write_arrays_safely(
-    folder: Path, arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]
-) -> None:
-    """Write a Zarr v3 group of arrays (zstd, crc32c per chunk) as a whole: all of it or nothing."""
-    with new_group_safely(folder, attributes) as group:
-        for name, array in arrays.items():
-            stored = new_array(group, name, array.shape, array.dtype)
-            if array.size:
-                stored[...] = array
-
-
-def new_array(group: Any, name: str, shape: tuple[int, ...], dtype: Any) -> Any:
-    """An empty array in a group, to be filled by whole leading steps."""
-    from zarr.codecs import Crc32cCodec, ZstdCodec
-
-    codecs = [ZstdCodec(level=3), Crc32cCodec()]
-    return group.create_array(name, shape=shape, dtype=dtype, chunks=_chunks(shape), compressors=codecs)
-
-
-@contextmanager
-def new_group_safely(folder: Path, attributes: Mapping[str, Any]) -> Iterator[Any]:
-    """A new Zarr v3 group to write to, which stands in `folder` once the block has ended without fault."""
-    import zarr
-
-    temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".tmp"))
-    try:
-        group = zarr.open_group(temporary, mode="w", zarr_format=3, attributes=dict(attributes))
-        yield group
-        temporary.chmod(0o755)
-        for file in temporary.rglob("*"):
-            if file.is_file():
-                with file.open("rb") as opened:
-                    os.fsync(opened.fileno())
-        if folder.exists():
-            shutil.rmtree(folder)
-        temporary.replace(folder)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    sync_folder(folder.parent)
-
-
-def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Whole trailing axes (a view) up to the chunk size; single steps of the leading ones."""
-    chunks: list[int] = []
-    room = CHUNK_ELEMENTS
-    for size in reversed(shape):
-        chunks.insert(0, max(1, min(size, room)))
-        room //= max(1, size)
-    return tuple(chunks)
-
-
-def hash_file(path: Path) -> str:
-    """SHA-256 of a file, in hex."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def list_files(root: Path, parts: list[str]) -> dict[str, dict[str, Any]]:
-    """Size and SHA-256 of every file of the named parts of a dataset, by path relative to it."""
-    entries: dict[str, dict[str, Any]] = {}
-    for part in parts:
-        top = root / part
-        files = [top] if top.is_file() else sorted(p for p in top.rglob("*") if p.is_file())
-        for file in files:
-            name = file.relative_to(root).as_posix()
-            entries[name] = {"bytes": file.stat().st_size, "sha256": hash_file(file)}
-    return entries
+def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
+    """Write the manifest of a dataset, with its checksum; from then on the dataset is finished."""
+    write_sealed(root / MANIFEST, {"format": FORMAT, "format_version": FORMAT_VERSION, **manifest})
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a finished dataset; `InputError` if there is none or it cannot be read."""
+    """The manifest of a finished dataset, every field that this package uses checked.
+
+    Raises `InputError` if there is none, if it was changed since it was written, or if it is not one.
+    """
+    from pcii.manifest_schema import DatasetManifest, validate
+
     path = root / MANIFEST
     if not root.is_dir():
         raise InputError(f"{root}: there is no such dataset folder")
     if not path.is_file():
         raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
-    try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as fault:
-        raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); generate it again") from None
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+    manifest = read_sealed(path, REMEDY)
+    if manifest.get("format") != FORMAT:
         raise InputError(f"{path}: not the manifest of a {FORMAT}")
     if manifest.get("format_version") != FORMAT_VERSION:
         raise InputError(
             f"{path}: format version {manifest.get('format_version')!r} is not supported; "
             f"this release reads version {FORMAT_VERSION}"
         )
+    validate(DatasetManifest, manifest, path, REMEDY)
     return manifest
 
 
-def check_file(root: Path, name: str, entry: Mapping[str, Any], *, content: bool) -> None:
-    """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
-    path = root / name
-    if not path.is_file():
-        raise InputError(f"{path}: listed in the manifest but missing; generate the dataset again")
-    size = path.stat().st_size
-    if size != entry["bytes"]:
-        raise InputError(
-            f"{path}: truncated or changed, {size} bytes where the manifest says {entry['bytes']}; "
-            "generate the dataset again"
-        )
-    if content and hash_file(path) != entry["sha256"]:
-        raise InputError(
-            f"{path}: its content does not match the manifest's SHA-256; generate the dataset again"
-        )
+def lists_part(files: Iterable[str], part: str) -> bool:
+    """Whether any of the listed files is `part` or in it."""
+    return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
 def write_exr_safely(path: Path, image: np.ndarray) -> None:
-    """A float32 image (H, W, C), C = 1 or 3, as EXR with ZIP, whose checksum finds every bit flip."""
+    """A float32 image (H, W, C), C = 1 or 3, as EXR with ZIP compression."""
     import OpenEXR
 
     names = ("Y",) if image.shape[2] == 1 else ("R", "G", "B")
@@ -214,23 +152,33 @@ def write_exr_safely(path: Path, image: np.ndarray) -> None:
     sync_folder(path.parent)
 
 
-def read_exr(path: Path) -> np.ndarray:
-    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B."""
+def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B.
+
+    Raises `InputError` if it cannot be read or, where `shape` is given, has another; that is seen in its
+    header, before there is memory asked for its pixels.
+    """
     import OpenEXR
 
     try:
+        if shape is not None and _exr_shape(path) != tuple(shape):
+            raise InputError(f"{path}: expected an image {tuple(shape)}, got {_exr_shape(path)}")
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
             names = ("Y",) if "Y" in channels else ("R", "G", "B")
             return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
+    except InputError:
+        raise
     except (KeyError, RuntimeError, TypeError, ValueError) as fault:
         raise InputError(f"{path}: cannot be read as an EXR image ({fault})") from None
 
 
-def sweep_temporaries(root: Path) -> None:
-    """Remove what a killed run left half written."""
-    for path in [*root.glob(".*.tmp"), *root.glob(f"{RADIANCE}/.*.tmp")]:
-        if path.is_dir():
-            shutil.rmtree(path, ignore_errors=True)
-        else:
-            path.unlink(missing_ok=True)
+def _exr_shape(path: Path) -> tuple[int, int, int]:
+    """Shape (H, W, C) that an EXR file's header tells."""
+    import OpenEXR
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        header = file.header()
+        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
+        is_mosaic = any(channel.name == "Y" for channel in header["channels"])
+    return bottom - top + 1, right - left + 1, 1 if is_mosaic else 3

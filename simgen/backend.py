@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.errors import InputError
-from pcii.store import write_json_safely
+from pcii.safe_files import write_json_safely
 
 Kind = Literal["cuda", "llvm", "scalar"]
 KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")

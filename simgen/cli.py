@@ -222,11 +222,13 @@ def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))
 
 @app.command
 def verify(dataset: Path) -> None:
-    """Compare every file of a dataset with the sizes and hashes in its manifest.
+    """Compare every file of a dataset, or of a folder of results, with its manifest.
+
+    Names what is missing, truncated or changed, and what the manifest does not list.
 
     Example:  simgen verify out/paper
     """
-    from simgen.generate import verify as compare
+    from pcii.verify import verify as compare
 
     with Stages() as report:
         count = compare(dataset, report)

@@ -11,8 +11,9 @@ from pcii.bayer import channel_count
 from pcii.console import Report, silent
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
-from pcii.store import COUNTS, PHOTON_TRUTH, nested_name, write_arrays_safely
+from pcii.store import COUNTS, COUNTS_LABELS, PHOTON_TRUTH, PHOTON_TRUTH_LABELS, nested_name
 from pcii.types import CameraGrid
+from pcii.zarr_groups import write_arrays_safely
 from simgen import seeds
 from simgen.build import Built
 from simgen.cameras import rig_of
@@ -220,7 +221,7 @@ def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:
 def _write_events(path: Path, counts: PhotonCounts) -> None:
     index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
     small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
-    write_arrays_safely(path, {**small, "n": counts.events.n}, {"layout": "events"})
+    write_arrays_safely(path, {**small, "n": counts.events.n}, COUNTS_LABELS)
 
 
 def _write_origins(path: Path, counts: Arrivals, grid: CameraGrid) -> None:
@@ -234,4 +235,4 @@ def _write_origins(path: Path, counts: Arrivals, grid: CameraGrid) -> None:
         "object_id": counts.object_id[order].astype(np.int16),
         "z_mm": counts.z_mm[order].astype(np.float32),
     }
-    write_arrays_safely(path, origins, {"z_mm": "planar depth in mm", "object_id": "-1: no photon"})
+    write_arrays_safely(path, origins, PHOTON_TRUTH_LABELS)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pcii.errors import InputError
-from pcii.store import write_bytes_safely
+from pcii.safe_files import write_bytes_safely
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 EMPTY = "0.93"

@@ -1,6 +1,5 @@
 """From a recipe to a dataset folder: the order of the work, resuming, and the manifest."""
 
-import fcntl
 import hashlib
 import json
 import os
@@ -17,24 +16,22 @@ import numpy as np
 
 from pcii.console import Report, silent
 from pcii.errors import InputError
+from pcii.safe_files import locked, sweep_temporaries
+from pcii.sealed import check_file, hash_file, list_files
 from pcii.store import (
     COUNTS,
-    FORMAT,
     FORMAT_VERSION,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
+    REMEDY,
     TRUTH,
-    check_file,
-    hash_file,
-    list_files,
     nested_name,
     radiance_name,
     read_exr,
     read_manifest,
-    sweep_temporaries,
     write_exr_safely,
-    write_json_safely,
+    write_manifest,
 )
 from simgen import backend, seeds
 from simgen.asset_names import asset
@@ -87,7 +84,10 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     clock = _Clock()
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
         built = prepared.built()
-    with _claimed(out, identity, engine):
+    with _claimed(out, identity, engine) as marker:
+        if (out / MANIFEST).is_file():  # another run has finished it since
+            marker.unlink()
+            return _whole(out, identity)
         sweep_temporaries(out)
         products, photons, made = recipe.products, None, None
         if products.truth or products.view_truth:
@@ -118,18 +118,9 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
             "timings_s": clock.seconds,
             "files": files,
         }
-        write_json_safely(out / MANIFEST, manifest)
-        (out / MARKER).unlink()
-    return manifest
-
-
-def verify(path: Path, report: Report = silent) -> int:
-    """Compare every file of a dataset with its manifest; the number of files. Raises `InputError`."""
-    files = read_manifest(path)["files"]
-    for done, (name, entry) in enumerate(files.items(), start=1):
-        check_file(path, name, entry, content=True)
-        report("verify", done, len(files))
-    return len(files)
+        write_manifest(out, manifest)
+        marker.unlink()
+    return read_manifest(out)
 
 
 def _identity(prepared: Prepared) -> str:
@@ -154,52 +145,57 @@ def _finished(out: Path, identity: str) -> dict[str, Any] | None:
         return None
     if not (out / MANIFEST).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
+    return _whole(out, identity)
+
+
+def _whole(out: Path, identity: str) -> dict[str, Any]:
+    """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
     manifest = read_manifest(out)
     if manifest.get("identity") != identity:
         raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
     for name, entry in manifest["files"].items():
-        try:
-            check_file(out, name, entry, content=True)
-        except InputError as fault:
-            raise InputError(f"{fault}, after deleting {out}") from None
+        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=True)
     return manifest
 
 
 @contextmanager
-def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[None]:
-    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it."""
+def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
+    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark."""
     out.mkdir(parents=True, exist_ok=True)
     marker = out / MARKER
-    mine = {"identity": identity, "backend": engine}
-    with (out / MARKER).open("a+", encoding="utf-8") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"{out}: another run is writing this dataset") from None
-        file.seek(0)
-        text = file.read()
-        if text:
-            try:
-                begun = json.loads(text)
-            except ValueError:
-                raise InputError(f"{marker}: damaged; delete the folder to start again") from None
-            if begun.get("identity") != identity:
-                raise InputError(
-                    f"{out}: holds the unfinished dataset of another recipe or scene; "
-                    "name a new or empty folder"
-                )
-            decisive = ("variant", "mitsuba", "drjit")
-            if any(begun["backend"][key] != engine[key] for key in decisive):
-                raise InputError(
-                    f"{out}: was begun with {begun['backend']['variant']}, and this machine now "
-                    f"runs {engine['variant']}, whose pixels differ; delete {marker.name}'s folder "
-                    "to start again, or set SIMGEN_BACKEND"
-                )
-        else:
-            file.write(json.dumps(mine))
-            file.flush()
-            os.fsync(file.fileno())
-        yield
+    try:
+        with locked(marker, wait=False) as file:
+            text = file.read()
+            if text:
+                _check_begun(marker, text, identity, engine)
+            else:
+                file.write(json.dumps({"identity": identity, "backend": engine}))
+                file.flush()
+                os.fsync(file.fileno())
+            yield marker
+    except BlockingIOError:
+        raise InputError(f"{out}: another run is writing this dataset") from None
+
+
+def _check_begun(marker: Path, text: str, identity: str, engine: dict[str, Any]) -> None:
+    """Raise `InputError` unless the dataset was begun for the same recipe on the same backend."""
+    decisive = ("variant", "mitsuba", "drjit")
+    try:
+        begun = json.loads(text)
+        known, before = begun["identity"], {key: begun["backend"][key] for key in decisive}
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{marker}: damaged; delete the folder {marker.parent} to start again") from None
+    if known != identity:
+        raise InputError(
+            f"{marker.parent}: holds the unfinished dataset of another recipe or scene; "
+            "name a new or empty folder"
+        )
+    if before != {key: engine[key] for key in decisive}:
+        raise InputError(
+            f"{marker.parent}: was begun with {before['variant']}, and this machine now runs "
+            f"{engine['variant']}, whose pixels differ; delete the folder {marker.parent} to start again, "
+            "or set SIMGEN_BACKEND"
+        )
 
 
 def _render_views(recipe: Recipe, built: Built, made: Plan | None, out: Path, report: Report) -> None:
@@ -290,8 +286,6 @@ def _manifest(
     """What the manifest says of the recipe, the scene and the software."""
     channels = 3 if built.filters is None else len(built.filters.sensitivity)
     return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
         "identity": identity,
         "title": recipe.title or scene.title,
         "grid": asdict(recipe.grid.camera_grid()),

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from pcii.console import Report
-from pcii.store import TRUTH, new_array, new_group_safely
+from pcii.store import TRUTH, TRUTH_LABELS
+from pcii.zarr_groups import new_array, new_group_safely
 from simgen.build import Built
 from simgen.cameras import Rig, centre_camera, rig_of
 from simgen.coverage import coverage
@@ -15,17 +16,6 @@ from simgen.recipe import Recipe, ViewPass
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
 from simgen.visibility import visible_views
 
-MEANINGS = {
-    "z_mm": "planar depth in mm, +inf for a miss",
-    "object_id": "0 for the backdrop and for a miss, else a key of the manifest's objects",
-    "normal": "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
-    "0 for a miss",
-    "coverage": "share of the pixel's square that belongs to the object (or to none) that its centre hits",
-    "camera_position_mm": "where the cameras really are",
-    "camera_rotation": "its columns are the cameras' right, down and forward directions",
-    "visible_views": "number of cameras that see the point; 0 for a miss",
-    "in_focus": "blur half-extent of at most 1 px at each plane of in_focus_z_mm",
-}
 RAYS = "visibility_rays"
 
 
@@ -35,7 +25,7 @@ def write_truth(recipe: Recipe, built: Built, out: Path, report: Report) -> None
         return
     rig, products, planes = rig_of(recipe), recipe.products, recipe.analysis.z_mm
     grid = rig.grid
-    with new_group_safely(out / TRUTH, MEANINGS) as group:
+    with new_group_safely(out / TRUTH, {}) as group:
         if products.truth:
             centre = first_hits_at_centre(built, grid)
             for name in ("z_mm", "object_id", "normal"):
@@ -71,7 +61,8 @@ def _write_views(group: Any, built: Built, rig: Rig, passes: tuple[ViewPass, ...
         for name, image in _view(built, rig, k, l, passes):
             if name not in arrays:
                 shape = (grid.rows, grid.cols, *image.shape)
-                arrays[name] = new_array(group, f"view_{name}", shape, image.dtype)
+                label = TRUTH_LABELS[f"view_{name}"]
+                arrays[name] = new_array(group, f"view_{name}", shape, image.dtype, label)
             arrays[name][k, l] = image
         report("truth of views", done, grid.view_count)
 
@@ -88,4 +79,4 @@ def _view(
 
 
 def _store(group: Any, name: str, array: np.ndarray) -> None:
-    new_array(group, name, array.shape, array.dtype)[...] = array
+    new_array(group, name, array.shape, array.dtype, TRUTH_LABELS[name])[...] = array

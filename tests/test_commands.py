@@ -1,5 +1,6 @@
 """The commands as a user types them: results, exit codes, one sentence for bad input."""
 
+import itertools
 import json
 import shutil
 from pathlib import Path
@@ -194,13 +195,36 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     (broken / "counts.zarr" / "n" / "c" / "0").write_bytes(b"")
     assert "truncated" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
     (broken / MANIFEST).write_text("{")
-    assert "not valid JSON" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
+    assert "manifest.json: damaged" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").touch()
     assert "holds something else" in refusal(
         pcii_cli.app, ["run", data, "-o", str(tmp_path / "full")], capsys
     )
     assert not Path(out).exists()
+
+
+def test_results_and_datasets_are_verified_by_one_command(
+    small_dataset: Path, results: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for app, folder in itertools.product((simgen_cli.app, pcii_cli.app), (small_dataset, results)):
+        assert console.run(app, ["verify", str(folder)]) == 0
+        assert "files match the manifest" in capsys.readouterr().out
+    broken = tmp_path / "broken"
+    shutil.copytree(results, broken)
+    (broken / "report.html").write_text("<p>better figures</p>")
+    assert "report.html: truncated or changed" in refusal(pcii_cli.app, ["verify", str(broken)], capsys)
+    assert "report.html: truncated or changed" in refusal(simgen_cli.app, ["verify", str(broken)], capsys)
+    assert "no such" in refusal(pcii_cli.app, ["verify", str(tmp_path / "nowhere")], capsys)
+
+
+def test_masks_whose_file_is_gone_are_not_scored_as_empty(
+    small_dataset: Path, results: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    broken = tmp_path / "broken"
+    shutil.copytree(results, broken)
+    (broken / "segmented_likelihood.zarr" / "in_focus" / "c" / "0" / "0" / "0").unlink()
+    assert "missing" in refusal(pcii_cli.app, ["score", str(small_dataset), str(broken)], capsys)
 
 
 def test_a_smaller_budget_is_asked_for_by_option(
@@ -251,7 +275,7 @@ def test_a_failure_is_one_line_and_exit_code_1(
     def full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pcii.results.save_sections", full_disk)
+    monkeypatch.setattr("pcii.results.Results.save_sections", full_disk)
     command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
     assert console.run(pcii_cli.app, command) == 1
     assert "No space left" in capsys.readouterr().err

@@ -18,7 +18,7 @@ from pcii.evaluate import evaluate, find_datasets
 from pcii.evaluation_tables import markdown, overview, told
 from pcii.measurements import ROWS, all_rows, append_row, claim_rows
 from pcii.segment import METHODS
-from pcii.store import MANIFEST, TRUTH
+from pcii.store import MANIFEST, TRUTH, read_manifest, write_manifest
 from pcii.summary import summarise
 from pcii.types import DepthMap
 
@@ -295,9 +295,9 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
         evaluate([], out)
     with pytest.raises(InputError, match="holds something else"):
         evaluate([series], series, methods=FAKES)
-    manifest = json.loads((series / "seed_3" / MANIFEST).read_text())
+    manifest = read_manifest(series / "seed_3")
     manifest["files"] = {name: e for name, e in manifest["files"].items() if not name.startswith(TRUTH)}
-    (series / "seed_3" / MANIFEST).write_text(json.dumps(manifest))
+    write_manifest(series / "seed_3", manifest)
     with pytest.raises(InputError, match="has no truth"):
         evaluate([series], out, methods=FAKES)
     assert calls == []

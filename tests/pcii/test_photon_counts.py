@@ -163,3 +163,26 @@ def test_photons_are_drawn_fairly_and_always_alike() -> None:
         np.testing.assert_array_equal(getattr(few.events, name), getattr(again.events, name))
         np.testing.assert_array_equal(getattr(few.events, name), getattr(drawn(counts, most).events, name))
     assert drawn(counts, counts.total) is counts
+
+
+# Totals
+
+
+MANY = 1 << 23
+MOST = np.int64(1 << 40)  # in one pixel; 2^23 of them are 2^63, one more than int64 holds
+
+
+def test_events_that_add_up_to_more_than_int64_holds_are_refused_by_name() -> None:
+    grid = unit_grid(1, 1, 1, 1)
+    zeros = np.zeros(MANY, dtype=np.uint8)
+    with pytest.raises(InputError, match=r"^n: 9223372036854775808 photons in all"):
+        PhotonCounts.from_events(zeros, zeros, zeros, zeros, np.full(MANY, MOST), grid)
+    just = np.full(MANY, MOST)
+    just[0] -= 1
+    assert PhotonCounts.from_events(zeros, zeros, zeros, zeros, just, grid).total == (1 << 63) - 1
+
+
+def test_a_dense_stack_of_more_than_int64_holds_is_refused_by_name() -> None:
+    grid = unit_grid(1, 1, 2048, 4096)
+    with pytest.raises(InputError, match=r"^counts: 9223372036854775808 photons in all"):
+        PhotonCounts.from_dense(np.full(grid.shape_KLHW, MOST), grid)

@@ -1,90 +1,38 @@
-import json
-import os
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+"""Datasets on disk: what comes back, what is refused."""
 
 import numpy as np
 import pytest
+import xarray
 import zarr
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as hnp
-from twins import unit_grid
+from stored_datasets import (
+    DENSE,
+    GRID,
+    IDS,
+    Z_MM,
+    flip_a_bit,
+    largest_file,
+    make_dataset,
+    one_sentence,
+)
 
-from pcii import store
 from pcii.dataset import open_dataset
-from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
+from pcii.safe_files import write_bytes_safely
+from pcii.sealed import LARGEST_DOCUMENT_BYTES, check_file, list_files
 from pcii.store import (
     COUNTS,
-    FORMAT,
-    FORMAT_VERSION,
+    COUNTS_LABELS,
     MANIFEST,
+    PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
-    check_file,
-    list_files,
     radiance_name,
     read_exr,
     read_manifest,
-    sweep_temporaries,
-    write_arrays_safely,
-    write_bytes_safely,
     write_exr_safely,
-    write_json_safely,
+    write_manifest,
 )
-
-GRID = unit_grid(2, 3, 4, 5)
-Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)
-IDS = np.where(np.isfinite(Z_MM), 1, 0)
-DENSE = np.random.default_rng(0).poisson(0.5, size=GRID.shape_KLHW)
-
-
-def make_dataset(root: Path, *, sparse: bool = True, **overrides: Any) -> Path:
-    """A finished dataset of counts, truth and radiance, as `simgen` lays it out."""
-    root.mkdir()
-    k, l, i, j = np.nonzero(DENSE)
-    events = {"k": k, "l": l, "i": i, "j": j, "n": DENSE[k, l, i, j]}
-    write_arrays_safely(root / COUNTS, events if sparse else {"dense": DENSE}, {})
-    write_arrays_safely(root / TRUTH, {"z_mm": Z_MM, "object_id": IDS}, {})
-    for a, b in np.ndindex(GRID.rows, GRID.cols):
-        write_exr_safely(root / radiance_name(a, b), np.full((4, 5, 3), 3 * a + b, dtype=np.float32))
-    manifest = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "grid": {
-            name: getattr(GRID, name)
-            for name in ("rows", "cols", "pitch_mm", "focal_mm", "pixel_mm", "height", "width")
-        },
-        "cfa": "GRBG",
-        "objects": {"1": "ball"},
-        "radiance_channels": 3,
-        "files": list_files(root, [COUNTS, TRUTH, RADIANCE]),
-    }
-    write_json_safely(root / MANIFEST, {**manifest, **overrides})
-    return root
-
-
-def one_sentence(action: Callable[[], object], path: Path) -> str:
-    """The message of the `InputError` that `action` raises, checked to be one line that names the path."""
-    with pytest.raises(InputError) as caught:
-        action()
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    return message
-
-
-def largest_file(root: Path, part: str) -> Path:
-    return max((p for p in (root / part).rglob("*") if p.is_file()), key=lambda p: (p.stat().st_size, p.name))
-
-
-def flip_a_bit(path: Path, bit: int) -> None:
-    content = bytearray(path.read_bytes())
-    content[bit // 8 % len(content)] ^= 1 << bit % 8
-    path.write_bytes(content)
-
+from pcii.zarr_groups import new_array
 
 # A dataset, read back
 
@@ -111,6 +59,21 @@ def test_what_a_dataset_does_not_have_is_none_or_refused(tmp_path):
     assert dataset.truth is None
     assert dataset.views is None
     assert "no counts" in one_sentence(lambda: dataset.counts, root)
+
+
+@pytest.mark.parametrize(
+    ("part", "sparse", "axes"),
+    [
+        (COUNTS, True, {"event"}),
+        (COUNTS, False, {"camera_row", "camera_col", "row", "col"}),
+        (PHOTON_TRUTH, True, {"photon"}),
+        (TRUTH, True, {"row", "col"}),
+    ],
+)
+def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, sparse, axes):
+    opened = xarray.open_zarr(make_dataset(tmp_path / "d", sparse=sparse) / part, consolidated=False)
+    assert set(opened.sizes) == axes
+    assert all(set(array.attrs) == {"unit", "meaning"} for array in opened.values())
 
 
 # Damage
@@ -155,8 +118,8 @@ def test_checking_without_content_trusts_the_size(tmp_path):
     write_bytes_safely(tmp_path / "a.bin", b"abcd")
     entry = list_files(tmp_path, ["a.bin"])["a.bin"]
     flip_a_bit(tmp_path / "a.bin", 3)
-    check_file(tmp_path, "a.bin", entry, content=False)
-    one_sentence(lambda: check_file(tmp_path, "a.bin", entry, content=True), tmp_path / "a.bin")
+    check_file(tmp_path, "a.bin", entry, "again", content=False)
+    one_sentence(lambda: check_file(tmp_path, "a.bin", entry, "again", content=True), tmp_path / "a.bin")
 
 
 def test_a_file_that_the_manifest_does_not_list_is_refused(tmp_path):
@@ -172,19 +135,21 @@ def test_no_folder_and_no_manifest_are_told_apart(tmp_path):
     assert "not a finished dataset" in one_sentence(lambda: open_dataset(tmp_path), tmp_path)
 
 
-@pytest.mark.parametrize("content", [b"", b"{", b'{"format": ', b"\xff\xfe\x00", b"not json"])
-def test_a_manifest_that_is_not_json_is_refused(tmp_path, content):
-    (tmp_path / MANIFEST).write_bytes(content)
-    assert "not valid JSON" in one_sentence(lambda: read_manifest(tmp_path), tmp_path / MANIFEST)
+def test_a_manifest_that_was_changed_is_refused(tmp_path):
+    root = make_dataset(tmp_path / "d")
+    path = root / MANIFEST
+    text = path.read_text()
+    path.write_text(text.replace('"focal_mm": 1.0', '"focal_mm": 2.0'))
+    assert path.read_text() != text
+    assert "changed since it was written" in one_sentence(lambda: open_dataset(root), path)
 
 
-@pytest.mark.parametrize("content", ["[]", "3", "null", "{}", '{"format": "something else"}'])
-def test_a_manifest_of_something_else_is_refused(tmp_path, content):
-    (tmp_path / MANIFEST).write_text(content)
-    assert "not the manifest" in one_sentence(lambda: read_manifest(tmp_path), tmp_path / MANIFEST)
+def test_a_manifest_of_something_else_is_refused(tmp_path):
+    root = make_dataset(tmp_path / "d", format="something else")
+    assert "not the manifest" in one_sentence(lambda: read_manifest(root), root / MANIFEST)
 
 
-@pytest.mark.parametrize("version", [0, 2, None, "1"])
+@pytest.mark.parametrize("version", [0, 1, None, "2"])
 def test_a_format_version_of_another_release_is_refused(tmp_path, version):
     root = make_dataset(tmp_path / "d", format_version=version)
     message = one_sentence(lambda: open_dataset(root), root / MANIFEST)
@@ -194,122 +159,66 @@ def test_a_format_version_of_another_release_is_refused(tmp_path, version):
 @pytest.mark.parametrize("name", ["grid", "cfa", "files"])
 def test_a_manifest_that_lacks_a_field_is_refused_by_its_name(tmp_path, name):
     root = make_dataset(tmp_path / "d")
-    manifest = json.loads((root / MANIFEST).read_text())
+    manifest = read_manifest(root)
     del manifest[name]
-    write_json_safely(root / MANIFEST, manifest)
-    assert name in one_sentence(lambda: open_dataset(root), root / MANIFEST)
+    write_manifest(root, manifest)
+    assert f"{name}: " in one_sentence(lambda: open_dataset(root), root / MANIFEST)
 
 
-def test_a_manifest_with_a_bad_grid_or_pattern_is_refused(tmp_path):
-    root = make_dataset(tmp_path / "d", cfa="GRGB")
-    with pytest.raises(InputError, match=r"^cfa: "):
-        open_dataset(root)
-    manifest = json.loads((root / MANIFEST).read_text())
-    manifest.update(cfa="GRBG", grid={**manifest["grid"], "rows": 0})
-    write_json_safely(root / MANIFEST, manifest)
-    with pytest.raises(InputError, match=r"^rows: "):
-        open_dataset(root)
+ENTRY = {"bytes": 1, "sha256": "0" * 64}
+WRONG = [
+    ({"cfa": "GRGB"}, "cfa: "),
+    ({"grid": {"rows": 1}}, "grid.cols: "),
+    ({"grid": 3}, "grid: "),
+    ({"objects": {"one": "ball"}}, "objects.one: "),
+    ({"objects": {"1": 3}}, "objects.1: "),
+    ({"objects": {"1\n": "ball"}}, "objects.1"),
+    ({"analysis": {"z_mm": [-5.0]}}, "analysis.z_mm.0: "),
+    ({"analysis": {"z_range_mm": [5.0]}}, "analysis.z_range_mm: "),
+    ({"recipe": {"photons": {"nested": ["few"]}}}, "recipe.photons.nested.0: "),
+    ({"radiance_channels": 2}, "radiance_channels: "),
+    ({"timings_s": {"truth": "long"}}, "timings_s.truth: "),
+    ({"title": ["a"]}, "title: "),
+    ({"files": []}, "files: "),
+    ({"files": {"../secret": ENTRY}}, "a path inside the folder"),
+    ({"files": {"/etc/passwd": ENTRY}}, "a path inside the folder"),
+    ({"files": {"a\0b": ENTRY}}, "a path inside the folder"),
+    ({"files": {"a": ENTRY | {"bytes": -1}}}, "files.a.bytes: "),
+    ({"files": {"a": ENTRY | {"sha256": "no"}}}, "files.a.sha256: "),
+    ({"files": {"a": {}}}, "files.a.bytes: "),
+]
 
 
-# Arrays
-
-shapes = hnp.array_shapes(min_dims=0, max_dims=5, min_side=0, max_side=4)
-dtypes = st.sampled_from([np.int32, np.int64, np.uint8, np.uint16, np.float32, np.float64, np.bool_])
-
-
-@given(array=dtypes.flatmap(lambda dtype: hnp.arrays(dtype, shapes)))
-@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_arrays_of_any_shape_come_back_to_the_bit(tmp_path, array):
-    folder = tmp_path / "a.zarr"  # written over, again and again
-    write_arrays_safely(folder, {"x": array, "y": np.arange(3)}, {"why": "test"})
-    group = zarr.open_group(folder, mode="r", zarr_format=3)
-    stored = np.asarray(group["x"][...])  # type: ignore[index]
-    assert (stored.dtype, stored.shape) == (array.dtype, array.shape)
-    assert stored.tobytes() == array.tobytes()
-    assert sorted(group.array_keys()) == ["x", "y"]
-    assert dict(group.attrs) == {"why": "test"}
-    assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
+@pytest.mark.parametrize(("members", "words"), WRONG, ids=[ascii(members) for members, _ in WRONG])
+def test_a_wrong_member_of_a_manifest_is_named(tmp_path, members, words):
+    root = make_dataset(tmp_path / "d", **members)
+    assert words in one_sentence(lambda: open_dataset(root), root / MANIFEST)
 
 
-@given(st.lists(st.integers(0, 3000), max_size=5).map(tuple))
-@settings(max_examples=200, deadline=None)
-def test_chunks_fit_the_array_and_the_limit(shape):
-    chunks = store._chunks(shape)
-    assert len(chunks) == len(shape)
-    assert all(1 <= chunk <= max(size, 1) for chunk, size in zip(chunks, shape, strict=True))
-    assert np.prod(chunks, dtype=object) <= store.CHUNK_ELEMENTS
+def test_a_manifest_too_large_to_be_one_is_refused(tmp_path):
+    with (tmp_path / MANIFEST).open("wb") as file:
+        file.truncate(LARGEST_DOCUMENT_BYTES + 1)
+    assert "larger than" in one_sentence(lambda: read_manifest(tmp_path), tmp_path / MANIFEST)
 
 
-def test_one_view_of_the_paper_is_one_chunk():
-    assert store._chunks((10, 10, 1024, 1024)) == (1, 1, 1024, 1024)
-
-
-def test_a_failed_write_of_arrays_leaves_the_old_ones_and_no_scraps(tmp_path, monkeypatch):
-    folder = tmp_path / "a.zarr"
-    write_arrays_safely(folder, {"x": np.arange(4)}, {})
-    monkeypatch.setattr(os, "fsync", disk_is_full)
-    with pytest.raises(OSError, match=r"disk is full"):
-        write_arrays_safely(folder, {"x": np.zeros(4)}, {})
-    assert [p.name for p in tmp_path.iterdir()] == ["a.zarr"]
-    np.testing.assert_array_equal(zarr.open_group(folder, mode="r")["x"][...], np.arange(4))  # type: ignore[index]
-
-
-# Files
-
-
-def disk_is_full(handle: int) -> None:
-    raise OSError("disk is full")
-
-
-def test_a_file_is_whole_under_its_name_and_leaves_no_temporary(tmp_path):
-    path = tmp_path / "new" / "folder" / "a.bin"
-    for content in (b"", b"first", b"second, longer"):
-        write_bytes_safely(path, content)
-        assert path.read_bytes() == content
-        assert [p.name for p in path.parent.iterdir()] == ["a.bin"]
-    assert path.stat().st_mode & 0o777 == 0o644
-
-
-def test_a_failed_write_leaves_the_old_content_and_no_temporary(tmp_path, monkeypatch):
-    path = tmp_path / "a.bin"
-    write_bytes_safely(path, b"old")
-    monkeypatch.setattr(os, "fsync", disk_is_full)
-    with pytest.raises(OSError, match=r"disk is full"):
-        write_bytes_safely(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert [p.name for p in tmp_path.iterdir()] == ["a.bin"]
-
-
-@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_json_refuses_what_json_cannot_say_and_keeps_the_old_file(tmp_path, bad):
-    path = tmp_path / "a.json"
-    write_json_safely(path, {"z_mm": 540})
-    with pytest.raises(ValueError, match=r"JSON compliant"):
-        write_json_safely(path, {"z_mm": bad})
-    assert json.loads(path.read_text()) == {"z_mm": 540}
-
-
-def test_a_killed_runs_scraps_are_swept_and_the_rest_is_kept(tmp_path):
+def test_what_no_manifest_lists_is_not_read(tmp_path):
     root = make_dataset(tmp_path / "d")
-    (root / ".manifest.json.x1.tmp").write_bytes(b"half")
-    (root / f".{COUNTS}.x2.tmp").mkdir()
-    (root / f".{COUNTS}.x2.tmp" / "chunk").write_bytes(b"half")
-    (root / RADIANCE / ".view_00_00.exr.7.tmp").write_bytes(b"half")
-    sweep_temporaries(root)
-    assert [p.name for p in root.rglob("*.tmp")] == []
-    assert open_dataset(root).counts.total == DENSE.sum()
+    group = zarr.open_group(root / COUNTS, mode="a", zarr_format=3)
+    new_array(group, "dense", DENSE.shape, DENSE.dtype, COUNTS_LABELS["dense"])[...] = DENSE + 7
+    counts = open_dataset(root).counts
+    assert counts.is_sparse
+    assert counts.total == DENSE.sum()
 
 
-def test_files_are_listed_by_their_place_in_the_dataset(tmp_path):
-    write_bytes_safely(tmp_path / "b" / "c.bin", b"abc")
-    write_bytes_safely(tmp_path / "a.bin", b"")
-    listed = list_files(tmp_path, ["b", "a.bin"])
-    # The SHA-256 of nothing and of "abc" are those of the standard's examples.
-    assert listed["a.bin"]["bytes"] == 0
-    assert listed["a.bin"]["sha256"].startswith("e3b0c44298fc1c14")
-    assert listed["b/c.bin"]["bytes"] == 3
-    assert listed["b/c.bin"]["sha256"].startswith("ba7816bf8f01cfea")
-    assert len(listed) == 2
+def test_radiance_of_another_size_is_refused_by_its_header(tmp_path):
+    root = make_dataset(tmp_path / "d")
+    wrong = root / radiance_name(1, 2)
+    write_exr_safely(wrong, np.zeros((40, 50, 3), dtype=np.float32))
+    manifest = read_manifest(root)
+    write_manifest(root, manifest | {"files": list_files(root, [COUNTS, TRUTH, RADIANCE])})
+    views = open_dataset(root).views
+    assert views is not None
+    assert "expected an image (4, 5, 3)" in one_sentence(lambda: views.view(1, 2), wrong)
 
 
 # Radiance

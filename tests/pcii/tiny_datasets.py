@@ -8,18 +8,10 @@ from twins import unit_grid
 
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct
-from pcii.store import (
-    COUNTS,
-    FORMAT,
-    FORMAT_VERSION,
-    MANIFEST,
-    TRUTH,
-    list_files,
-    nested_name,
-    write_arrays_safely,
-    write_json_safely,
-)
+from pcii.sealed import list_files
+from pcii.store import COUNTS, COUNTS_LABELS, TRUTH, TRUTH_LABELS, nested_name, write_manifest
 from pcii.types import Segmented
+from pcii.zarr_groups import write_arrays_safely
 
 GRID = unit_grid(2, 2, 8, 12, pitch_mm=(10.0, 10.0))
 Z_MM = (1.0, 2.0)  # 10 and 5 px of disparity: 2.5 px of blur at the other's depth
@@ -42,17 +34,16 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
         dense[0, 0][NEAR] = first.reshape(2, 5)
         k, l, i, j = np.nonzero(dense)
         part = nested_name(COUNTS, None if budget == OWN else budget)
-        write_arrays_safely(root / part, {"k": k, "l": l, "i": i, "j": j, "n": dense[k, l, i, j]}, {})
+        events = {"k": k, "l": l, "i": i, "j": j, "n": dense[k, l, i, j]}
+        write_arrays_safely(root / part, events, COUNTS_LABELS)
     z_mm, ids = np.full((8, 12), np.inf), np.zeros((8, 12), dtype=np.int16)
     z_mm[NEAR], ids[NEAR] = 1.0, 1
     z_mm[FAR], ids[FAR] = 2.0, 2
-    write_arrays_safely(root / TRUTH, {"z_mm": z_mm, "object_id": ids}, {})
+    write_arrays_safely(root / TRUTH, {"z_mm": z_mm, "object_id": ids}, TRUTH_LABELS)
     keys = ("rows", "cols", "pitch_mm", "focal_mm", "pixel_mm", "height", "width")
     nested = [budget for budget in hits if budget != OWN]
     parts = [TRUTH, *(nested_name(COUNTS, None if budget == OWN else budget) for budget in hits)]
     manifest = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
         "identity": f"{title}, seed {seed}",
         "title": title,
         "grid": {name: getattr(GRID, name) for name in keys},
@@ -67,7 +58,7 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
         "scene": {},
         "files": list_files(root, parts),
     }
-    write_json_safely(root / MANIFEST, manifest)
+    write_manifest(root, manifest)
     return root
 
 

@@ -16,12 +16,12 @@ from pcii.dataset import Dataset, open_dataset
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
 from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
+from pcii.verify import verify
 from simgen import backend
 from simgen import counts as module
 from simgen.build import Built, build
 from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import Arrivals, members
-from simgen.generate import verify
 from simgen.noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.recipe import MOST_PATHS, Recipe
 from simgen.scene import Scene, load_scene

@@ -1,5 +1,6 @@
 """Datasets: the same bytes again, resuming, and refusing what is not ours."""
 
+import fcntl
 import hashlib
 import json
 import shutil
@@ -13,9 +14,10 @@ from tiny import TINY_RECIPE
 from pcii.dataset import open_dataset
 from pcii.errors import InputError
 from pcii.store import MANIFEST, RADIANCE, TRUTH
+from pcii.verify import verify
 from simgen import generate as module
 from simgen.cameras import rig_of
-from simgen.generate import MARKER, generate, verify
+from simgen.generate import MARKER, generate
 from simgen.recipe import Recipe
 
 pytestmark = pytest.mark.renders
@@ -114,6 +116,44 @@ def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.Monkey
     before = (made / MANIFEST).stat().st_mtime_ns
     generate(recipe(), Path(), made)
     assert (made / MANIFEST).stat().st_mtime_ns == before
+
+
+def test_a_second_run_that_waited_for_the_first_finds_its_dataset(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "shared"
+    original, locks = fcntl.flock, []
+
+    def first_run_ends_now(file: object, operation: int) -> None:
+        if not locks:  # between the second run's opening of the marker and its locking it
+            shutil.copytree(made, out, dirs_exist_ok=True)
+            (out / MARKER).unlink()
+        locks.append(operation)
+        original(file, operation)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fcntl, "flock", first_run_ends_now)
+    monkeypatch.setattr(module, "render_view", lambda *_: pytest.fail("rendered again"))
+    manifest = generate(recipe(), Path(), out)
+    assert len(locks) == 2
+    assert manifest["timings_s"] == open_dataset(made).manifest["timings_s"]
+    assert not (out / MARKER).exists()
+    assert verify(out) == len(manifest["files"])
+
+
+def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with (tmp_path / "out" / MARKER).open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with pytest.raises(InputError, match="another run is writing"):
+            generate(recipe(), Path(), tmp_path / "out")
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"identity": 1}', '{"identity": "", "backend": 3}'])
+def test_a_damaged_mark_of_an_unfinished_dataset_is_named(tmp_path: Path, content: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / MARKER).write_text(content)
+    with pytest.raises(InputError, match=r"\.unfinished\.json: damaged"):
+        generate(recipe(), Path(), tmp_path / "out")
 
 
 def test_a_folder_with_something_else_is_refused_and_untouched(made: Path, tmp_path: Path) -> None:

@@ -1,0 +1,122 @@
+"""Writing that survives a kill: whatever has its final name is whole.
+
+A file or folder is written beside its place under the name `.NAME.*.tmp`, flushed to disk and renamed.
+"""
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+
+def write_bytes_safely(path: Path, content: bytes) -> None:
+    """Write a file so that it is either whole under its name or not there at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def json_bytes(value: Any) -> bytes:
+    """`value` as indented JSON; infinities and NaN are refused, since JSON has none."""
+    return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def write_json_safely(path: Path, value: Any) -> None:
+    """Write indented JSON safely; raises ValueError for infinities and NaN."""
+    write_bytes_safely(path, json_bytes(value))
+
+
+@contextmanager
+def new_folder_safely(folder: Path) -> Iterator[Path]:
+    """An empty folder to fill, which takes the place of `folder` once the block has ended without fault."""
+    with temporary_folder(folder) as temporary:
+        yield temporary
+        replace_folder(temporary, folder)
+
+
+@contextmanager
+def temporary_folder(folder: Path) -> Iterator[Path]:
+    """An empty folder beside `folder`, gone at the end of the block unless it was renamed by then."""
+    temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".tmp"))
+    try:
+        yield temporary
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def replace_folder(new: Path, folder: Path) -> None:
+    """Flush `new` to disk and rename it to `folder`; what was there is renamed first and deleted last."""
+    new.chmod(0o755)
+    for file in new.rglob("*"):
+        if file.is_file():
+            with file.open("rb") as opened:
+                os.fsync(opened.fileno())
+    with temporary_folder(folder) as old:
+        was_there = folder.exists()
+        if was_there:
+            folder.replace(old)  # `old` is empty: a folder may take its place
+        try:
+            new.replace(folder)
+        except OSError:
+            if was_there:
+                old.replace(folder)
+            raise
+        sync_folder(folder.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush a folder's entries (new names, renames) to disk."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def sweep_temporaries(root: Path) -> None:
+    """Remove what a killed run left half written in `root` and in its folders."""
+    for path in [*root.glob(".*.tmp"), *root.glob("*/.*.tmp")]:
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+@contextmanager
+def locked(path: Path, *, wait: bool) -> Iterator[IO[str]]:
+    """The file `path`, made if it is not there, open to read and append, with other processes kept out.
+
+    Whoever holds the lock may delete the file. Raises BlockingIOError if another process holds it and
+    `wait` is false.
+    """
+    import fcntl  # not everywhere, and only writers need it
+
+    while True:
+        with path.open("a+", encoding="utf-8") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            # The last holder may have deleted the file between opening and locking; then this is another.
+            if _is_at(file, path):
+                file.seek(0)
+                yield file
+                return
+
+
+def _is_at(file: IO[str], path: Path) -> bool:
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
