@@ -15,7 +15,7 @@ from pcii.evaluate import evaluate
 from pcii.photon_counts import PhotonCounts
 from pcii.reconstruct import reconstruct, reconstruct_each
 from pcii.score import score
-from pcii.segment import segment
+from pcii.segment import removal_methods, segment
 from pcii.three_step import ThreeStep
 from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
 
@@ -37,6 +37,7 @@ __all__ = [
     "open_dataset",
     "reconstruct",
     "reconstruct_each",
+    "removal_methods",
     "score",
     "segment",
 ]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pcii.brief import Brief, listed, times
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
 from pcii.sealed import check_file
@@ -23,9 +24,9 @@ from pcii.store import (
     lists_part,
     nested_name,
     radiance_name,
-    read_exr,
     read_manifest,
 )
+from pcii.stored_radiance import StoredRadiance
 from pcii.types import CameraGrid, PhotonTruth, Truth, Views
 from pcii.zarr_groups import Label, read_array
 
@@ -33,8 +34,8 @@ MORE_TRUTH = ("normal", "coverage", "visible_views")
 """Maps of the truth that a dataset may lack: old ones do."""
 
 
-@dataclass(frozen=True, eq=False)
-class Dataset:
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(Brief):
     """A finished dataset folder; its parts are read, and their hashes checked, on first use."""
 
     path: Path
@@ -43,6 +44,17 @@ class Dataset:
     cfa: str | None
     budget: float | None = None
     """Nested photon budget that `counts` are of; None for the recipe's own."""
+
+    def _facts(self) -> dict[str, object]:
+        parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
+        return {
+            "name": self.name,
+            "shape": times(self.grid.shape_KLHW),
+            "cfa": self.cfa,
+            "budgets": listed([budget or "exposure" for budget in self.budgets]),
+            "z_mm": listed(self.analysis.get("z_mm") or ()),
+            "has": listed([name for name, part in parts.items() if self.has(part)]),
+        }
 
     @property
     def budgets(self) -> tuple[float | None, ...]:
@@ -123,7 +135,8 @@ class Dataset:
             return None
         channels = int(self.manifest["radiance_channels"])
         cfa = self.cfa if channels == 1 else None
-        return Views(_ExrStack(self, channels), self.grid, cfa)
+        shape = (*self.grid.shape_KLHW, channels)
+        return Views(StoredRadiance(shape, lambda k, l: self.check(radiance_name(k, l))), self.grid, cfa)
 
     def has(self, part: str) -> bool:
         """Whether the manifest lists files under `part`."""
@@ -147,19 +160,6 @@ class Dataset:
             name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
             for name in names
         }
-
-
-class _ExrStack:
-    """Radiance (K, L, H, W, C) on disk, one EXR a view, read when indexed by [k, l]."""
-
-    def __init__(self, dataset: Dataset, channels: int) -> None:
-        self._dataset = dataset
-        self.shape = (*dataset.grid.shape_KLHW, channels)
-        self.dtype = np.dtype(np.float32)
-
-    def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
-        path = self._dataset.check(radiance_name(*index))
-        return read_exr(path, self.shape[2:])
 
 
 def open_dataset(path: str | Path) -> Dataset:

@@ -1,8 +1,7 @@
 """Methods compared: every dataset, photon budget and method once, scored against the truth and timed."""
 
 import re
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,15 +24,15 @@ from pcii.measurements import (
 )
 from pcii.pipeline import depth_range_of, planes_of
 from pcii.score import score
-from pcii.segment import methods as removals
-from pcii.segment import segment
+from pcii.segment import removal_methods, segment
 from pcii.store import MANIFEST, TRUTH
 from pcii.summary import summarise
+from pcii.timing import timed
 
 
 def known_methods() -> tuple[str, ...]:
     """Names of what can be evaluated: the methods of removal, and the depth map."""
-    return (*removals(), DEPTH)
+    return (*removal_methods(), DEPTH)
 
 
 @dataclass(frozen=True)
@@ -67,8 +66,9 @@ def evaluate(
 
     Rows are added to out/rows.jsonl as they are made, and what is there is not made again; evaluation.json,
     .html and .md tell of all rows that `out` holds. `missing` counts those that were asked for and are not
-    there yet. The seconds of a row are wall time of the method alone, after one call that warms up.
-    Raises `InputError` for a dataset without truth, depths or counts, or an unknown method or budget.
+    there yet. The seconds of a row are wall time of the method alone, after one call that warms up, of a
+    call in which nothing was compiled or loaded. Raises `InputError` for a dataset without truth, depths or
+    counts, or an unknown method or budget.
     """
     folder = Path(out)
     tasks = _tasks([open_dataset(path) for path in find_datasets(datasets)], _checked(methods), budgets)
@@ -161,12 +161,12 @@ def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
     if (task.budget, task.method) not in warm:
         work()
         warm.add((task.budget, task.method))
-    seconds, found = _timed(work)
+    seconds, found = timed(work)
     row = described(data) | {
         "budget": task.budget,
         "photons_per_view": counts.total / counts.grid.view_count,
         "method": task.method,
-        "seconds": round(seconds, 4),
+        "seconds": round(seconds, 6),
     }
     if task.method == DEPTH:
         return row | {"depth": dict(score(None, found, data.truth, grid=data.grid).depth)}
@@ -176,9 +176,3 @@ def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
         for plane, known in zip(result.planes, result.bounds["planes"], strict=True)
     ]
     return row | {"planes": planes, "objects": [dict(thing) for thing in result.objects]}
-
-
-def _timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    start = time.perf_counter()
-    found = work()
-    return time.perf_counter() - start, found

@@ -5,9 +5,13 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from pcii.plain import visible
+
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """Okabe and Ito's colours, which the colour-blind tell apart."""
 MARKERS = "osD^vPX"
+LONGEST_NAME = 40
+"""Characters of a method's name in the legend, about a third of the plot's width."""
 
 
 def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
@@ -36,7 +40,9 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         }
         iou = [row["object"]["iou"]["mean"] for row in rows]
         bars = _bars([row["object"]["iou"] for row in rows])
-        light.errorbar([row["photons_per_view"] for row in rows], iou, yerr=bars, label=method, **style)
+        light.errorbar(
+            [row["photons_per_view"] for row in rows], iou, yerr=bars, label=_legend(method), **style
+        )
         seconds = [row["seconds"]["mean"] for row in rows]
         time.errorbar(seconds, iou, yerr=bars, **style)
     for axes, name in ((light, "photons per view"), (time, "seconds a dataset")):
@@ -55,6 +61,13 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
     return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"
+
+
+def _legend(method: str) -> str:
+    """A method's name so that Matplotlib shows it as it is, cut to what leaves room for the plots."""
+    told = visible(method)
+    told = told if len(told) <= LONGEST_NAME else f"{told[: LONGEST_NAME - 1]}…"
+    return told.lstrip("_").replace("$", r"\$")
 
 
 def _bars(means: Sequence[Mapping[str, Any]]) -> list[list[float]]:

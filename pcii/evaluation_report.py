@@ -6,6 +6,8 @@ from typing import Any
 
 from pcii.evaluation_plots import accuracy_plots
 from pcii.evaluation_tables import budget_name, markdown, overview, tables_of, told
+from pcii.pages import page
+from pcii.plain import in_markdown
 from pcii.safe_files import write_bytes_safely, write_json_safely
 
 
@@ -13,7 +15,7 @@ def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
     """Write evaluation.json, evaluation.md and evaluation.html of what `summarise` gives."""
     write_json_safely(out / "evaluation.json", evaluation)
     write_bytes_safely(out / "evaluation.md", _markdown(evaluation).encode())
-    write_bytes_safely(out / "evaluation.html", _page(evaluation).encode())
+    write_bytes_safely(out / "evaluation.html", _page(evaluation))
 
 
 def _methods(evaluation: Mapping[str, Any]) -> list[str]:
@@ -35,7 +37,7 @@ def _notes(evaluation: Mapping[str, Any]) -> list[str]:
 
 def _falls(group: Mapping[str, Any]) -> list[str]:
     return [
-        f"{fall['method']}: IoU is worse with {budget_name(fall['to'])} photons than with "
+        f"IoU of {fall['method']} is worse with {budget_name(fall['to'])} photons than with "
         f"{budget_name(fall['from'])}, by {told(fall['difference'])}."
         for fall in group["monotonic"]
     ]
@@ -47,25 +49,17 @@ def _markdown(evaluation: Mapping[str, Any]) -> str:
     if table.rows:
         parts += [f"## {table.title}", markdown(table)]
     for group in evaluation["groups"]:
-        parts.append(f"## {group['title']}")
+        parts.append(f"## {in_markdown(group['label'])}")
         parts += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
-        parts += _falls(group)
+        parts += map(in_markdown, _falls(group))
     return "\n\n".join(parts) + "\n"
 
 
-def _page(evaluation: Mapping[str, Any]) -> str:
-    from jinja2 import Environment, PackageLoader, select_autoescape
-
-    environment = Environment(
-        loader=PackageLoader("pcii"),
-        autoescape=select_autoescape(),
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+def _page(evaluation: Mapping[str, Any]) -> bytes:
     methods = _methods(evaluation)
     groups = [
         {
-            "title": group["title"],
+            "label": group["label"],
             "datasets": group["datasets"],
             "recipe": group["recipe"],
             "plot": accuracy_plots(group, methods) if methods else "",
@@ -74,9 +68,10 @@ def _page(evaluation: Mapping[str, Any]) -> str:
         }
         for group in evaluation["groups"]
     ]
-    return environment.get_template("evaluation.html.j2").render(
-        version=evaluation["version"],
-        notes=_notes(evaluation),
-        overview=overview(evaluation["groups"]),
-        groups=groups,
-    )
+    content = {
+        "version": evaluation["version"],
+        "notes": _notes(evaluation),
+        "overview": overview(evaluation["groups"]),
+        "groups": groups,
+    }
+    return page("evaluation.html.j2", content)

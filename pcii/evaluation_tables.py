@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pcii.plain import in_markdown
+
 COLUMNS = (
     ("IoU", "object", "iou"),
     ("IoU, pixels", "pixel", "iou"),
@@ -34,7 +36,7 @@ def tables_of(group: Mapping[str, Any]) -> list[Table]:
 
 
 def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
-    """Mean object IoU of every scene and method by photon budget."""
+    """Mean object IoU of every group and method by photon budget; no two groups have one label."""
     budgets: dict[str, None] = {}
     cells: dict[tuple[str, str], dict[str, str]] = {}
     for group in groups:
@@ -42,7 +44,7 @@ def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
             if "object" in row:
                 name = budget_name(row["budget"])
                 budgets[name] = None
-                cells.setdefault((group["title"], row["method"]), {})[name] = told(row["object"].get("iou"))
+                cells.setdefault((group["label"], row["method"]), {})[name] = told(row["object"].get("iou"))
     order = sorted(budgets, key=lambda name: (name == "own", float(name) if name != "own" else 0.0))
     rows = [(*names, *(own.get(budget, "–") for budget in order)) for names, own in cells.items()]
     return Table("IoU by photon budget", ("scene", "method", *order), tuple(rows), words=2)
@@ -51,7 +53,7 @@ def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
 def markdown(table: Table) -> str:
     """The table in Markdown, without its title."""
     rule = [":--" if column < table.words else "--:" for column in range(len(table.header))]
-    rows = [[cell.replace("|", "\\|") for cell in row] for row in (table.header, *table.rows)]
+    rows = [[in_markdown(cell) for cell in row] for row in (table.header, *table.rows)]
     return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 

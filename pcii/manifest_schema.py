@@ -14,8 +14,6 @@ from pcii.bayer import check_cfa
 from pcii.errors import InputError
 from pcii.types import CameraGrid
 
-LONGEST_NAME = 1000
-"""Characters of an object's name, a title or a path."""
 MOST_FILE_BYTES = 1 << 50
 MOST_PHOTONS = 1 << 62
 """More cannot be added up in 64 bits."""
@@ -28,16 +26,23 @@ def _relative(path: str) -> str:
     return path
 
 
+def _text(value: Any) -> str:
+    # pydantic's own str refuses names of files whose bytes are no characters.
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {type(value).__name__}")
+    return value
+
+
 class _Part(BaseModel):
     model_config = ConfigDict(strict=True, extra="allow", frozen=True, allow_inf_nan=False)
 
 
 Real = Annotated[float, Field(strict=False)]
-Text = Annotated[str, Field(max_length=LONGEST_NAME)]
+Text = Annotated[Any, AfterValidator(_text)]
 Seconds = Annotated[Real, Field(ge=0)]
 Photons = Annotated[Real, Field(ge=0, le=MOST_PHOTONS)]
 Depth = Annotated[Real, Field(gt=0)]
-FileName = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_relative)]
+FileName = Annotated[str, AfterValidator(_relative)]
 ObjectKey = Annotated[str, Field(pattern=re.compile(r"\A-?[0-9]{1,9}\Z"))]
 
 
@@ -58,7 +63,7 @@ class Analysis(_Part):
 class RecipePhotons(_Part):
     """Photon budgets of the recipe."""
 
-    scope: Text | None = None
+    scope: str | None = None
     budget: Photons | None = None
     nested: list[Photons] | None = None
 
@@ -72,7 +77,7 @@ class RecipeRender(_Part):
 class Recipe(_Part):
     """What is read of the recipe."""
 
-    scene: Text | None = None
+    scene: str | None = None
     seed: int | None = None
     photons: RecipePhotons = RecipePhotons()
     render: RecipeRender | None = None
@@ -81,14 +86,14 @@ class Recipe(_Part):
 class Backend(_Part):
     """What rendered the data."""
 
-    variant: Text
-    mitsuba: Text
+    variant: str
+    mitsuba: str
 
 
 class PhotonLog(_Part):
     """How the photons were drawn."""
 
-    method: Text | None = None
+    method: str | None = None
     total: int | None = None
     paths: int | None = None
     dense_paths_instead: int | None = None
@@ -115,7 +120,7 @@ class DatasetManifest(_Part):
     """The manifest of a dataset."""
 
     title: Text | None = None
-    identity: Text | None = None
+    identity: str | None = None
     grid: Grid
     cfa: str | None
     radiance_channels: Literal[1, 3] | None = None
@@ -124,7 +129,7 @@ class DatasetManifest(_Part):
     recipe: Recipe = Recipe()
     backend: Backend | None = None
     photons: PhotonLog | None = None
-    timings_s: dict[Text, Seconds] = {}
+    timings_s: dict[str, Seconds] = {}
     files: dict[FileName, FileEntry]
 
 
@@ -132,7 +137,7 @@ class ResultsManifest(_Part):
     """The manifest of a folder of results."""
 
     dataset: Text
-    identity: Text | None
+    identity: str | None
     budget: Photons | None
     files: dict[FileName, FileEntry]
 
@@ -154,5 +159,5 @@ def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, re
 
 
 def _printable(text: str) -> str:
-    """Text of a stranger on one line, without what a terminal would obey."""
+    """str of a stranger on one line, without what a terminal would obey."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)

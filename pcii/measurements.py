@@ -49,7 +49,17 @@ def described(dataset: Dataset) -> Row:
         "title": manifest.get("title") or dataset.name,
         "scene": recipe.get("scene"),
         "seed": recipe.get("seed"),
+        "settings": dict(_settings({name: recipe[name] for name in recipe if name not in ("title", "seed")})),
     }
+
+
+def _settings(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value of nested tables by its dotted name, as `--set` takes it."""
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _settings(value, f"{place}{name}.")
+        else:
+            yield f"{place}{name}", value
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
@@ -99,7 +109,8 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
 
 def append_row(out: Path, row: Row) -> None:
     """Add a row and flush it to disk; what a killed process left of a line goes first."""
-    line = json.dumps(row, ensure_ascii=False, allow_nan=False).encode() + b"\n"
+    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
+    line = text.encode(errors="backslashreplace") + b"\n"
     with _locked(out) as file:
         if file.seek(0, os.SEEK_END):
             file.seek(-1, os.SEEK_END)

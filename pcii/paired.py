@@ -40,16 +40,40 @@ def mean_interval(values: Sequence[float], bounds: tuple[float, float] = (-np.in
     The values are taken as independent and about normal, which means of shares far from 0 and 1 are.
     One value has no interval. Raises `InputError` for none.
     """
+    mean, half = _mean_and_half(values)
+    if half is None:
+        return Mean(1, mean, None, None)
+    return Mean(len(values), mean, max(mean - half, bounds[0]), min(mean + half, bounds[1]))
+
+
+def positive_mean_interval(values: Sequence[float]) -> Mean:
+    """Mean of values that are never negative, such as times and errors, and its 95 % interval.
+
+    It is Student's interval of the logarithm of the mean, whose standard error is about s / (mean sqrt(n)):
+    from mean / r to mean r, r = exp(t s / (mean sqrt(n))). So it never reaches 0, is that of
+    `mean_interval` where the values lie close together, and is longer above than below where few large ones
+    make the mean. Values that are all 0 have an interval without width. Raises `InputError` for none, or
+    one below 0.
+    """
+    if any(value < 0 for value in values):
+        raise InputError("values: expected numbers of at least 0")
+    mean, half = _mean_and_half(values)
+    if half is None:
+        return Mean(1, mean, None, None)
+    ratio = float(np.exp(half / mean)) if half > 0 else 1.0
+    return Mean(len(values), mean, mean / ratio, mean * ratio)
+
+
+def _mean_and_half(values: Sequence[float]) -> tuple[float, float | None]:
+    """Mean and half the length of Student's interval, None for one value."""
     from scipy.stats import t
 
     x = np.asarray(values, dtype=np.float64)
     if x.ndim != 1 or x.size == 0 or not np.isfinite(x).all():
         raise InputError("values: expected a list of at least one finite number")
-    mean = float(x.mean())
     if x.size == 1:
-        return Mean(1, mean, None, None)
-    half = float(t.ppf((1 + CONFIDENCE) / 2, x.size - 1) * x.std(ddof=1) / np.sqrt(x.size))
-    return Mean(x.size, mean, max(mean - half, bounds[0]), min(mean + half, bounds[1]))
+        return float(x[0]), None
+    return float(x.mean()), float(t.ppf((1 + CONFIDENCE) / 2, x.size - 1) * x.std(ddof=1) / np.sqrt(x.size))
 
 
 def paired_difference(first: Sequence[float], second: Sequence[float], seed: int = 0) -> Difference:

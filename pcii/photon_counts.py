@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from pcii.bayer import channel_count, check_cfa, colour_cells
+from pcii.brief import Brief, times
 from pcii.errors import InputError
 from pcii.types import CameraGrid, read_only
 
@@ -15,8 +16,8 @@ LARGEST_COUNT = 1 << 40
 """Photons in a pixel; millions of such pixels still add up in 64 bits."""
 
 
-@dataclass(frozen=True)
-class PhotonEvents:
+@dataclass(frozen=True, repr=False)
+class PhotonEvents(Brief):
     """Pixels that caught photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,)."""
 
     k: np.ndarray
@@ -25,9 +26,12 @@ class PhotonEvents:
     j: np.ndarray
     n: np.ndarray
 
+    def _facts(self) -> dict[str, object]:
+        return {"events": self.n.size, "photons": int(self.n.sum())}
 
-@dataclass(frozen=True, eq=False)
-class PhotonCounts:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotonCounts(Brief):
     """Photon counts of every elemental image, as sparse events or as a dense stack.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.
@@ -86,6 +90,10 @@ class PhotonCounts:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         _check_total("n", photons)
         return cls(grid, cfa, _events=_canonical_events(tuple(where.values()), photons, grid))
+
+    def _facts(self) -> dict[str, object]:
+        kept = "events" if self.is_sparse else "dense"
+        return {"shape": times(self.grid.shape_KLHW), "cfa": self.cfa, "photons": self.total, "kept": kept}
 
     @property
     def is_sparse(self) -> bool:

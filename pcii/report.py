@@ -12,6 +12,7 @@ import numpy as np
 from pcii import __version__, picture
 from pcii.demosaic import demosaic
 from pcii.foreground import box_around
+from pcii.pages import page
 from pcii.pipeline import Outcome, depth_range_of
 from pcii.safe_files import write_bytes_safely
 from pcii.score import object_masks, pixel_masks
@@ -23,21 +24,7 @@ PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
 
 def write_report(path: Path, outcome: Outcome) -> None:
     """Write the report of one run as a self-contained HTML file."""
-    from jinja2 import Environment, PackageLoader, select_autoescape
-
-    environment = Environment(
-        loader=PackageLoader("pcii"),
-        autoescape=select_autoescape(),
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["number"] = _number
-    page = environment.get_template("report.html.j2").render(**_content(outcome))
-    write_bytes_safely(path, page.encode())
-
-
-def _number(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
+    write_bytes_safely(path, page("report.html.j2", _content(outcome)))
 
 
 def _content(outcome: Outcome) -> dict[str, Any]:
@@ -46,8 +33,6 @@ def _content(outcome: Outcome) -> dict[str, Any]:
     manifest = dataset.manifest
     return {
         "title": manifest.get("title") or dataset.name,
-        "version": __version__,
-        "dataset": dataset.name,
         "grid": dataset.grid,
         "cfa": dataset.cfa,
         "photons_total": dataset.counts.total,
@@ -65,11 +50,44 @@ def _content(outcome: Outcome) -> dict[str, Any]:
         "table1": _table1(outcome.score.objects),
         "table1_holds": table1_holds(outcome.score.objects, outcome.score.planes),
         "paper_table1": PAPER_TABLE_1 if outcome.sections.z_mm.tolist() == [540.0, 620.0] else (),
-        "timings": outcome.timings_s,
-        "made": manifest,
-        "made_s": sum(manifest.get("timings_s", {}).values()),
+        "made": _made(manifest, dataset.name, outcome.timings_s),
         "has_truth": dataset.truth is not None,
     }
+
+
+def _made(manifest: Mapping[str, Any], name: str, timings_s: Mapping[str, float]) -> list[tuple[str, str]]:
+    """What is known of how the dataset and this report were made."""
+    recipe, backend, photons = (manifest.get(key) or {} for key in ("recipe", "backend", "photons"))
+    identity = manifest.get("identity")
+    rows = [("dataset", f"{name}, identity {identity[:16]}" if identity else name)]
+    if backend:
+        samples = recipe["render"]["samples_per_pixel"]
+        engine = f"Mitsuba {backend['mitsuba']}, {backend['variant']}"
+        rows.append(("renderer", f"{engine}; {samples} samples per pixel, seed {recipe['seed']}"))
+    if photons.get("method") == "thinning":
+        told = (
+            f"drawn one by one: {photons['paths']:,} light paths for {photons['total']:,} photons, where "
+            f"rendering every pixel would have taken {photons['dense_paths_instead']:,}"
+        )
+        rows.append(("photons", told))
+    elif photons.get("method") == "dense":
+        told = (
+            f"drawn from rendered views of {photons['samples_per_pixel']} samples per pixel, whose noise "
+            f"adds about {100 * photons['rendering_noise']:.2g} % to the variance of the counts"
+        )
+        rows.append(("photons", told))
+    if manifest.get("timings_s"):
+        rows.append(("made in", _stages(manifest["timings_s"], 1)))
+    return [
+        *rows,
+        ("analysed in", _stages(timings_s, 2)),
+        ("software", f"photon-integral-imaging {__version__}"),
+    ]
+
+
+def _stages(seconds: Mapping[str, float], digits: int) -> str:
+    each = ", ".join(f"{name} {value:.{digits}f}" for name, value in seconds.items())
+    return f"{sum(seconds.values()):.1f} s ({each})"
 
 
 def _table1(objects: tuple[Mapping[str, Any], ...]) -> list[dict[str, Any]]:

@@ -32,7 +32,9 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
 
 def json_bytes(value: Any) -> bytes:
     """`value` as indented JSON; infinities and NaN are refused, since JSON has none."""
-    return (json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False) + "\n").encode()
+    text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    # Names of files may hold bytes that are no characters; in JSON those are told by their escapes.
+    return (text + "\n").encode(errors="backslashreplace")
 
 
 def write_json_safely(path: Path, value: Any) -> None:

@@ -12,12 +12,12 @@ from pcii.types import Segmented, check_z_mm
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
-    `method` is one of `methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood", a simple
-    one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an installed
-    package; or anything that makes a `Segmented` of counts and depths, such as `ThreeStep(entropy=False)`.
-    None is told how many objects there are, their colours or their depths. Without photons nothing is in
-    focus. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a package's
-    method that returns something else than it should.
+    `method` is one of `pcii.removal_methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood",
+    a simple one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an
+    installed package; or anything that makes a `Segmented` of counts and depths, such as
+    `ThreeStep(entropy=False)`. None is told how many objects there are, their colours or their depths.
+    Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown
+    method, a single view, or a package's method that returns something else than it should.
 
     >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
     >>> focus.in_focus.shape                                  # doctest: +SKIP
@@ -30,7 +30,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     return find_method(method)(counts, z)
 
 
-def methods() -> tuple[str, ...]:
+def removal_methods() -> tuple[str, ...]:
     """Names that `segment` knows: the built-in ones, then those of installed packages.
 
     Raises `InputError` for a package whose method has a name that it may not have.

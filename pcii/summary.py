@@ -1,5 +1,6 @@
 """Rows of an evaluation, summed up: means over seeds, and what is better than what."""
 
+import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, pairwise
@@ -7,9 +8,12 @@ from typing import Any
 
 from pcii import __version__
 from pcii.measurements import DEPTH, Row
-from pcii.paired import Mean, mean_interval, paired_difference
+from pcii.paired import Mean, mean_interval, paired_difference, positive_mean_interval
 
-INTERVALS = "95 % interval of the mean by Student's t over seeds, shares clipped to [0, 1]; null for one seed"
+INTERVALS = (
+    "95 % interval of the mean by Student's t over seeds, for shares clipped to [0, 1], for seconds and "
+    "other figures that are never negative by way of the mean's logarithm; null for one seed"
+)
 TABLE_1_METHOD = "three-step"
 TRUTHS = ("object", "pixel")
 SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
@@ -20,11 +24,12 @@ SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fa
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     """What evaluation.json holds: `groups`, one for each recipe, of datasets that differ in their seed alone.
 
-    A group's `results` have a row for each budget and method: means over seeds with their intervals, by kind
-    of truth as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`.
-    `paired` compares methods by the mean object IoU of the same datasets, `monotonic` lists where that
-    falls from one budget to the next larger one by more than its interval explains, and `table1` says in
-    how many seeds each object's entropy is lowest at its own plane.
+    A group's `label` is its title, and where groups share one also what tells their recipes apart. Its
+    `results` have a row for each budget and method: means over seeds with their intervals, by kind of truth
+    as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`. `paired`
+    compares methods by the mean object IoU of the same datasets, `monotonic` lists where that falls from one
+    budget to the next larger one by more than its interval explains, and `table1` says in how many seeds
+    each object's entropy is lowest at its own plane.
     """
     groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
     for row in rows:
@@ -32,8 +37,26 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     return {
         "version": __version__,
         "interval": INTERVALS,
-        "groups": [_group(recipe, groups[title, recipe]) for title, recipe in sorted(groups)],
+        "groups": [
+            {"label": _label(rows[0], [other[0] for other in groups.values()]), **_group(recipe, rows)}
+            for (_, recipe), rows in sorted(groups.items())
+        ],
     }
+
+
+def _label(row: Row, others: Sequence[Row]) -> str:
+    """The title of a row's group, with settings that tell it from those `others` that share the title."""
+    alike = [other for other in others if other["title"] == row["title"]]
+    rivals = [other.get("settings", {}) for other in alike if other["recipe"] != row["recipe"]]
+    told: list[str] = []
+    for name, value in row.get("settings", {}).items():
+        left = [settings for settings in rivals if name in settings and settings[name] == value]
+        if len(left) < len(rivals):
+            told.append(f"{name}={value if isinstance(value, str) else json.dumps(value)}")
+        rivals = left
+    if rivals:  # scenes of one name that were changed, or datasets without a recipe
+        told.append(f"recipe {row['recipe'][:8]}")
+    return f"{row['title']} ({', '.join(told)})" if told else row["title"]
 
 
 def own_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
@@ -79,7 +102,7 @@ def _result(budget: float | None, method: str, rows: Sequence[Row]) -> dict[str,
         "method": method,
         "seeds": len(rows),
         "photons_per_view": sum(row["photons_per_view"] for row in rows) / len(rows),
-        "seconds": _told(mean_interval([row["seconds"] for row in rows])),
+        "seconds": _told(positive_mean_interval([row["seconds"] for row in rows])),
     }
     if method == DEPTH:
         return result | {"depth": _means([row["depth"] for row in rows])}
@@ -119,11 +142,14 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     means: dict[str, Any] = {}
     for name in dict.fromkeys(name for row in rows for name in row):
         known = [value for row in rows if (value := row.get(name)) is not None]
-        if known and isinstance(known[0], Mapping):
+        if not known:
+            means[name] = None
+            continue
+        if isinstance(known[0], Mapping):
             means[name] = _means(known)
             continue
-        bounds = (0.0, 1.0) if name in SHARES else (float("-inf"), float("inf"))
-        means[name] = _told(mean_interval(known, bounds)) if known else None
+        mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
+        means[name] = _told(mean)
     return means
 
 

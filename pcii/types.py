@@ -13,6 +13,7 @@ from typing import Any, Literal, Protocol, TypeGuard
 import numpy as np
 
 from pcii.bayer import check_cfa
+from pcii.brief import Brief, listed, span, table, times
 from pcii.errors import InputError
 
 Normalisation = Literal["overlap", "views"]
@@ -113,8 +114,8 @@ class ArrayLike5D(Protocol):
     def __getitem__(self, index: Any, /) -> Any: ...
 
 
-@dataclass(frozen=True, eq=False)
-class Views:
+@dataclass(frozen=True, eq=False, repr=False)
+class Views(Brief):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel
@@ -138,6 +139,9 @@ class Views:
                 raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
             object.__setattr__(self, "radiance", read_only(self.radiance))
 
+    def _facts(self) -> dict[str, object]:
+        return {"shape": times(self.radiance.shape), "cfa": self.cfa}
+
     @property
     def channel_count(self) -> int:
         """Colours that sections of these views will have."""
@@ -151,8 +155,8 @@ class Views:
         return image
 
 
-@dataclass(frozen=True, eq=False)
-class Sections:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sections(Brief):
     """Sections of the scene at depths `z_mm`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
@@ -186,6 +190,16 @@ class Sections:
                 raise InputError("variance: must have the shape of counts")
             object.__setattr__(self, "variance", read_only(self.variance))
 
+    def _facts(self) -> dict[str, object]:
+        counted = self.counts.dtype.kind in "iu"
+        return {
+            "z_mm": listed(self.z_mm.tolist()),
+            "shape": times(self.counts.shape),
+            "photons": int(self.counts.sum(dtype=np.int64)) if counted else None,
+            "subpixel": self.subpixel,
+            "cfa": self.cfa,
+        }
+
     @cached_property
     def estimate(self) -> np.ndarray:
         """Mean per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
@@ -202,8 +216,8 @@ class Sections:
         return read_only(mean)
 
 
-@dataclass(frozen=True, eq=False)
-class Segmented:
+@dataclass(frozen=True, eq=False, repr=False)
+class Segmented(Brief):
     """Which points of each section are in focus: `in_focus` (Z, H, W) bool.
 
     `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at. A method that decides
@@ -234,14 +248,23 @@ class Segmented:
         object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
 
+    def _facts(self) -> dict[str, object]:
+        shares = [f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))]
+        return {
+            "method": self.method,
+            "z_mm": listed(self.z_mm.tolist()),
+            "shape": times(self.in_focus.shape),
+            "in_focus": listed(shares),
+        }
+
     @property
     def cleaned(self) -> np.ndarray:
         """Section estimates with what is defocused set to zero, (Z, H, W, C)."""
         return self.sections.estimate * self.in_focus[..., None]
 
 
-@dataclass(frozen=True, eq=False)
-class DepthMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthMap(Brief):
     """Depth per pixel of the virtual centre: `z_mm` (H, W), NaN where the method abstains.
 
     `confidence` (H, W) is in [0, 1]: 0 where it abstains.
@@ -256,9 +279,14 @@ class DepthMap:
         object.__setattr__(self, "z_mm", read_only(self.z_mm))
         object.__setattr__(self, "confidence", read_only(self.confidence))
 
+    def _facts(self) -> dict[str, object]:
+        answered = self.z_mm[np.isfinite(self.z_mm)]
+        share = f"{answered.size / max(1, self.z_mm.size):.2%}"
+        return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
 
-@dataclass(frozen=True)
-class PhotonTruth:
+
+@dataclass(frozen=True, repr=False)
+class PhotonTruth(Brief):
     """Where each detected photon came from: five arrays and a depth, (N,).
 
     Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of what its path hit first.
@@ -271,9 +299,12 @@ class PhotonTruth:
     object_id: np.ndarray
     z_mm: np.ndarray
 
+    def _facts(self) -> dict[str, object]:
+        return {"photons": self.z_mm.size, "objects": np.unique(self.object_id).size}
 
-@dataclass(frozen=True, eq=False)
-class Truth:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(Brief):
     """What the virtual centre camera really sees, from first hits at pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
@@ -308,6 +339,12 @@ class Truth:
         object.__setattr__(self, "z_mm", read_only(self.z_mm))
         object.__setattr__(self, "object_id", read_only(self.object_id))
 
+    def _facts(self) -> dict[str, object]:
+        hit = self.z_mm[np.isfinite(self.z_mm)]
+        photons = None if self.photons is None else self.photons.z_mm.size
+        objects = listed(list(self.names.values()))
+        return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
     def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
         """An optional map, made read-only; lengths of 1 may be rounded by 1e-6."""
         values = getattr(self, name)
@@ -320,8 +357,8 @@ class Truth:
         object.__setattr__(self, name, read_only(values))
 
 
-@dataclass(frozen=True)
-class Score:
+@dataclass(frozen=True, repr=False)
+class Score(Brief):
     """What `score.json` holds: rows per plane, entropies per object, errors of the depth map, bounds."""
 
     planes: tuple[Mapping[str, Any], ...]
@@ -329,6 +366,20 @@ class Score:
     depth: Mapping[str, Any]
     dataset: str | None = None
     bounds: Mapping[str, Any] = field(default_factory=dict)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "dataset": self.dataset,
+            "methods": listed(list(dict.fromkeys(row["method"] for row in self.planes))),
+            "planes": len(self.planes),
+            "objects": len(self.objects),
+            "depth median_mm": self.depth.get("median_mm"),
+        }
+
+    def _repr_html_(self) -> str:
+        names = ("z_mm", "method", "truth", "object", "iou", "precision", "recall", "boundary_f")
+        rows = [[row.get(name) for name in names] for row in self.planes]
+        return table(repr(self), rows, names)
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""

@@ -231,13 +231,17 @@ class Recipe(Strict):
 def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path]:
     """A recipe by path or shipped name, with `key=value` overrides; and its folder.
 
-    A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string.
+    A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string. With another scene the
+    recipe's title, which is of its own scene, is dropped unless another is given too.
     Raises `InputError` for a recipe that is missing or wrong.
     """
     path = _find_recipe(name_or_path)
     values = read_toml(path)
+    scene = values.get("scene")
     for text in overrides:
         _override(values, text)
+    if values.get("scene") != scene and not any(text.startswith("title=") for text in overrides):
+        values.pop("title", None)
     source = str(path) if not overrides else f"{path} with --set {' '.join(overrides)}"
     return validate(Recipe, values, source), path.parent
 

@@ -27,7 +27,8 @@ SHARED = {
 }
 # Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
 PCII_LEVELS = [
-    {"errors"},
+    {"errors", "plain", "timing"},
+    {"brief", "pages"},
     {"bayer", "cells", "safe_files", "console", "kernels", "paired", "evaluation_tables", "evaluation_plots"},
     {"sealed"},
     {"zarr_groups", "results_list"},
@@ -40,6 +41,7 @@ PCII_LEVELS = [
         "outline_kernels",
     },
     {"photon_counts", "store", "manifest_schema", "focus_kernels", "layer_kernels"},
+    {"stored_radiance"},
     {"geometry", "dataset", "verify", "demosaic", "picture"},
     {"dense", "boundary"},
     {"reconstruct", "planes", "foreground", "pieces"},
@@ -146,6 +148,12 @@ def test_arrows_run_one_way(package: str, levels: list[set[str]]) -> None:
             assert rank[other] < rank[name], f"{package}.{name} imports {package}.{other}"
 
 
+def test_pages_are_made_in_one_file() -> None:
+    for package in ("pcii", "simgen"):
+        for name, tree in modules(package).items():
+            assert name == "pages" or not roots(all_imports(tree)) & {"jinja2", "markupsafe"}, name
+
+
 def test_importing_pcii_is_light() -> None:
     script = (
         "import sys, time; start = time.perf_counter(); import pcii;"
@@ -165,7 +173,7 @@ def test_pcii_offers_the_names_that_users_rely_on() -> None:
     import pcii
 
     nouns = "CameraGrid Views PhotonCounts Sections Segmented DepthMap Truth Score Dataset InputError"
-    verbs = "reconstruct reconstruct_each demosaic segment estimate_depth score open_dataset"
+    verbs = "reconstruct reconstruct_each demosaic segment estimate_depth score open_dataset removal_methods"
     for name in (nouns + " " + verbs).split():
         assert callable(getattr(pcii, name)), name
         assert name in pcii.__all__

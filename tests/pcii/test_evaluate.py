@@ -3,16 +3,19 @@
 import json
 import re
 import shutil
+import time
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
+import numba as nb
 import numpy as np
 import pytest
 from tiny_datasets import NESTED, OWN, as_told, two_rows, write_dataset
 
 from pcii import cli, console
+from pcii.dataset import open_dataset
 from pcii.errors import InputError
 from pcii.evaluate import evaluate, find_datasets
 from pcii.evaluation_tables import markdown, overview, told
@@ -130,6 +133,57 @@ def test_scenes_stay_apart(series: Path, tmp_path: Path, calls: list[str]) -> No
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
     groups = evaluate([series, other], tmp_path / "out", methods=FAKES)["groups"]
     assert [(group["title"], group["datasets"]) for group in groups] == [("another", 1), ("by hand", 3)]
+
+
+def change_recipe(dataset: Path, **settings: Any) -> None:
+    manifest = read_manifest(dataset)
+    manifest["recipe"] |= settings
+    manifest["identity"] += str(settings)
+    write_manifest(dataset, manifest)
+
+
+def test_groups_of_one_title_are_told_by_what_differs(tmp_path: Path, calls: list[str]) -> None:
+    data = [write_dataset(tmp_path / f"data {number}", 1, {OWN: 2 + number}) for number in range(4)]
+    change_recipe(data[1], scene="another", grid={"rows": 4}, exposure=None)
+    change_recipe(data[2], scene="another", grid={"rows": 6}, exposure={"time_s": 1.0})
+    change_recipe(data[3], title="of its own")  # which `title` of the manifest does not tell
+    other = write_dataset(tmp_path / "other", 1, {OWN: 9}, title="other")
+    evaluation = evaluate([*data, other], tmp_path / "out", methods=["as told"])
+    table = overview(evaluation["groups"])
+    cells = {row[0]: row[2] for row in table.rows}
+    assert len(table.rows) == len(cells) == 5
+    assert cells["by hand (scene=another, grid.rows=6)"] == "0.700"
+    assert cells["by hand (scene=another, grid.rows=4)"] == "0.650"
+    assert cells["other"] == "0.950"
+    # These two have the same settings, and are told by their recipes' hashes.
+    left = {row["label"]: row["recipe"][:8] for row in evaluation["groups"] if row["scene"] == "by hand"}
+    assert list(left) == [f"by hand (scene=by hand, recipe {recipe})" for recipe in left.values()]
+    page = (tmp_path / "out" / "evaluation.html").read_text()
+    assert "<h2>by hand (scene=another, grid.rows=6)</h2>" in page
+    assert "## by hand (scene=another, grid.rows=6)\n" in (tmp_path / "out" / "evaluation.md").read_text()
+
+
+def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop = nb.njit(lambda n: n + 1)
+    seconds: list[float] = []
+
+    def late(counts: Any, z_mm: Any) -> Any:
+        start = time.perf_counter()
+        if counts.total != first_total:  # of the first dataset: the others take another path
+            loop(counts.total)
+        found = as_told(counts, z_mm)
+        seconds.append(time.perf_counter() - start)
+        return found
+
+    monkeypatch.setitem(METHODS, "late", late)
+    first_total = open_dataset(series / "seed_3").counts.total
+    evaluation = evaluate([series], tmp_path / "out", methods=["late"], budgets=[OWN])
+    assert len(seconds) == 5  # three, the warm-up and the one that compiled
+    assert max(row["seconds"] for row in rows_of(tmp_path / "out")) < max(seconds) / 2
+    interval = result_of(evaluation, OWN, "late")["seconds"]["interval"]
+    assert interval[0] > 0
 
 
 def entropies(seed: int, ball: tuple[float, float], bird: tuple[float, float]) -> dict[str, Any]:
@@ -314,10 +368,10 @@ def test_the_command_and_its_page(
     page = (out / "evaluation.html").read_text()
     assert page.count("data:image/png;base64,") == 1
     assert "<script" not in page
-    assert "http" not in page
+    assert "://" not in page
     assert str(tmp_path) not in page
     assert "0.850 (0.726 to 0.974)" in page
-    assert "as told: IoU is worse with 50 photons than with 20" in page
+    assert "IoU of as told is worse with 50 photons than with 20" in page
     assert len(rows_of(out)) == 12
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
     assert console.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0

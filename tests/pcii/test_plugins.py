@@ -8,7 +8,7 @@ from twins import unit_grid
 
 from pcii.errors import InputError
 from pcii.photon_counts import PhotonCounts
-from pcii.segment import METHODS, methods, segment
+from pcii.segment import METHODS, removal_methods, segment
 
 CODE = """
 from dataclasses import replace
@@ -59,16 +59,16 @@ def counts() -> PhotonCounts:
 
 
 def test_a_method_of_another_package_is_found_by_name(tmp_path, monkeypatch):
-    assert methods() == tuple(METHODS)
+    assert removal_methods() == tuple(METHODS)
     install(tmp_path, monkeypatch, good="strange_code:good")
-    assert methods() == (*METHODS, "good")
+    assert removal_methods() == (*METHODS, "good")
     focus = segment(counts(), [1.0, 2.0], method="good")
     np.testing.assert_array_equal(focus.in_focus, focus.sections.counts[..., 0] > 0)
 
 
 def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, broken="no_such_module:remove")
-    assert "broken" in methods()
+    assert "broken" in removal_methods()
     segment(counts(), 1.0, method="brightness")
     with pytest.raises(
         InputError, match=r"^method: 'broken' of the package strange cannot be loaded: .*no_such"
@@ -87,14 +87,14 @@ def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
     with pytest.raises(
         InputError, match=r"strange_code:good of the package strange takes the name .*'likelihood'"
     ):
-        methods()
+        removal_methods()
     assert segment(counts(), 1.0, method="likelihood").method == "likelihood"
 
 
 def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, **{"../good": "strange_code:good"})
     with pytest.raises(InputError, match=r"is named '\.\./good'; use letters"):
-        methods()
+        removal_methods()
 
 
 @pytest.mark.parametrize(

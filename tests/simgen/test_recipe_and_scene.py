@@ -75,6 +75,15 @@ def test_a_sensor_has_no_faults_and_a_recipe_no_exposure_unless_told() -> None:
     assert (recipe.photons.nested, recipe.photons.statistics) == ((), "poisson")
 
 
+def test_another_scene_does_not_keep_the_title_of_the_recipes_own() -> None:
+    own, _ = load_recipe("small")
+    assert own.title == "Ball and bird, small"
+    assert load_recipe("small", ["scene=same_colour"])[0].title == ""  # so the scene's own title is told
+    assert load_recipe("small", ["scene=two_objects", "seed=3"])[0].title == own.title
+    assert load_recipe("small", ["title=Balls", "scene=same_colour"])[0].title == "Balls"
+    assert load_recipe("small", ["scene=same_colour", f"title={own.title}"])[0].title == own.title
+
+
 def test_overrides_reach_the_sensor_the_exposure_and_nested_budgets() -> None:
     told = ["photons.nested=[100, 300]", "sensor.counter_bits=1", "exposure.time_s=0.5"]
     recipe, _ = load_recipe("paper", [*told, "sensor.full_light.adc_bits=10"])
