@@ -127,7 +127,7 @@ def report(evaluation: Mapping[str, Any], entry_of: Mapping[str, Entry]) -> Iter
     for shown in (overview(groups), by_half_and_kind(groups, entry_of)):
         yield f"\n{shown.title}\n\n{markdown(shown)}"
     for group in groups:
-        yield f"\n{group['title']}"
+        yield f"\n{group['label']}"
         for shown in tables_of(group):
             yield f"\n{shown.title}\n\n{markdown(shown)}"
 

@@ -73,7 +73,7 @@ def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict
         for (budget, method), mean in ious.items()
     ]
     told = {"datasets": 2, "results": results, "paired": [], "monotonic": [], "table1": []}
-    return {"recipe": recipe, "title": title, "scene": title, **told}
+    return {"recipe": recipe, "title": title, "label": title, "scene": title, **told}
 
 
 GROUPS = [
