@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from pcii.bayer import check_cfa
 from pcii.errors import InputError
+from pcii.plain import visible
 from pcii.types import CameraGrid
 
 MOST_FILE_BYTES = 1 << 50
@@ -153,11 +154,6 @@ def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, re
         first = fault.errors(include_url=False)[0]
         where = ".".join(str(step) for step in first["loc"] if step != "[key]")
         sentence = f"{where}: {first['msg'].removeprefix('Value error, ')}"
-        raise InputError(f"{path}: {_printable(sentence)}; {remedy}") from None
+        raise InputError(f"{path}: {visible(sentence)}; {remedy}") from None
     except InputError as fault:
-        raise InputError(f"{path}: {_printable(str(fault))}; {remedy}") from None
-
-
-def _printable(text: str) -> str:
-    """str of a stranger on one line, without what a terminal would obey."""
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+        raise InputError(f"{path}: {visible(str(fault))}; {remedy}") from None
