@@ -30,6 +30,9 @@ PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 `make bench` on two cores; only their ratios matter."""
 SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST = 77.0, 0.3
 """The same without a compiled backend."""
+PROBE_SEED = 0
+"""The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
+nothing else are made alike: all with the origins of photons or all without."""
 MOST_SINGLE_PHOTONS = 1 << 25
 """So many photons are kept one by one at most; each takes some 200 bytes."""
 
@@ -53,11 +56,11 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
 
     Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
     each needs, which are more the more light there is. Where it cannot take enough, photons are thinned
-    as long as there is memory for them.
+    as long as there is memory for them. The recipe's seed has no part in it (see `PROBE_SEED`).
     """
     grid = recipe.grid.camera_grid()
     pixels = grid.height * grid.width
-    seen = probe(built, grid, recipe.cfa, recipe.seed)
+    seen = probe(built, grid, recipe.cfa, PROBE_SEED)
     per_view, gain = _photons(recipe, seen)
     scope_pixels = _scope_pixels(recipe)
     samples = seen.samples_for(gain, scope_pixels)

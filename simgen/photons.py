@@ -219,7 +219,8 @@ class _Drawing:
                 part = self.attempt << 16 | round_number
                 yield self._round(wanting, candidates, self._pool(), number, part)
                 round_number += 1
-                self.report("photons", int(self.scopes.got.sum()), int(self.scopes.wanted.sum()))
+                got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
+                self.report(self._stage("photons"), got, wanted)
 
     def _exposed(self) -> Iterator[dict[str, np.ndarray]]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
@@ -231,7 +232,12 @@ class _Drawing:
             rng = seeds.generator(self.seed, view=part, stage="totals", part=self.attempt)
             candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
             yield self._round(views, candidates, pool, part, self.attempt << 16)
-            self.report("parts of the exposure", part + 1, parts)
+            self.report(self._stage("parts of the exposure"), part + 1, parts)
+
+    def _stage(self, what: str) -> str:
+        """What progress is told of: each attempt is a stage of its own, which says why it begins again."""
+        again = f", drawn again with a higher bound (attempt {self.attempt + 1})"
+        return what + again * (self.attempt > 0)
 
     def _round(
         self, scopes: np.ndarray, candidates: np.ndarray, pool: Pool, number: int, part: int

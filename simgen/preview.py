@@ -67,5 +67,5 @@ def write_preview(
         frame_part(axes[0], box)
     draw_depth(figure, axes[1], hits.z_mm[box], things[box])
     draw_objects(axes[2], hits.object_id[box], built.names)
-    figure.suptitle(recipe.title or target.scene.title)
+    figure.suptitle(recipe.title or target.scene.title, parse_math=False)
     save_figure(figure, out, dots_per_inch)

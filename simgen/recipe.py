@@ -18,6 +18,7 @@ from simgen.schema import (
     Real,
     Share,
     Strict,
+    Title,
     Whole,
     completed_by,
     read_toml,
@@ -170,7 +171,7 @@ class Analysis(Strict):
 class Recipe(Strict):
     """A dataset: which scene, seen by which cameras, in how much light, and what is kept."""
 
-    title: str = ""
+    title: Title = ""
     """What reports and pictures call it; the scene's title unless given."""
     scene: Annotated[str, Field(min_length=1)]
     """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""

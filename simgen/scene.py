@@ -23,6 +23,7 @@ from simgen.schema import (
     Position,
     Real,
     Strict,
+    Title,
     Vector,
     read_toml,
     shorten,
@@ -53,7 +54,7 @@ class SceneObject(Strict):
     @field_validator("name")
     @classmethod
     def _is_a_name(cls, name: str) -> str:
-        if not re.match(NAME, name):
+        if not re.fullmatch(NAME, name):
             shown = shorten(repr(name), LONGEST_PART)
             raise ValueError(
                 f"a name is a letter, then letters, digits, _ and -, such as 'left-wheel', not {shown}"
@@ -75,7 +76,7 @@ class Backdrop(Strict):
 class Scene(Strict):
     """A world to be looked at: objects, lights, and what stands behind."""
 
-    title: Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", max_length=200)]
+    title: Title
     """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """What it is for."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, Tag, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationError
 
 from pcii.errors import InputError
 
@@ -49,6 +49,16 @@ LARGEST_MM = 1e6
 Length = Annotated[Real, Field(gt=0, le=LARGEST_MM)]
 Coordinate = Annotated[Real, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 Position = tuple[Coordinate, Coordinate, Coordinate]
+LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
+
+
+def _one_line(title: str) -> str:
+    if not re.fullmatch(LINE, title):
+        raise ValueError(f"a title is one line without control characters, not {_repr(title)}")
+    return title
+
+
+Title = Annotated[str, Field(max_length=200, json_schema_extra={"pattern": LINE}), AfterValidator(_one_line)]
 Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
 
 

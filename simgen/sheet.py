@@ -51,7 +51,7 @@ def write_sheet(path: Path, out: Path) -> None:
     _draw_radiance(axes["full light"], dataset, view_box)
     _draw_histogram(axes["histogram"], counts)
     title = str(dataset.manifest.get("title") or dataset.name)
-    figure.suptitle("\n".join((title, *facts(dataset, counts))), fontsize=12)
+    figure.suptitle("\n".join((title, *facts(dataset, counts))), fontsize=12, parse_math=False)
     save_figure(figure, out)
 
 

@@ -20,7 +20,7 @@ from pcii.verify import verify
 from simgen import backend
 from simgen import counts as module
 from simgen.build import Built, build
-from simgen.counts import Plan, draw_from_views, plan, thin, write_counts
+from simgen.counts import PROBE_SEED, Plan, draw_from_views, plan, thin, write_counts
 from simgen.detector import Arrivals, members
 from simgen.noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.recipe import MOST_PATHS, Recipe
@@ -314,6 +314,16 @@ def test_little_light_is_thinned_and_much_is_rendered(two_objects: Built) -> Non
 
 
 @pytest.mark.renders
+@pytest.mark.parametrize(
+    "scope", [{"photons": {"budget": 3e4}}, {"photons": {"scope": "exposure"}, "exposure": {}}]
+)
+def test_all_seeds_of_a_recipe_are_made_alike(two_objects: Built, scope: dict[str, Any]) -> None:
+    # Not only near break-even: the samples of dense views are the same too.
+    plans = [plan(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in range(1, 5)]
+    assert plans == plans[:1] * 4
+
+
+@pytest.mark.renders
 def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objects: Built) -> None:
     # Some hundred photons per pixel, whose rates are not known to 1 % of their own noise.
     bright = recipe(grid=PROBED, photons={"budget": 3e5})
@@ -326,7 +336,7 @@ def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objec
 @pytest.mark.parametrize(("scope", "pixels"), [("view", 4096), ("channel", 1024), ("scene", 6 * 4096)])
 def test_a_budget_is_divided_by_light_that_is_known_well(two_objects: Built, scope: str, pixels: int) -> None:
     dim = recipe(grid=PROBED, photons={"budget": 0.1, "scope": scope})
-    seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", dim.seed)
+    seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", PROBE_SEED)
     made = plan(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
     assert made.normaliser_error == pytest.approx(error)

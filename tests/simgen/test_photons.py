@@ -346,3 +346,26 @@ def test_a_black_scene_gives_no_photons() -> None:
     drawn = draw(scene, 1, budget=100)
     assert drawn.k.size == 0
     assert drawn.log["kept"] == 0
+
+
+@pytest.mark.parametrize("light", [{"budget": 300}, {"scope": "exposure"}])
+def test_each_attempt_is_a_stage_that_says_why_it_begins_again(
+    scene: Built, light: dict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("simgen.photons.OVERSHOOT_SHARE", -1.0)  # never enough
+    monkeypatch.setattr("simgen.photons.ATTEMPTS", 3)
+    told: list[tuple[str, int, int]] = []
+    setup, gain = Setup(scene, GRID, "GRBG", DEPTH), 0.01 if "scope" in light else None
+    draw_photons(
+        setup,
+        Photons.model_validate(light),
+        seed=1,
+        photons_per_radiance=gain,
+        report=lambda *stage: told.append(stage),
+    )
+    what = "photons" if gain is None else "parts of the exposure"
+    again = [f"{what}, drawn again with a higher bound (attempt {number})" for number in (2, 3)]
+    assert list(dict.fromkeys(stage for stage, _, _ in told)) == [what, *again]
+    for name in (what, *again):
+        done = [count for stage, count, _ in told if stage == name]
+        assert done == sorted(done)  # a bar never runs backwards

@@ -41,7 +41,9 @@ def grid(**changes: Any) -> CameraGrid:
 @pytest.mark.renders
 def test_a_preview_of_a_recipe(tmp_path: Path) -> None:
     out = tmp_path / "recipe.jpg"
-    assert console.run(cli.app, ["preview", "small", "-o", str(out), "--samples-per-pixel", "2"]) == 0
+    title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
+    command = ["preview", "small", "-o", str(out), "--samples-per-pixel", "2"]
+    assert console.run(cli.app, [*command, *title]) == 0
     assert_shows_something(out)
 
 
@@ -54,7 +56,7 @@ def test_a_sheet_of_a_dataset(small_dataset: Path, tmp_path: Path) -> None:
 
 @pytest.mark.renders
 def test_a_sheet_of_a_dataset_without_products(tmp_path: Path) -> None:
-    recipe = TINY_RECIPE | {"products": {"counts": False, "truth": False}}
+    recipe = TINY_RECIPE | {"products": {"counts": False, "truth": False}, "title": r"5 $ and \6 $"}
     generate(Recipe.model_validate(recipe), Path(), tmp_path / "bare")
     out = tmp_path / "bare.png"
     assert console.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(out)]) == 0

@@ -181,6 +181,10 @@ def test_what_lies_just_within_the_limits_is_accepted(values: dict, limit: str) 
         (scene_with(material={}), "'objects[0].material': give either 'reflectance' or 'texture'"),
         (scene_with(material={"reflectance": [1, 2, 0]}), "'objects[0].material.reflectance[1]'"),
         (scene_with(name="../x"), "'objects[0].name'"),
+        (scene_with(name="ball\n"), "'objects[0].name'"),
+        (scene_with(name="ba\x1bll"), "'objects[0].name'"),
+        (scene_with() | {"title": "two\nlines"}, "'title': a title is one line"),
+        (scene_with() | {"title": "t\n"}, "'title': a title is one line"),
         ({"title": "t", "lights": []}, "'lights'"),
         (scene_with() | {"objects": scene_with()["objects"] * 2}, "two objects are named 'a'"),
     ],
@@ -197,6 +201,14 @@ def test_a_missing_recipe_or_scene_gets_a_suggestion() -> None:
         load_recipe("papre")
     with pytest.raises(InputError, match="did you mean 'two_objects'"):
         load_scene("two_object")
+
+
+def test_a_title_is_one_line_and_else_holds_what_it_likes() -> None:
+    given = "Kugel & Vögel, 5 $ < 6 $ \\frac 球"
+    assert Recipe(scene="two_objects", title=given).title == given
+    for control in "\n", "\r", "\x1b", "\x7f", "\u2028":
+        with pytest.raises(InputError, match="'title': a title is one line without control characters"):
+            validate(Recipe, {"scene": "two_objects", "title": f"Ball{control}"}, "r.toml")
 
 
 def test_bad_overrides_are_refused() -> None:
