@@ -291,4 +291,4 @@ def verify(folder: Path) -> None:
 
 def main() -> int:
     """Entry point of the `pcii` command."""
-    return console.run(app)
+    return console.run(app, resuming=("evaluate",))

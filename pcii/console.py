@@ -5,11 +5,12 @@ no longer read. Set PCII_TRACEBACK=1 to see tracebacks.
 """
 
 import os
+import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
-from types import TracebackType
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from types import FrameType, TracebackType
 from typing import TYPE_CHECKING
 
 from pcii.errors import InputError
@@ -19,38 +20,85 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 LOG_EVERY_S = 10.0
+STOP_AGAIN_S = 1.0
+"""Time enough to tidy up, after which a stop that nobody heeded is repeated."""
 
 
-def run(app: "App", arguments: Sequence[str] | None = None) -> int:
+def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collection[str] = ()) -> int:
     """Run a command line and return its exit code; the only place where errors become messages.
 
-    A command that returns a number leaves with that exit code.
+    A command that returns a number leaves with that exit code. `resuming` names the commands that go on where
+    they were stopped when they are given again.
     """
     from cyclopts import CycloptsError
 
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    try:
-        code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
-    except CycloptsError as fault:
-        return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
-    except InputError as fault:
-        return _fail(2, str(fault))
-    except KeyboardInterrupt:
-        return _fail(130, "interrupted; what is finished is kept, run the same command to go on")
-    except BrokenPipeError:  # whoever read the output has read enough, such as `| head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
-    except MemoryError as fault:
-        return _fail(1, f"not enough memory: {fault}")
-    except Exception as fault:
-        return _fail(1, f"{type(fault).__name__}: {' '.join(str(fault).split())}")
+    app.suppress_keyboard_interrupt = False  # else it would end the process without a word
+    with _stops() as stops:
+        try:
+            code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        except (Exception, KeyboardInterrupt) as fault:
+            if stops:  # what was stopped may take its time to end, and is not to be stopped in that
+                signal.setitimer(signal.ITIMER_REAL, 0)
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+            if stops or isinstance(fault, KeyboardInterrupt):
+                on = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
+                return _leave(130, f"stopped{on}")
+            if isinstance(fault, CycloptsError):
+                return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
+            return _failed(fault)
     return code if isinstance(code, int) else 0
 
 
+@contextmanager
+def _stops() -> Iterator[list[int]]:
+    """Signals of Ctrl-C as they come, of which a KeyboardInterrupt need not be left.
+
+    Raised during an import or in a foreign library it can become another error, and in a callback or a
+    finaliser it is dropped. So it is raised again until the block ends.
+    """
+    stops: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        stops.append(number)
+        sys.unraisablehook = lambda _: None  # what is half made need not tell how it ends
+        signal.setitimer(signal.ITIMER_REAL, STOP_AGAIN_S)
+        signal.default_int_handler(number, frame)
+
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # another sees to it, or none shall
+        yield stops
+        return
+    signal.signal(signal.SIGINT, stop)
+    alarm = signal.signal(signal.SIGALRM, stop)
+    try:
+        yield stops
+    finally:
+        if stops:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGALRM, alarm)
+
+
+def _failed(fault: Exception) -> int:
+    """Tell what went wrong, and the exit code."""
+    if isinstance(fault, InputError):
+        return _fail(2, str(fault))
+    if isinstance(fault, BrokenPipeError):  # whoever read the output has read enough, such as `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    if isinstance(fault, MemoryError):
+        return _fail(1, f"not enough memory: {fault}")
+    return _fail(1, f"{type(fault).__name__}: {' '.join(str(fault).split())}")
+
+
 def _fail(code: int, sentence: str) -> int:
+    return _leave(code, f"error: {sentence}")
+
+
+def _leave(code: int, sentence: str) -> int:
     if os.environ.get("PCII_TRACEBACK"):
         raise
-    print(f"error: {sentence}", file=sys.stderr, flush=True)
+    print(sentence, file=sys.stderr, flush=True)
     return code
 
 

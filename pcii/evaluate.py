@@ -25,7 +25,7 @@ from pcii.measurements import (
 from pcii.pipeline import depth_range_of, planes_of
 from pcii.score import score
 from pcii.segment import removal_methods, segment
-from pcii.store import MANIFEST, TRUTH
+from pcii.store import MANIFEST, MARKER, TRUTH
 from pcii.summary import summarise
 from pcii.timing import timed
 
@@ -95,11 +95,12 @@ def evaluate(
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
     """Folders of datasets: those named, and those in the folders named; `InputError` where there is none.
 
-    A folder seed_<n> without a manifest counts too, so that whoever opens it learns that it is unfinished.
+    An unfinished one, or a folder seed_<n> without a manifest, counts too, so that who opens it learns what
+    it lacks.
     """
     found: list[Path] = []
     for path in map(Path, paths):
-        if (path / MANIFEST).is_file():
+        if _is_begun(path):
             found.append(path)
             continue
         if not path.is_dir():
@@ -107,7 +108,7 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
         inside = [
             folder
             for folder in path.iterdir()
-            if folder.is_dir() and ((folder / MANIFEST).is_file() or re.fullmatch(r"seed_\d+", folder.name))
+            if folder.is_dir() and (_is_begun(folder) or re.fullmatch(r"seed_\d+", folder.name))
         ]
         if not inside:
             raise InputError(f"{path}: neither a finished dataset nor a folder of such")
@@ -115,6 +116,10 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
     if not found:
         raise InputError("datasets: name at least one dataset folder")
     return found
+
+
+def _is_begun(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
 
 
 def part_of(text: str) -> tuple[int, int]:

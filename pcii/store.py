@@ -27,6 +27,8 @@ from pcii.zarr_groups import Label
 FORMAT = "photon-integral-imaging dataset"
 FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
+MARKER = ".unfinished.json"
+"""In a dataset's folder while it is made."""
 COUNTS = "counts.zarr"
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
@@ -112,6 +114,8 @@ def read_manifest(root: Path) -> dict[str, Any]:
     path = root / MANIFEST
     if not root.is_dir():
         raise InputError(f"{root}: there is no such dataset folder")
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
     if not path.is_file():
         raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
     manifest = read_sealed(path, REMEDY)

@@ -237,4 +237,4 @@ def verify(dataset: Path) -> None:
 
 def main() -> int:
     """Entry point of the `simgen` command."""
-    return console.run(app)
+    return console.run(app, resuming=("generate",))

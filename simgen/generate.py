@@ -22,6 +22,7 @@ from pcii.store import (
     COUNTS,
     FORMAT_VERSION,
     MANIFEST,
+    MARKER,
     PHOTON_TRUTH,
     RADIANCE,
     REMEDY,
@@ -49,7 +50,6 @@ from simgen.truth_file import traced_for_visibility, write_truth
 
 RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
 SPECTRAL_UNIT = "cd/m^2 of light of 555 nm that gives as many photons to a pixel that detects them all"
-MARKER = ".unfinished.json"
 RENDERED = ".rendered"
 """Exact views that are no product in themselves; gone when the dataset is finished."""
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from pcii.errors import InputError
-from pcii.store import MANIFEST
-from simgen.generate import MARKER, generate
+from pcii.store import MANIFEST, MARKER
+from simgen.generate import generate
 from simgen.recipe import SEED_LIMIT, Recipe
 
 MOST_SEEDS = 1000
