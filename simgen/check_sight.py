@@ -4,6 +4,8 @@ from simgen.cameras import NEAR_CLIP_MM
 from simgen.facts import Facts, Finding, ObjectFacts, listed
 
 MOST_HIDDEN = 0.5
+MOST_MAGNIFIED = 10.0
+"""What stands nearer than the focal length divided by this is so many times as large on the film."""
 LEAST_GLASS_DEPTH = 6
 """Segments of a path through the two sides of a ball to something lit, and on to a lamp by way of another."""
 
@@ -23,6 +25,9 @@ def sight_findings(facts: Facts) -> list[Finding]:
 
 def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
     name, found = thing.name, []
+    if _surely_metres(facts, thing):
+        text = f"{name} stands at z = {thing.stands_at_mm:g} mm, right before the cameras"
+        return [Finding("bad", "objects", text, _in_millimetres(thing.stands_at_mm))]
     if thing.encloses_camera:
         return [Finding("bad", "objects", f"a camera stands inside {name}", f"move {name} away from Z = 0")]
     if not thing.z_mm.size and not thing.corners_seen:
@@ -31,7 +36,9 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
         text = (
             f"{thing.corners_seen} of {facts.corners} corner cameras see {name}, the virtual centre does not"
         )
-        found.append(Finding("warn", "objects", text, "truth and scores are the centre's: move it into view"))
+        before = f", where it is hidden behind {listed(list(thing.hidden_by))}" if thing.hidden_by else ""
+        remedy = f"truth and scores are the centre's{before}: move it into view"
+        found.append(Finding("warn", "objects", text, remedy))
     elif thing.corners_seen < facts.corners:
         text = f"{facts.corners - thing.corners_seen} of {facts.corners} corner cameras do not see {name}"
         found.append(Finding("warn", "objects", text, "move it to the middle or take a smaller pitch"))
@@ -62,14 +69,47 @@ def _cut(facts: Facts, thing: ObjectFacts) -> list[Finding]:
 
 def _why_unseen(facts: Facts, thing: ObjectFacts) -> str:
     near, far = thing.body_z_mm
-    if far <= 0:
-        return f"it is behind the cameras (z up to {far:.0f} mm): Z runs forward"
+    if far <= NEAR_CLIP_MM:
+        flat = near >= -NEAR_CLIP_MM
+        place = "in the plane of the cameras" if flat else f"behind the cameras (z up to {far:.0f} mm)"
+        return f"it is {place}: Z runs forward, give it a z of some hundred millimetres"
+    if near <= 0:
+        return f"it reaches behind the cameras, to z = {near:g} mm: move it away"
     if facts.backdrop_mm is not None and near >= facts.backdrop_mm:
         return f"it is behind the backdrop at {facts.backdrop_mm:g} mm"
-    if thing.hidden_share > 0:
-        return "other objects hide it"
-    rows, cols = facts.probe_px
-    return f"it is off the film, or smaller than the probe's {rows} x {cols} pixels show"
+    if thing.hidden_by:
+        return f"it is hidden behind {listed(list(thing.hidden_by))}: move one of them aside"
+    if thing.on_film is None or not thing.on_film.in_view:
+        across, down = (
+            side * facts.grid.pixel_mm / facts.grid.focal_mm * near / 2
+            for side in (facts.grid.width, facts.grid.height)
+        )
+        return (
+            f"it is outside the field of view, which at {near:.0f} mm reaches {across:.0f} mm to either side "
+            f"and {down:.0f} mm up and down"
+        )
+    return _too_small(facts, max(thing.on_film.size_px))
+
+
+def _too_small(facts: Facts, size_px: float) -> str:
+    if size_px < 1:
+        return f"it is smaller than a pixel ({size_px:.2g} px): make it larger, or pixels smaller"
+    coarse_px = max(facts.grid.height, facts.grid.width) / max(facts.probe_px)
+    if size_px < 2 * coarse_px:
+        return f"it is {size_px:.1f} px large, and this coarse look has pixels of {coarse_px:.1f} px"
+    return "it is thinner than a pixel: turn it towards the cameras, or make it thicker"
+
+
+def _surely_metres(facts: Facts, thing: ObjectFacts) -> bool:
+    """Whether an object is so near that its depth must be in metres: no camera magnifies so much."""
+    near_mm = facts.grid.focal_mm / MOST_MAGNIFIED
+    hardly_seen = not thing.z_mm.size or thing.encloses_camera or thing.body_z_mm[1] < near_mm
+    return 0 < thing.stands_at_mm < near_mm and hardly_seen
+
+
+def _in_millimetres(z_mm: float) -> str:
+    """What to say of a depth that must be in metres."""
+    return f"did you mean {1000 * z_mm:g} mm? lengths are in millimetres"
 
 
 def _glass_findings(facts: Facts) -> list[Finding]:
@@ -82,8 +122,11 @@ def _glass_findings(facts: Facts) -> list[Finding]:
 
 def _wall_findings(facts: Facts) -> list[Finding]:
     wall = facts.backdrop_mm
-    if wall is None or wall > NEAR_CLIP_MM:
+    if wall is None or wall >= facts.grid.focal_mm / MOST_MAGNIFIED:
         return []
+    if wall > NEAR_CLIP_MM:
+        text = f"it stands at z = {wall:g} mm, right before the cameras"
+        return [Finding("bad", "backdrop", text, _in_millimetres(wall))]
     text = f"the backdrop stands at {wall:g} mm, in the plane of the cameras"
     return [Finding("bad", "backdrop", text, "give it a z_mm behind the objects")]
 

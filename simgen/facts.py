@@ -1,5 +1,6 @@
 """What a coarse look at a scene tells, and what follows from it: the nouns of `simgen check`."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ from simgen.counts import Plan
 from simgen.lights import Level
 from simgen.recipe import Recipe
 from simgen.shifts import apart_px
+from simgen.unseen import OnFilm
 
 Verdict = Literal["ok", "note", "warn", "bad"]
 Elsewhere = Literal["backdrop", "a lamp in view", "nothing"]
@@ -57,6 +59,12 @@ class ObjectFacts:
     """Whether the virtual centre's film cuts it too."""
     body_z_mm: tuple[float, float] = (0.0, 0.0)
     """Nearest and farthest depth of its bounding box, of what is hidden too."""
+    stands_at_mm: float = math.inf
+    """The scene's depth of its origin."""
+    hidden_by: tuple[str, ...] = ()
+    """What hides it from the virtual centre, if that sees nothing of it."""
+    on_film: OnFilm | None = None
+    """Where its bounding box falls."""
     encloses_camera: bool = False
     """Whether a camera stands in its bounding box and sees nothing else."""
 
@@ -117,7 +125,7 @@ class Facts:
         planes: list[float] = []
         for middle_mm in sorted(thing.middle_mm for thing in self.seen):
             if not planes or apart_px(self.grid, planes[-1], middle_mm) > PLANES_APART_PX:
-                planes.append(float(round(middle_mm)))
+                planes.append(float(round(middle_mm)) or middle_mm)
         return self.recipe.analysis.z_mm or tuple(planes)
 
 

@@ -12,26 +12,25 @@ import numpy as np
 from pcii.bayer import channel_count, colour_cells
 from pcii.types import CameraGrid
 from simgen import backend, seeds
-from simgen.build import Built, build
+from simgen.build import Built
 from simgen.cameras import as_rig
 from simgen.counts import plan
 from simgen.facts import Elsewhere, Facts, ObjectFacts
-from simgen.lights import AreaLight, UniformLight
-from simgen.materials import Glass, Material
+from simgen.lights import AreaLight
+from simgen.materials import Glass
 from simgen.prepared import Prepared
 from simgen.recipe import Recipe
 from simgen.render import render_view
 from simgen.scene import Scene
 from simgen.sensor import sense
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
+from simgen.unseen import SAME_DEPTH, hidden_by, on_film, seen_alone
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
 ALONE_PX, SCALAR_ALONE_PX = 256, 128
 """The same where objects are looked at alone, which takes a pass for each."""
 SAMPLES = 4
-SAME_DEPTH = 1e-3
-"""So near to the backdrop's depth, as a share of it, a hit is taken to be on it."""
 
 
 def probe_scene(target: Prepared) -> Facts:
@@ -50,13 +49,25 @@ def probe_scene(target: Prepared) -> Facts:
     hit_s = (time.perf_counter() - begun) / (len(corners) * centre.z_mm.size)
     boxes = _boxes(built)
     alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
-    hidden = _hidden_shares(built, target, alone, boxes)
+    together = first_hits_at_centre(built, alone)
+    hidden = _hidden_shares(built, target, alone, boxes, together)
     light = image.sum(axis=(0, 1))
+    objects = [
+        _object_facts(number, name, centre, corners, image, boxes.get(number), hidden, small)
+        for number, name in built.names.items()
+    ]
     return Facts(
         recipe=recipe,
         objects=tuple(
-            _object_facts(number, name, centre, corners, image, boxes.get(number), hidden, small)
-            for number, name in built.names.items()
+            replace(
+                thing,
+                stands_at_mm=scene.objects[number - 1].position_mm[2],
+                on_film=None if number not in boxes else on_film(boxes[number], grid),
+                hidden_by=()
+                if thing.z_mm.size
+                else hidden_by(built, scene, target.folder, number, alone, together),
+            )
+            for number, thing in enumerate(objects, start=1)
         ),
         luminance=float(image.mean() if built.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
@@ -174,23 +185,19 @@ def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
 
 
 def _hidden_shares(
-    built: Built, target: Prepared, grid: CameraGrid, boxes: dict[int, np.ndarray]
+    built: Built, target: Prepared, grid: CameraGrid, boxes: dict[int, np.ndarray], together: FirstHits
 ) -> dict[int, float]:
     """Share of each object, seen alone from the virtual centre, that other objects stand before.
 
     Only objects whose boxes appear to overlap another's are looked at alone.
     """
-    lamps = [light for light in target.scene.lights if isinstance(light, AreaLight)]
-    together, shares = first_hits_at_centre(built, grid).object_id, dict[int, float]()
-    for number, thing in enumerate(target.scene.objects, start=1):
+    owner, shares = together.object_id, dict[int, float]()
+    for number in built.names:
         others = [box for other, box in boxes.items() if other != number]
         if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
             continue
-        # Only its shape and lamps in view matter, so that no more files than its mesh are needed.
-        plain = thing.model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5))})
-        single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
-        alone = first_hits_at_centre(build(built.mi, single, target.folder, 2), grid).object_id == 1
-        before = alone & (together > 0) & (together != number)
+        alone = seen_alone(built, target.scene, target.folder, number, grid)
+        before = alone & (owner > 0) & (owner != number)
         shares[number] = float(before.sum() / alone.sum()) if alone.any() else 0.0
     return shares
 

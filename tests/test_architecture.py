@@ -80,7 +80,7 @@ SIMGEN_LEVELS = [
     {"pools"},
     {"pilot"},
     {"photons", "noise"},
-    {"counts", "truth_file"},
+    {"counts", "truth_file", "unseen"},
     {"facts"},
     {"generate", "probe_scene", "check_sight", "check_depth", "check_photons", "check_cost"},
     {"check", "preview", "sheet", "series"},

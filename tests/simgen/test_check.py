@@ -238,9 +238,6 @@ def test_why_nothing_is_seen_of_an_object() -> None:
     assert "behind the cameras" in sight_findings(facts(behind))[0].remedy
     beyond = replace(thing("a", corners_seen=0), body_z_mm=(900.0, 910.0))
     assert "behind the backdrop at 800 mm" in sight_findings(facts(beyond, backdrop_mm=800.0))[0].remedy
-    covered = thing("a", corners_seen=0, hidden_share=1.0)
-    assert "other objects hide it" in sight_findings(facts(covered))[0].remedy
-    assert "off the film" in sight_findings(facts(thing("a", corners_seen=0)))[0].remedy
 
 
 def test_darkness_and_lamps_that_face_away() -> None:
