@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from simgen.check_cost import cost_findings
+from simgen.check_cost import cost_findings, hopeless
 from simgen.check_depth import depth_findings
 from simgen.check_photons import photon_findings
 from simgen.check_sight import sight_findings
@@ -18,7 +18,7 @@ def check(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[str, list[F
     views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
     line = f"{recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    return line, findings(probe_scene(target))
+    return line, hopeless(recipe) or findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:

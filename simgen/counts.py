@@ -20,7 +20,7 @@ from simgen.cameras import rig_of
 from simgen.candidates import Setup
 from simgen.detector import Arrivals, detect, members, stop_counting
 from simgen.exposure import photons_per_radiance
-from simgen.noise import NOISE_SHARE, Probe, probe
+from simgen.noise import NOISE_SHARE, Probe, depths_seen, probe
 from simgen.photons import draw_photons, places
 from simgen.recipe import MOST_PATHS, MOST_PHOTONS, Recipe
 from simgen.sensor import draw_counts, fixed_totals, photon_rates, scope_energies
@@ -49,6 +49,8 @@ class Plan:
     """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
     normaliser_error: float
     """Standard error of the light that a dense view's budget is divided by, as a share of it."""
+    depths_mm: tuple[float, ...] = ()
+    """Some of the depths that the corner cameras see, if photons are thinned."""
 
 
 def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
@@ -78,13 +80,15 @@ def plan(recipe: Recipe, built: Built, kind: str) -> Plan:
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
+    # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
+    thins = few and seen.mean > 0 and (cheaper or noise > NOISE_SHARE)
     return Plan(
-        # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
-        thins=few and seen.mean > 0 and (cheaper or noise > NOISE_SHARE),
+        thins=thins,
         samples=samples,
         photons_per_view=per_view,
         noise=noise,
         normaliser_error=0.0 if scope_pixels is None else seen.light_error(samples * scope_pixels),
+        depths_mm=depths_seen(built, grid) if thins else (),
     )
 
 

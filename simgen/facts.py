@@ -94,8 +94,10 @@ class Facts:
     """Seconds that the probe took for a first hit."""
     compiled: bool = True
     """Whether a compiled backend renders."""
-    memory_bytes: int | None = None
-    """Memory of this machine, if it tells."""
+    memory_bytes: float = math.inf
+    """Memory of this machine that is available."""
+    disk_bytes: float = math.inf
+    """What is left on the disk of the working directory."""
     corners: int = 4
     """Corner cameras: fewer for a single row or column."""
     lamps_away: tuple[int, ...] = ()

@@ -44,6 +44,7 @@ from simgen.exposure import photons_per_radiance
 from simgen.prepared import Prepared, prepare
 from simgen.recipe import Recipe
 from simgen.render import render_view
+from simgen.resources import check_resources
 from simgen.scene import Scene, scene_files
 from simgen.sensor import sense
 from simgen.truth_file import traced_for_visibility, write_truth
@@ -80,22 +81,24 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     finished = _finished(out, identity)
     if finished is not None:
         return finished
+    check_resources(recipe, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)
-    clock = _Clock()
+    clock, made = _Clock(), None
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
         built = prepared.built()
+    if recipe.products.counts:  # likewise: too much light
+        with clock.stage("plan"):
+            made = plan(recipe, built, engine["kind"])
+            check_resources(recipe, made, out)
     with _claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return _whole(out, identity)
         sweep_temporaries(out)
-        products, photons, made = recipe.products, None, None
+        products, photons = recipe.products, None
         if products.truth or products.view_truth:
             with clock.stage("truth"):
                 write_truth(recipe, built, out, report)
-        if products.counts:
-            with clock.stage("plan"):
-                made = plan(recipe, built, engine["kind"])
         if made is not None and made.thins:
             with clock.stage("photons"):
                 arrivals, photons = thin(recipe, built, made, report)

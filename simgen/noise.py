@@ -16,6 +16,7 @@ from simgen import seeds
 from simgen.build import Built
 from simgen.render import render_view
 from simgen.sensor import sense
+from simgen.truth import first_hits_of_view
 
 NOISE_SHARE = 0.01
 NORMALISER_ERROR = 0.003
@@ -23,6 +24,8 @@ MOST_SAMPLES = 64
 PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
+DEPTHS = 64
+"""Depths are told apart in so many equal steps of disparity."""
 
 
 @dataclass(frozen=True)
@@ -54,15 +57,7 @@ class Probe:
 
 def probe(built: Built, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
     """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
-    scale = max(grid.height, grid.width) / PROBE_PX
-    small = replace(
-        grid,
-        rows=1,
-        cols=1,
-        height=max(2, round(grid.height / scale)),
-        width=max(2, round(grid.width / scale)),
-        pixel_mm=grid.pixel_mm * scale,
-    )
+    small = replace(_coarse(grid), rows=1, cols=1)
     first, second = (
         sense(
             render_view(
@@ -80,3 +75,26 @@ def probe(built: Built, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
     # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
     variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
     return Probe(float((first + second).mean() / 2), float(variance))
+
+
+def depths_seen(built: Built, grid: CameraGrid) -> tuple[float, ...]:
+    """Up to `DEPTHS` depths in mm, of what a coarse look from the corner cameras finds; inf for nothing."""
+    small, ends = _coarse(grid), [(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
+    z_mm = np.concatenate([first_hits_of_view(built, small, k, l).z_mm.ravel() for k, l in ends])
+    nearest = float(z_mm.min())
+    if not nearest < math.inf:
+        return (math.inf,)
+    steps = np.unique(np.rint(DEPTHS * nearest / z_mm.astype(np.float64)))
+    return tuple((DEPTHS * nearest / steps[steps > 0]).tolist())
+
+
+def _coarse(grid: CameraGrid) -> CameraGrid:
+    """The same cameras with the same field of view on few pixels."""
+    scale = max(grid.height, grid.width) / PROBE_PX
+    return replace(
+        grid,
+        height=max(2, round(grid.height / scale)),
+        width=max(2, round(grid.width / scale)),
+        pixel_mm=grid.pixel_mm * scale,
+        shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
+    )

@@ -1,10 +1,11 @@
 """The coarse probe of `simgen check`: what few, large pixels of the centre and of the corner cameras see."""
 
 import itertools
-import os
+import shutil
 import time
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from simgen.materials import Glass
 from simgen.prepared import Prepared
 from simgen.recipe import Recipe
 from simgen.render import render_view
+from simgen.resources import available_bytes
 from simgen.scene import Scene
 from simgen.sensor import sense
 from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
@@ -78,7 +80,8 @@ def probe_scene(target: Prepared) -> Facts:
         path_s=path_s,
         hit_s=hit_s,
         compiled=compiled,
-        memory_bytes=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"),
+        memory_bytes=available_bytes(),
+        disk_bytes=shutil.disk_usage(Path()).free,
         corners=len(corners),
         lamps_away=_lamps_away(scene, list(boxes.values())),
         level=scene.level,

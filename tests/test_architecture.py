@@ -81,7 +81,7 @@ SIMGEN_LEVELS = [
     {"pilot"},
     {"photons", "noise"},
     {"counts", "truth_file", "unseen"},
-    {"facts"},
+    {"facts", "resources"},
     {"generate", "probe_scene", "check_sight", "check_depth", "check_photons", "check_cost"},
     {"check", "preview", "sheet", "series"},
     {"cli"},

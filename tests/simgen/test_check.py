@@ -16,7 +16,7 @@ from pcii.reconstruct import reconstruct
 from pcii.types import CameraGrid
 from simgen import cli
 from simgen.check import findings
-from simgen.check_cost import cost_findings, in_bytes, in_time, peak_bytes, product_bytes, seconds
+from simgen.check_cost import cost_findings, in_time, seconds
 from simgen.check_depth import (
     alias_findings,
     depth_findings,
@@ -33,6 +33,7 @@ from simgen.facts import Facts, Finding, ObjectFacts
 from simgen.prepared import Prepared
 from simgen.probe_scene import coarser, probe_scene
 from simgen.recipe import Recipe
+from simgen.resources import in_bytes, peak_bytes, product_bytes
 from simgen.scene import Scene
 from simgen.shifts import (
     apart_px,
@@ -302,22 +303,30 @@ def test_sizes_memory_and_time_by_hand() -> None:
     recipe = {"products": {"radiance": "mosaic", "view_truth": True}, "render": {"samples_per_pixel": 2}}
     known = facts(recipe=recipe)
     pixels = 1024**2
-    sizes = product_bytes(known)
+    sizes = product_bytes(known.recipe, known.plan)
     assert sizes == {"counts": 16 * 1e5, "radiance": 400 * pixels, "truth": 6 * 101 * pixels}
-    assert peak_bytes(known) == 4e8 + 600 * pixels
+    assert peak_bytes(known.recipe, known.plan) == 4e8 + 165 * pixels  # truth is written view by view
     paths = 1e-7 * (101 * pixels + 200 * pixels)
     assert seconds(known) == pytest.approx(paths + 1e-7 * 1.5 / 0.065 * 1e5)
     plan = Plan(thins=False, samples=5, photons_per_view=1e9, noise=0.0, normaliser_error=0.0)
     dense = facts(recipe={"products": {"truth": False}}, plan=plan)
-    assert product_bytes(dense) == {"counts": 1600.0 * pixels}  # a count in every pixel at most
+    assert product_bytes(dense.recipe, dense.plan) == {
+        "counts": 1600.0 * pixels
+    }  # a count in every pixel at most
     assert seconds(dense) == pytest.approx(1e-7 * 500 * pixels)
     assert "5 samples per pixel" in cost_findings(dense)[-1].text
 
 
 def test_too_much_memory_is_warned_of() -> None:
-    recipe = {"products": {"view_truth": True}}
-    assert verdicts(cost_findings(facts(recipe=recipe, memory_bytes=10**9))) == ["ok", "warn", "ok"]
-    assert verdicts(cost_findings(facts(recipe=recipe, memory_bytes=10**10))) == ["ok", "ok", "ok"]
+    # A view's first hits take 165 B a pixel, 173 MB of 1024 x 1024, and the renderer 400 MB.
+    for room, verdict in ((170e6, "bad"), (180e6, "warn"), (700e6, "warn"), (740e6, "ok")):
+        assert verdicts(cost_findings(facts(memory_bytes=room))) == ["ok", verdict, "ok"]
+
+
+def test_too_little_disk_is_warned_of() -> None:
+    recipe = {"products": {"radiance": "rgb"}}  # 100 views of 12 MB, of which at least half is written
+    for room, verdict in ((620e6, "warn"), (640e6, "ok")):
+        assert cost_findings(facts(recipe=recipe, disk_bytes=room))[0].verdict == verdict
 
 
 def test_sizes_and_times_read_well() -> None:
