@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING
 
@@ -34,7 +34,7 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
 
     tokens = list(sys.argv[1:] if arguments is None else arguments)
     app.suppress_keyboard_interrupt = False  # else it would end the process without a word
-    with _stops() as stops:
+    with _stops() as stops, _shown_by(Stages()):
         try:
             code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         except (Exception, KeyboardInterrupt) as fault:
@@ -127,8 +127,10 @@ class Stages(AbstractContextManager["Stages"]):
         self._tasks: dict[str, TaskID] = {}
         self._started: dict[str, float] = {}
         self._logged: dict[str, float] = {}
+        self._shown = ExitStack()
 
     def __enter__(self) -> "Stages":
+        self._shown.enter_context(_shown_by(self))
         if sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import (
@@ -158,6 +160,7 @@ class Stages(AbstractContextManager["Stages"]):
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._shown.close()
         if self._rich is not None:
             self._rich.stop()
 
@@ -175,6 +178,43 @@ class Stages(AbstractContextManager["Stages"]):
             elapsed = now - start
             left = f", {elapsed / done * (total - done):.0f} s left" if 0 < done < total else ""
             print(f"{stage}: {done}/{total}, {elapsed:.1f} s{left}", file=sys.stderr, flush=True)
+
+    def compiling(self, loops: int, running: bool) -> None:
+        """Tell of loops compiled up to now, the last maybe still `running`; nobody knows how many follow."""
+        if self._rich is not None:
+            if COMPILING not in self._tasks:
+                self._tasks[COMPILING] = self._rich.add_task(COMPILING, total=None)
+            done, total = (loops - 1, None) if running else (loops, loops)
+            self._rich.update(self._tasks[COMPILING], completed=done, total=total)
+            return
+        now = time.monotonic()
+        if COMPILING not in self._logged:
+            print(COMPILING, file=sys.stderr, flush=True)
+        elif not running and now - self._logged[COMPILING] >= LOG_EVERY_S:
+            print(f"{COMPILING}: {loops} so far", file=sys.stderr, flush=True)
+        else:
+            return
+        self._logged[COMPILING] = now
+
+
+COMPILING = "compiling (once per machine)"
+_showing: list[Stages] = []
+"""Those who show progress now, the last of them to be told; nobody where `pcii` is used as a library."""
+
+
+@contextmanager
+def _shown_by(stages: Stages) -> Iterator[None]:
+    _showing.append(stages)
+    try:
+        yield
+    finally:
+        _showing.remove(stages)
+
+
+def tell_of_compiling(loops: int, *, running: bool) -> None:
+    """Tell whoever runs a command that a loop is being compiled, or has been; `loops` are those up to now."""
+    for stages in _showing[-1:]:
+        stages.compiling(loops, running)
 
 
 def silent(stage: str, done: int, total: int) -> None:

@@ -29,8 +29,8 @@ SHARED = {
 PCII_LEVELS = [
     {"errors", "plain", "timing"},
     {"brief", "pages"},
-    {"bayer", "cells", "safe_files", "console", "kernels", "paired", "evaluation_tables", "evaluation_plots"},
-    {"sealed"},
+    {"bayer", "cells", "safe_files", "console", "paired", "evaluation_tables", "evaluation_plots"},
+    {"sealed", "kernels"},
     {"zarr_groups", "results_list"},
     {
         "types",

@@ -1,27 +1,18 @@
 """The commands as a user types them: results, exit codes, one sentence for bad input."""
 
-import contextlib
 import itertools
 import json
-import os
-import pty
 import shutil
-import signal
-import subprocess
-import sys
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zarr
-from cyclopts import App
 from PIL import Image
 
 from pcii import cli as pcii_cli
 from pcii import console
-from pcii.store import MANIFEST, MARKER
+from pcii.store import MANIFEST
 from simgen import cli as simgen_cli
 
 pytestmark = pytest.mark.renders
@@ -315,116 +306,3 @@ def test_preview_writes_a_picture(tmp_path: Path) -> None:
     out = tmp_path / "look.png"
     assert console.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
     assert np.asarray(Image.open(out)).std() > 10
-
-
-UNFINISHED = "unfinished; the same `simgen generate` command goes on from here"
-
-
-@pytest.mark.parametrize("inside", [False, True])
-@pytest.mark.parametrize(
-    "verb", ["run", "depth", "segment", "reconstruct", "score", "evaluate", "verify", "sheet"]
-)
-def test_of_an_unfinished_dataset_the_way_on_is_told(
-    verb: str, inside: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    begun, out = tmp_path / "sets" / "begun", str(tmp_path / "out.png")
-    begun.mkdir(parents=True)
-    (begun / MARKER).write_text("{}")
-    app = simgen_cli.app if verb in ("verify", "sheet") else pcii_cli.app
-    named = begun.parent if inside and verb == "evaluate" else begun
-    more = {"verify": [], "score": [out]}.get(verb, ["-o", out])
-    assert refusal(app, [verb, str(named), *more], capsys) == f"error: {begun}: {UNFINISHED}"
-    assert not Path(out).exists()
-
-
-def generating(out: Path, samples: int) -> list[str]:
-    """A command line for a process that heeds Ctrl-C, whoever started this one."""
-    script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    script += "from simgen.cli import main; sys.exit(main())"
-    return [
-        *(sys.executable, "-c", script, "generate", "small", "-o", str(out)),
-        *("--set", f"render.samples_per_pixel={samples}", "--set", "grid.rows=2"),
-    ]
-
-
-def wait_for(path: Path) -> None:
-    for _ in range(600):
-        if path.exists():
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"{path} did not come to be")
-
-
-ON = "stopped; the same command goes on from here"
-
-
-@pytest.mark.parametrize("begun", [MARKER, "radiance/view_00_01.exr"])
-def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> None:
-    out = tmp_path / "small"
-    process = subprocess.Popen(generating(out, 4), stderr=subprocess.PIPE, text=True)
-    wait_for(out / begun)
-    process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert (process.returncode, said.splitlines()[-1]) == (130, ON)
-    assert "Traceback" not in said
-    assert (out / MARKER).exists()
-    assert subprocess.run(generating(out, 4), capture_output=True, check=False).returncode == 0
-    assert console.run(simgen_cli.app, ["verify", str(out)]) == 0
-
-
-def test_a_generate_stopped_at_a_terminal_says_so_below_its_bars(tmp_path: Path) -> None:
-    out, (controller, terminal) = tmp_path / "small", pty.openpty()
-    process = subprocess.Popen(
-        generating(out, 64), stdin=terminal, stdout=terminal, stderr=terminal, start_new_session=True
-    )
-    os.close(terminal)
-    wait_for(out / "radiance" / "view_00_00.exr")
-    process.send_signal(signal.SIGINT)
-    said = b""
-    with contextlib.suppress(OSError):  # the end of a terminal
-        while part := os.read(controller, 1 << 16):
-            said += part
-    os.close(controller)
-    assert process.wait(timeout=60) == 130
-    assert b"views" in said
-    assert said.decode().splitlines()[-1].endswith(ON)
-
-
-def as_of_an_import() -> None:
-    """Ctrl-C while an extension module is loaded."""
-    try:
-        os.kill(os.getpid(), signal.SIGINT)
-    except KeyboardInterrupt:
-        raise SystemError("returned a result with an exception set") from None
-
-
-def as_of_a_callback() -> None:
-    """Ctrl-C where an exception is dropped."""
-    with contextlib.suppress(KeyboardInterrupt):
-        os.kill(os.getpid(), signal.SIGINT)
-    time.sleep(20)
-
-
-@pytest.mark.parametrize("stop", [as_of_an_import, as_of_a_callback])
-@pytest.mark.parametrize(("resuming", "words"), [(("work",), ON), ((), "stopped")])
-def test_a_stop_is_told_whatever_becomes_of_it(
-    stop: Callable[[], None],
-    resuming: tuple[str, ...],
-    words: str,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)  # for it to be put back
-    monkeypatch.setattr(console, "STOP_AGAIN_S", 0.1)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    app = App()
-    app.command(stop, name="work")
-    try:
-        begun = time.monotonic()
-        assert console.run(app, ["work"], resuming=resuming) == 130
-        assert time.monotonic() - begun < 10
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-        assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
-    finally:
-        signal.signal(signal.SIGINT, before)
-    assert capsys.readouterr().err == f"{words}\n"

@@ -1,0 +1,215 @@
+"""What commands say at a terminal and in a log: stopped, given unfinished data, and while loops compile."""
+
+import contextlib
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from cyclopts import App
+
+from pcii import cli as pcii_cli
+from pcii import console
+from pcii.store import MARKER
+from simgen import cli as simgen_cli
+
+
+def at_a_terminal(command: list[str], **settings: str) -> tuple["subprocess.Popen[bytes]", int]:
+    """A process whose input and output are a terminal, and the other end of that."""
+    controller, terminal = pty.openpty()
+    process = subprocess.Popen(
+        command,
+        stdin=terminal,
+        stdout=terminal,
+        stderr=terminal,
+        start_new_session=True,
+        env=os.environ | settings,
+    )
+    os.close(terminal)
+    return process, controller
+
+
+def all_said(controller: int) -> str:
+    said = b""
+    with contextlib.suppress(OSError):  # the end of a terminal
+        while part := os.read(controller, 1 << 16):
+            said += part
+    os.close(controller)
+    return said.decode()
+
+
+def generating(out: Path, samples: int) -> list[str]:
+    """A command line for a process that heeds Ctrl-C, whoever started this one."""
+    script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    script += "from simgen.cli import main; sys.exit(main())"
+    return [
+        *(sys.executable, "-c", script, "generate", "small", "-o", str(out)),
+        *("--set", f"render.samples_per_pixel={samples}", "--set", "grid.rows=2"),
+    ]
+
+
+def wait_for(path: Path) -> None:
+    for _ in range(600):
+        if path.exists():
+            return
+        time.sleep(0.05)
+    raise AssertionError(f"{path} did not come to be")
+
+
+ON = "stopped; the same command goes on from here"
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("begun", [MARKER, "radiance/view_00_01.exr"])
+def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> None:
+    out = tmp_path / "small"
+    process = subprocess.Popen(generating(out, 4), stderr=subprocess.PIPE, text=True)
+    wait_for(out / begun)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert (process.returncode, said.splitlines()[-1]) == (130, ON)
+    assert "Traceback" not in said
+    assert (out / MARKER).exists()
+    assert subprocess.run(generating(out, 4), capture_output=True, check=False).returncode == 0
+    assert console.run(simgen_cli.app, ["verify", str(out)]) == 0
+
+
+@pytest.mark.renders
+def test_a_generate_stopped_at_a_terminal_says_so_below_its_bars(tmp_path: Path) -> None:
+    out = tmp_path / "small"
+    process, controller = at_a_terminal(generating(out, 64))
+    wait_for(out / "radiance" / "view_00_02.exr")  # told of the first two
+    process.send_signal(signal.SIGINT)
+    said = all_said(controller)
+    assert process.wait(timeout=60) == 130
+    assert "views" in said
+    assert said.splitlines()[-1].endswith(ON)
+
+
+def as_of_an_import() -> None:
+    """Ctrl-C while an extension module is loaded."""
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
+        raise SystemError("returned a result with an exception set") from None
+
+
+def as_of_a_callback() -> None:
+    """Ctrl-C where an exception is dropped."""
+    with contextlib.suppress(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(20)
+
+
+@pytest.mark.parametrize("stop", [as_of_an_import, as_of_a_callback])
+@pytest.mark.parametrize(("resuming", "words"), [(("work",), ON), ((), "stopped")])
+def test_a_stop_is_told_whatever_becomes_of_it(
+    stop: Callable[[], None],
+    resuming: tuple[str, ...],
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)  # for it to be put back
+    monkeypatch.setattr(console, "STOP_AGAIN_S", 0.1)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    app = App()
+    app.command(stop, name="work")
+    try:
+        begun = time.monotonic()
+        assert console.run(app, ["work"], resuming=resuming) == 130
+        assert time.monotonic() - begun < 10
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert capsys.readouterr().err == f"{words}\n"
+
+
+UNFINISHED = "unfinished; the same `simgen generate` command goes on from here"
+
+
+@pytest.mark.parametrize("inside", [False, True])
+@pytest.mark.parametrize(
+    "verb", ["run", "depth", "segment", "reconstruct", "score", "evaluate", "verify", "sheet"]
+)
+def test_of_an_unfinished_dataset_the_way_on_is_told(
+    verb: str, inside: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    begun, out = tmp_path / "sets" / "begun", str(tmp_path / "out.png")
+    begun.mkdir(parents=True)
+    (begun / MARKER).write_text("{}")
+    app = simgen_cli.app if verb in ("verify", "sheet") else pcii_cli.app
+    named = begun.parent if inside and verb == "evaluate" else begun
+    more = {"verify": [], "score": [out]}.get(verb, ["-o", out])
+    assert console.run(app, [verb, str(named), *more]) == 2
+    assert capsys.readouterr().err == f"error: {begun}: {UNFINISHED}\n"
+    assert not Path(out).exists()
+
+
+LOOPS = """
+from pcii.kernels import helper
+
+@helper
+def double(number):
+    return 2 * number
+"""
+WORKS = """
+import sys
+from cyclopts import App
+from pcii import console
+
+app = App()
+
+@app.command
+def work(*, bars: bool) -> None:
+    import loops
+    with console.Stages() if bars else __import__("contextlib").nullcontext():
+        print(loops.double(4))
+
+sys.exit(console.run(app) if len(sys.argv) > 1 else work(bars=False))
+"""
+
+
+@pytest.fixture
+def works(tmp_path: Path) -> list[str]:
+    """A program with a compiled loop of its own."""
+    for name, text in (("loops.py", LOOPS), ("works.py", WORKS)):
+        (tmp_path / name).write_text(text)
+    return [sys.executable, str(tmp_path / "works.py")]
+
+
+@pytest.mark.parametrize("bars", ["--bars", "--no-bars"])
+def test_compiling_is_told_once_per_machine(works: list[str], bars: str, tmp_path: Path) -> None:
+    said = []
+    for _ in range(2):
+        process = subprocess.run(
+            [*works, "work", bars],
+            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert process.stdout == "8\n"
+        said.append(process.stderr)
+    assert said == ["compiling (once per machine)\n", ""]
+
+
+def test_compiling_is_a_stage_at_a_terminal(works: list[str], tmp_path: Path) -> None:
+    process, controller = at_a_terminal([*works, "work", "--bars"], NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    said = all_said(controller)
+    assert process.wait() == 0
+    assert "compiling (once per machine)" in said
+    assert "1/1" in said
+
+
+def test_a_library_compiles_in_silence(works: list[str], tmp_path: Path) -> None:
+    process = subprocess.run(
+        works, env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}, capture_output=True, text=True, check=True
+    )
+    assert (process.stdout, process.stderr) == ("8\n", "")
