@@ -70,20 +70,21 @@ def plumage(p: Array) -> Array:
     Each row has a whole number of feathers, so that the rows close behind the bird.
     """
     q = unit(p / [28.0, 36.0, 26.0])  # about as far from the origin everywhere
-    pitch = 0.1  # of the rows, as an angle: some 3 mm
+    pitch = 0.11  # of the rows, as an angle: some 3 mm
     turn = np.arctan2(q[..., 0], -q[..., 2]) / (2 * np.pi)
 
     def across(k: Array) -> Array:
-        return turn * np.maximum(np.rint(54 * np.sin(k * pitch)), 3) + 0.5 * (k % 2)
+        return turn * np.maximum(np.rint(50 * np.sin(k * pitch)), 3) + 0.5 * (k % 2)
 
     return shingles(np.arccos(np.clip(-q[..., 1], -1, 1)) / pitch, across)
 
 
 def bird_parts(noise: SolidNoise) -> list[Part]:
     """Return the parts of the bird, a European robin; they overlap instead of being joined."""
-    olive, brown, slate = linear(122, 102, 66), linear(82, 64, 46), linear(132, 140, 144)
-    rust, buff, pale = linear(199, 83, 29), linear(184, 151, 105), linear(206, 198, 180)
-    white, black, horn = linear(240, 240, 240), linear(24, 22, 22), linear(74, 58, 50)
+    olive, brown, slate = linear(150, 128, 84), linear(122, 98, 68), linear(128, 135, 140)
+    rust, buff, pale = linear(194, 78, 26), linear(178, 146, 102), linear(198, 190, 173)
+    white, black = linear(240, 240, 240), linear(24, 22, 22)
+    horn, skin = linear(62, 50, 44), linear(158, 112, 88)
 
     def paint_trunk(p: Array) -> Array:
         ragged = noise(p * [1.0, 0.5, 1.0] + 17)
@@ -98,7 +99,8 @@ def bird_parts(noise: SolidNoise) -> list[Part]:
         rgb = mix(rgb, slate, smoothstep(-6.5, -4.0, bib) * beside)
         rgb = mix(rgb, rust, smoothstep(-1.0, 1.2, bib))
         ruffled = p + 0.5 * np.stack([noise(p * 0.7 + shift) for shift in (3, 11, 23)], axis=-1)
-        return rgb * np.exp(0.45 * plumage(ruffled))[..., None]
+        down = np.clip(noise(p * [1.6, 0.4, 1.6] + 41), -2.8, 2.8)
+        return rgb * np.exp(0.45 * plumage(ruffled) + 0.3 * down)[..., None]
 
     def paint_wing(p: Array) -> Array:
         _, over, back = np.moveaxis(p @ frame(WING_AIM).T, -1, 0)
@@ -117,13 +119,16 @@ def bird_parts(noise: SolidNoise) -> list[Part]:
         glint = np.hypot(x - np.sign(x) * EYE[0] + 1.0, y - EYE[1] + 1.3)
         return mix(black, white, smoothstep(1.0, 0.6, glint) * (z < EYE[2]))
 
-    def paint_horn(p: Array) -> Array:
+    def paint_beak(p: Array) -> Array:
         return np.broadcast_to(horn, p.shape)
+
+    def paint_leg(p: Array) -> Array:
+        return np.broadcast_to(skin, p.shape)
 
     parts: list[Part] = [
         Union(ellipsoids=TRUNK, blend=5.0, paint=paint_trunk, cell=(0, 0, 768), n=68, mottle=0.26),
         Superellipsoid(centre=(0, -17, -26), axes=(2.4, 2.2, 8.5), aim=(0, 0.08, -1), taper=0.6,
-                       paint=paint_horn, cell=(0, 768, 128)),
+                       paint=paint_beak, cell=(0, 768, 128)),
         Superellipsoid(centre=(19, 27.5, 13), axes=(2.2, 5, 16.5), aim=TAIL_AIM, taper=-0.2, power=3.2,
                        paint=paint_tail, cell=(768, 512, 256)),
     ]  # fmt: skip
@@ -133,14 +138,14 @@ def bird_parts(noise: SolidNoise) -> list[Part]:
                            paint=paint_eye, cell=(128 + 128 * k, 768, 128), mottle=0.07),
             Superellipsoid(centre=(side * 24.2, 13.5, 9.5), axes=(4.5, 12.5, 24), taper=0.75,
                            aim=WING_AIM * [-side, 1, 1], paint=paint_wing, cell=(768, 256 * k, 256), n=20),
-            Superellipsoid(centre=(side * 7, 35, 2), axes=(1.1, 6, 1.1),
-                           paint=paint_horn, cell=(384 + 64 * k, 768, 64), n=10),
+            Superellipsoid(centre=(side * 7, 35, 2), axes=(1.4, 6, 1.4),
+                           paint=paint_leg, cell=(384 + 64 * k, 768, 64), n=10),
         ]  # fmt: skip
         for toe, turn in enumerate((-0.5, 0.0, 0.5)):
             ahead = np.array([np.sin(turn), 0.0, -np.cos(turn)])
             parts.append(
-                Superellipsoid(centre=[side * 7, 40.3, 2] + 3.5 * ahead, axes=(1, 1, 4.8), taper=0.4,
-                               aim=(ahead[0], 0.1, ahead[2]), paint=paint_horn,
+                Superellipsoid(centre=[side * 7, 40.3, 2] + 3.5 * ahead, axes=(1.2, 1.2, 4.8), taper=0.4,
+                               aim=(ahead[0], 0.1, ahead[2]), paint=paint_leg,
                                cell=(384 + 64 * toe, 832 + 64 * k, 64), n=8)
             )  # fmt: skip
     return parts
