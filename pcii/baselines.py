@@ -100,6 +100,10 @@ def _bright(image: np.ndarray) -> np.ndarray:
 
     masks: list[np.ndarray] = []
     for plane in image:
+        # No two classes are farther apart than the darkest and the brightest; Otsu's histogram needs two.
+        if np.ptp(plane) <= LEAST_CONTRAST_SIGMAS * NOISE:
+            masks.append(np.zeros(plane.shape, dtype=bool))
+            continue
         mask = plane > threshold_otsu(plane)
         contrast = plane[mask].mean() - plane[~mask].mean() if mask.any() else 0.0
         is_real = contrast > LEAST_CONTRAST_SIGMAS * NOISE

@@ -8,6 +8,8 @@ from pcii.cells import CELL_PX
 from pcii.errors import InputError
 from pcii.focus import Focus, best_labels, focus_of, windowed
 from pcii.geometry import depth_of_spread_mm, depths_of_equal_spread_mm, disparity_spread_px
+from pcii.halves import halves_of, least_agreement
+from pcii.hot_pixels import without_hot_pixels
 from pcii.photon_counts import PhotonCounts, check_depth_counts
 from pcii.statistics import cells_to_pixels
 from pcii.types import DepthMap, check_z_mm
@@ -18,9 +20,7 @@ MOST_PLANES = 1000
 STEP_NATS, JUMP_NATS = 0.002, 0.08
 """What a change of depth from cell to cell must earn, per plane and at most; less than between objects."""
 SIGNIFICANT_NATS = 20.0
-DENSE_PHOTONS = 5.0
-"""Of a flat film less than 1 part in 200 is answered if 20 nats are asked for where photons are scarce, and
-three times as many from 5 photons per pixel on: a window counts evidence several times, and so its noise."""
+"""Evidence that noise makes of nothing exceeds this seldom; a window counts it several times."""
 FEWEST_PHOTONS = 10.0
 NEARBY_CELLS = 1.0
 """Fewer photons than this within about 10 px of a point: its neighbours' depth is not its own."""
@@ -36,7 +36,9 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     that stop at edges (`pcii.focus`); neighbours agree unless it costs too much; between planes a parabola
     is fitted. `confidence` (H, W) is the posterior probability, all planes being equally likely beforehand,
     that the depth lies within 2 planes of the best. Below one half, or where there are next to no photons or
-    nothing to be seen, the method abstains.
+    nothing to be seen, the method abstains; and where two halves of the cameras do not agree on what is seen
+    (`pcii.halves`), so that of noise, however bright, at most 1 pixel in 1000 is answered.
+    Pixels that are hot in most views are not looked at (`pcii.hot_pixels`).
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """
@@ -54,6 +56,7 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
             f"most {MOST_PLANES * PLANE_STEP_PX:g} px can be searched; choose a farther near end"
         )
     spread = np.sort(disparity_spread_px(grid, depths_of_equal_spread_mm(grid, near, far, PLANE_STEP_PX)))
+    counts = without_hot_pixels(counts)
     focus = focus_of(counts, spread)
     evidence = windowed(focus.gain, focus.photons)
     best = best_labels(evidence, np.full(spread.size - 1, STEP_NATS), JUMP_NATS)
@@ -61,10 +64,10 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     confidence = _posterior_near(evidence, best)
     at_best = np.take_along_axis(evidence, best[None], axis=0)[0]
     photons = _photons_nearby(focus, best)
-    per_px = photons / (2 * np.pi * NEARBY_CELLS**2 * CELL_PX**2)
-    significant = SIGNIFICANT_NATS * (1 + 2 * np.minimum(per_px / DENSE_PHOTONS, 1))
-    abstains = (at_best < significant) | (photons < FEWEST_PHOTONS)
+    abstains = (at_best < SIGNIFICANT_NATS) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
+    halves = halves_of(counts, spread)
+    abstains |= halves.agreement(best) < least_agreement(halves.planes)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))

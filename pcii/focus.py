@@ -98,14 +98,15 @@ def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[F
     film, everywhere = (grid.height, grid.width), np.ones((h, w), np.float32)
 
     def look(z: int) -> None:
-        own_cell, own_rate, base = np.empty(N, np.int32), np.empty(N, np.float32), np.empty(N, np.float32)
-        samples, mean, blurred = np.empty((3, h, w), np.float32)
+        own_cell, (own_rate, base) = np.empty(N, np.int32), np.empty((2, N))
+        samples, mean, blurred = np.empty((3, h, w))
         land(*place, rows[z], cols[z], film, own_cell)
         seen = (*place, counts.event_colours, n, believed, own_cell)
         section = (rows[z], cols[z], *film, sites, everywhere, 0.0)
         predict(seen, section, (own_rate, base, samples, mean, blurred))
-        gain[z] = samples * (blurred - mean)
-        kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, gain[z], photons[z])
+        own_gain = samples * (blurred - mean)
+        kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, own_gain, photons[z])
+        gain[z] = own_gain
         if keep:
             rate[z], cell[z], expected[z] = own_rate, own_cell, samples * mean
 

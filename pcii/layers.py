@@ -99,10 +99,11 @@ class Layers:
         self.covered = np.zeros((V, h, w), np.uint16)
         self.hidden = np.zeros(N, np.int32)
         self.cells = np.zeros((D, N), np.int32)
-        self.rate, self.base = np.zeros((2, N), np.float32)
-        self.samples, self.light, self.blurred, self.free = np.zeros((4, h, w), np.float32)
+        self.rate, self.base = np.zeros((2, N))
+        self.samples, self.light, self.blurred = np.zeros((3, h, w))
         # How many views see each cell if nothing is nearer: the film's frame is all that hides.
         self.within = np.zeros((D, h, w), np.float32)
+        self.free = np.zeros((h, w), np.float32)
         for layer in range(D):
             self._look(layer)
             self.within[layer] = self.free

@@ -40,9 +40,10 @@ Section = tuple[np.ndarray, np.ndarray, int, int, np.ndarray, np.ndarray, float]
 width of the film in px; sites (C,) of each colour in a block; of the views that cover a cell the share that
 is believed (H, W); how many samples a coarser scale is worth."""
 Predicted = tuple[np.ndarray, ...]
-"""What a section says, overwritten. Of events: rate, photons per sample of its pixel by all other events, and
-base, the same by the widest window alone. Of cells: samples, the views of all its blocks; mean, photons per
-block and view, and blurred, the same by the widest window alone."""
+"""What a section says, overwritten, in double precision: of many photons a small share is many. Of events:
+rate, photons per sample of its pixel by all other events, and base, the same by the widest window alone. Of
+cells: samples, the views of all its blocks; mean, photons per block and view, and blurred, the same by the
+widest window alone."""
 Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
 """A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
 how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks."""
@@ -52,9 +53,9 @@ how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks
 def _smoothed(values: np.ndarray) -> np.ndarray:
     """Each plane of (C, H, W) smoothed along both axes; nothing comes in across borders."""
     C, H, W = values.shape
-    centre, side = np.float32(CENTRE), np.float32(SIDE)
+    centre, side = CENTRE, SIDE
     result = np.empty_like(values)
-    across = np.empty((H, W), np.float32)
+    across = np.empty((H, W))
     for c in range(C):
         for i in range(H):
             # Slices, so that the compiler sees that neighbours exist and takes several at a time.
@@ -69,7 +70,7 @@ def _smoothed(values: np.ndarray) -> np.ndarray:
         for i in range(H):
             row, line = across[i], result[c, i]
             above, below = across[max(i - 1, 0)], across[min(i + 1, H - 1)]
-            up, down = side if i > 0 else np.float32(0), side if i + 1 < H else np.float32(0)
+            up, down = side if i > 0 else 0.0, side if i + 1 < H else 0.0
             for j in range(line.size):
                 line[j] = centre * row[j] + up * above[j] + down * below[j]
     return result
@@ -79,7 +80,7 @@ def _smoothed(values: np.ndarray) -> np.ndarray:
 def _halved(values: np.ndarray) -> np.ndarray:
     """Sums over 2 x 2 of (C, H, W), sizes rounded up."""
     C, H, W = values.shape
-    result = np.zeros((C, (H + 1) // 2, (W + 1) // 2), np.float32)
+    result = np.zeros((C, (H + 1) // 2, (W + 1) // 2))
     for c in range(C):
         for i in range(H):
             row, line = values[c, i], result[c, i // 2]
@@ -126,9 +127,9 @@ def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
 
 
 @helper
-def _views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
+def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
     """How many camera rows (or columns) see each block row (or column), (blocks,)."""
-    seen = np.zeros(blocks, np.float32)
+    seen = np.zeros(blocks)
     for camera in range(shifts.size):
         first, last = _whole_blocks(int(shifts[camera]), size)
         for place in range(first, last):
@@ -167,21 +168,21 @@ def _scales(events: Events, section: Section, finest: int) -> Scales:
     k, l, i, j, colour, n, weight, cell = events
     rows, cols, H, W, sites, share_seen, _ = section
     h, w = share_seen.shape
-    by_row, by_col = _views_of_blocks(rows, H, 2 * h), _views_of_blocks(cols, W, 2 * w)
-    totals = np.zeros((1, by_row.size, by_col.size), np.float32)
+    by_row, by_col = views_of_blocks(rows, H, 2 * h), views_of_blocks(cols, W, 2 * w)
+    totals = np.zeros((1, by_row.size, by_col.size))
     # Of colours nobody asks at the finer scales.
     wide = BLOCK_PX << COLOUR_SCALE
-    counts = np.zeros((sites.size, -(-2 * h * BLOCK_PX // wide), -(-2 * w * BLOCK_PX // wide)), np.float32)
+    counts = np.zeros((sites.size, -(-2 * h * BLOCK_PX // wide), -(-2 * w * BLOCK_PX // wide)))
     for e in range(k.size):
         if cell[e] >= 0:
             row, col, photons = i[e] + rows[k[e]], j[e] + cols[l[e]], n[e] * weight[e]
             totals[0, row // BLOCK_PX, col // BLOCK_PX] += photons
             counts[colour[e], row // wide, col // wide] += photons
-    views = np.empty((1, by_row.size, by_col.size), np.float32)
+    views = np.empty((1, by_row.size, by_col.size))
     for a in range(by_row.size):
         for b in range(by_col.size):
             views[0, a, b] = by_row[a] * by_col[b] * share_seen[a // 2, b // 2]
-    everywhere = totals.sum() / max(views.sum(), np.float32(1e-6))
+    everywhere = totals.sum() / max(views.sum(), 1e-6)
     seen, light, coloured = [], [], []
     for scale in range(SCALES):
         if scale > 0:
@@ -261,44 +262,50 @@ def _predict_events(
 
 @helper
 def _predict_cells(
-    first: int, last: int, finest: int, section: Section, scales: Scales, told: Predicted
+    first: int, last: int, finest: int, sharp: bool, section: Section, scales: Scales, told: Predicted
 ) -> None:
-    """The `samples`, `mean` and `blurred` light of the rows from `first` to `last`."""
+    """The `samples`, `mean` and `blurred` light of the rows from `first` to `last`.
+
+    Block by block, in which rates are linear, and by how many views see each block: so `samples` times `mean`
+    is the sum of what events are predicted with over all pixels of the cell, whatever chance made of them.
+    If `sharp`, coarser scales are told at the cell's centre instead, as a picture of the light is.
+    """
     prior = section[6]
     seen, light, _, everywhere, by_row, by_col = scales
     _, _, samples, mean, blurred = told
-    coarsers, sums = np.empty((2, mean.shape[1]), np.float64)
+    blocks = by_col.size
+    coarsers, sums, widest = np.zeros((3, blocks), np.float64)
     for a in range(first, last):
-        coarsers[:] = everywhere
-        sums[:] = 0.0
-        for reverse in range(SCALES - max(finest, 1)):
-            scale = SCALES - 1 - reverse
-            views, photons = seen[scale][0], light[scale][0]
-            high, wide = views.shape
-            share_of_cell = CELL_PX / float(BLOCK_PX << scale)
-            top, bottom, share_i, _ = _between((a + 0.5) * share_of_cell, high)
-            for b in range(coarsers.size):
-                left, right, share_j, _ = _between((b + 0.5) * share_of_cell, wide)
-                there = _at(views, top, bottom, share_i, left, right, share_j)
-                others = _at(photons, top, bottom, share_i, left, right, share_j)
-                coarsers[b] = (others + prior * coarsers[b]) / max(there + prior, 1e-6)
-                sums[b] += coarsers[b] / SCALES
-                if scale == BASE_SCALE:
-                    blurred[a, b] = coarsers[b]
-        views, photons = seen[0][0], light[0][0]
-        for b in range(coarsers.size):
+        for b in range(mean.shape[1]):
             samples[a, b] = (by_row[2 * a] + by_row[2 * a + 1]) * (by_col[2 * b] + by_col[2 * b + 1])
-            if samples[a, b] <= 0:
-                mean[a, b] = blurred[a, b] = 0.0
+            mean[a, b] = blurred[a, b] = 0.0
+        for u in range(2 * a, 2 * a + 2):
+            if by_row[u] <= 0:
                 continue
-            if finest > 0:
-                continue
-            for u in range(2 * a, 2 * a + 2):
-                for v in range(2 * b, 2 * b + 2):
-                    if by_row[u] * by_col[v] > 0:
-                        block = (photons[u, v] + prior * coarsers[b]) / (views[u, v] + prior)
-                        sums[b] += block / (4 * SCALES)
-            mean[a, b] = (1 - BASE_SHARE) * sums[b] + BASE_SHARE * blurred[a, b]
+            coarsers[:] = everywhere
+            sums[:] = 0.0
+            for reverse in range(SCALES - finest):
+                scale = SCALES - 1 - reverse
+                views, photons = seen[scale][0], light[scale][0]
+                high, wide = views.shape
+                narrow, centred = 1 / float(1 << scale), sharp and scale > 0
+                row = 2 * a + 1.0 if centred else u + 0.5
+                top, bottom, share_i, _ = _between(row * narrow, high)
+                for v in range(blocks):
+                    if by_col[v] <= 0:
+                        continue
+                    col = v // 2 * 2 + 1.0 if centred else v + 0.5
+                    left, right, share_j, _ = _between(col * narrow, wide)
+                    there = _at(views, top, bottom, share_i, left, right, share_j)
+                    others = _at(photons, top, bottom, share_i, left, right, share_j)
+                    coarsers[v] = (others + prior * coarsers[v]) / max(there + prior, 1e-6)
+                    sums[v] += coarsers[v] / SCALES
+                    if scale == BASE_SCALE:
+                        widest[v] = coarsers[v]
+            for v in range(blocks):
+                share = by_row[u] * by_col[v] / max(samples[a, v // 2], 1e-6)
+                mean[a, v // 2] += share * ((1 - BASE_SHARE) * sums[v] + BASE_SHARE * widest[v])
+                blurred[a, v // 2] += share * widest[v]
 
 
 @helper
@@ -307,7 +314,7 @@ def predict(events: Events, section: Section, told: Predicted) -> None:
     N, h = events[0].size, told[3].shape[0]
     scales = _scales(events, section, 0)
     _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, told)
-    _predict_cells(0, h, 0, section, scales, told)
+    _predict_cells(0, h, 0, False, section, scales, told)
 
 
 @compiled
@@ -322,6 +329,7 @@ def predict_shared(
 ) -> None:
     """The same, shared among threads in so many `parts`, for those events alone that are `asked` for (N,).
 
+    Light is that at the centres of cells: sharper, but not the sum of what events are predicted with.
     Of cells those in the `asked_rows`, first and last + 1. With `finest` = BASE_SCALE the widest window alone
     is looked at: `base` and `blurred` are right, `rate` and `mean` mean nothing.
     """
@@ -332,4 +340,4 @@ def predict_shared(
         _predict_events(this, beyond, asked, finest, events, section, scales, told)
         top = first + (last - first) * part // parts
         bottom = first + (last - first) * (part + 1) // parts
-        _predict_cells(top, bottom, finest, section, scales, told)
+        _predict_cells(top, bottom, finest, True, section, scales, told)

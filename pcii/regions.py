@@ -11,6 +11,7 @@ import numpy as np
 
 from pcii.focus import Focus, dark_around, typical_light
 from pcii.foreground import connected_pieces, dilated
+from pcii.halves import Halves, least_agreement
 
 HALO_CELLS = 4
 """Evidence of an outline lies up to 16 px outside it."""
@@ -157,9 +158,14 @@ def _depths(planes: Planes, plane: int) -> np.ndarray:
 
 
 def regions_of(
-    plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes
+    plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes, halves: Halves
 ) -> tuple[np.ndarray, list[Region]]:
-    """A map (h, w) int64 of the regions' numbers, 0 outside, and the regions."""
+    """A map (h, w) int64 of the regions' numbers, 0 outside, and the regions.
+
+    `halves` are what the halves of the cameras show at the searched depths. They must agree on the piece of
+    what is bright that a region belongs to; on a region alone, seen between leaves, they need not.
+    """
+    agreed = _agreed(bright, halves)
     numbers = np.zeros(plane.shape, np.int64)
     found: list[Region] = []
     nowhere = planes.away_px > planes.far_px
@@ -177,6 +183,7 @@ def regions_of(
             doubt_nats = SURE_NATS if cells >= OWN_OPINION_CELLS else 0.0
             in_focus = evidence[~nowhere].max() >= elsewhere - doubt_nats
             is_there = own >= 0 and sure_nats[best] > SURE_NATS and in_focus
+            is_there = is_there and bool(agreed[box][piece].any())
             number = len(found) + 1
             numbers[box][piece] = number
             if not is_there and elsewhere > evidence[best]:
@@ -192,6 +199,16 @@ def regions_of(
                 )
             )
     return numbers, found
+
+
+def _agreed(bright: np.ndarray, halves: Halves) -> np.ndarray:
+    """Which of the connected pieces of what is bright the halves of the cameras agree on, (h, w) bool."""
+    least = least_agreement(halves.planes)
+    agreed = np.zeros(bright.shape, dtype=bool)
+    for box, piece in _pieces(bright):
+        if halves.agreement_over(*box, _around(box, piece, bright)) > least:
+            agreed[box] |= piece
+    return agreed
 
 
 def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
@@ -212,8 +229,13 @@ def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
 
 def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray) -> np.ndarray:
     """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
-    around = dilated(piece, HALO_CELLS) & (~bright[box] | piece)
+    around = _around(box, piece, bright)
     return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)
+
+
+def _around(box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray) -> np.ndarray:
+    """A piece and the dark around it."""
+    return dilated(piece, HALO_CELLS) & (~bright[box] | piece)
 
 
 def _beyond_chance(evidence: np.ndarray, nowhere: np.ndarray) -> np.ndarray:

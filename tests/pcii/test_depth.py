@@ -8,6 +8,7 @@ import pcii.depth
 from pcii.depth import estimate_depth
 from pcii.errors import InputError
 from pcii.geometry import disparity_spread_px
+from pcii.halves import FALSE_RATE
 from pcii.photon_counts import PhotonCounts
 from pcii.types import CameraGrid, DepthMap
 
@@ -73,7 +74,8 @@ def test_what_is_less_certain_than_asked_for_is_not_answered(monkeypatch):
     grid = unit_grid(7, 7, 96, 96)
     sparse = np.random.default_rng(0).poisson(0.004, size=grid.shape_KLHW)  # few photons, no texture
     counts = PhotonCounts.from_dense(sparse, grid, cfa="GRBG")
-    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_NATS", -np.inf)  # which would refuse all of it
+    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_NATS", -np.inf)  # either would refuse all of it
+    monkeypatch.setattr(pcii.depth, "least_agreement", lambda planes: -np.inf)
     answered = []
     for least in (pcii.depth.LEAST_CONFIDENCE, 0.95):
         monkeypatch.setattr(pcii.depth, "LEAST_CONFIDENCE", least)
@@ -97,12 +99,13 @@ def flat_share(rate: float, films: int) -> float:
 # From 0.2 to 50 photons in each pixel of a section.
 @pytest.mark.parametrize("rate", [0.004, 0.02, 0.1, 1.0])
 def test_a_flat_film_has_no_depth(rate):
-    # What the significance that is asked for was chosen for.
-    assert flat_share(rate, films=4) <= 1 / 200
+    assert flat_share(rate, films=4) <= FALSE_RATE
 
 
 def test_a_flat_film_is_refused_for_want_of_evidence(monkeypatch):
-    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_NATS", -np.inf)  # the fault: noise taken for texture
+    # The fault: noise taken for texture.
+    monkeypatch.setattr(pcii.depth, "SIGNIFICANT_NATS", -np.inf)
+    monkeypatch.setattr(pcii.depth, "least_agreement", lambda planes: -np.inf)
     assert flat_share(0.1, films=1) > 1 / 2
 
 

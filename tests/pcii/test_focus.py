@@ -126,16 +126,18 @@ def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) 
         here = {(y, x): seen[0][0][y] * seen[0][1][x] for y, x in blocks}
         if not sum(here.values()):
             continue
-        lit = [block for block in blocks if here[block]]
-        finest = sum(
-            light(0, 2 * y + 1, 2 * x + 1, None, None) / samples(0, 2 * y + 1, 2 * x + 1) for y, x in lit
-        )
-        y, x = 4 * a + 2.0, 4 * b + 2.0
-        wider = [light(scale, y, x, None, None) / samples(scale, y, x) for scale in range(1, 5)]
-        mean, base = (finest / 4 + sum(wider)) / 5, wider[-1]
-        expected[a, b] = sum(here.values()) * (0.95 * mean + 0.05 * base)
-        gain[a, b] -= sum(here.values()) * 0.95 * (mean - base)
-        size[a, b] += sum(here.values()) * (mean + base)
+        for y, x in blocks:
+            if not here[y, x]:
+                continue
+            # At the centre of each block, between which rates are linear.
+            rates = [
+                light(s, 2 * y + 1, 2 * x + 1, None, None) / samples(s, 2 * y + 1, 2 * x + 1)
+                for s in range(5)
+            ]
+            mean, base = sum(rates) / 5, rates[4]
+            expected[a, b] += here[y, x] * (0.95 * mean + 0.05 * base)
+            gain[a, b] -= here[y, x] * 0.95 * (mean - base)
+            size[a, b] += here[y, x] * (mean + base)
     return Twin(rate, cell, expected, gain, size)
 
 
@@ -259,6 +261,23 @@ def test_photons_in_pairs_are_seen():
         counts = PhotonCounts.from_dense(film, grid)
         films.append(focus_of(counts, spread_of(grid, 3)).gain[0])
     assert large_gains(np.array(films)) > 0.9
+
+
+@pytest.mark.parametrize("size", [(7, 128), (10, 128), (128, 14), (64, 65)])
+def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
+    # What is expected of a cell is the sum of what its pixels are predicted with: else all photons of it were
+    # gained or lost by the share by which the two differ, and chance would grow as the root of the photons.
+    for rate in (0.1, 10.0, 1e3):
+        grid = unit_grid(5, 5, *size)
+        films = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(4)]
+        gains = np.array(
+            [focus_of(PhotonCounts.from_dense(f, grid), spread_of(grid, 3)).gain[0] for f in films]
+        )
+        # A cell's four finest rates cost half a nat each at most, give or take sqrt(1/2), times the fifth for
+        # which their scale counts; coarser scales are fewer, and shared by cells.
+        assert gains.std() < 0.6
+        totals = gains.sum(axis=(1, 2), dtype=np.float64)
+        assert abs(totals.mean()) < 0.05 * gains[0].size + 4 * 0.6 * math.sqrt(gains[0].size / 4)
 
 
 FRAMES = [(0.01, "GRBG"), (2.0, "GRBG"), (10.0, "GRBG"), (0.01, None), (2.0, None), (10.0, None)]

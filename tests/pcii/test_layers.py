@@ -498,8 +498,11 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     def outputs():
         return (*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
 
-    whole = outputs()
-    predict(*about, whole)
+    whole, by_one = outputs(), outputs()
+    predict_shared(1, np.ones(N, dtype=bool), (0, h), 0, *about, whole)
+    predict(*about, by_one)
+    for found, expected in zip(by_one[:3], whole[:3], strict=True):
+        np.testing.assert_array_equal(found, expected)
     asked = rng.random(N) < 0.5
     in_rows = ((np.arange(h) >= 5) & (np.arange(h) < h - 2))[:, None] & np.ones(w, dtype=bool)
     for parts in (1, 3):

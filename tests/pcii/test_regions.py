@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from pcii.focus import Focus, focus_of
+from pcii.halves import BLOCKS_CELLS, Halves, halves_of
 from pcii.photon_counts import PhotonCounts
 from pcii.regions import HALO_CELLS, SMALLEST_CELLS, SURE_NATS, Planes, bright_cells, regions_of, settled
 from pcii.types import CameraGrid
@@ -17,6 +18,12 @@ PLANES = Planes(
     far_px=10.0,
 )
 FIRST, BETWEEN, SECOND = 1, 2, 3
+
+BLOCKS = [(SPREAD_PX.size, -(-SHAPE[0] // side), -(-SHAPE[1] // side)) for side in BLOCKS_CELLS]
+AGREED, UNSURE = (
+    Halves([np.full(shape, p) for shape in BLOCKS], [np.zeros(shape) for shape in BLOCKS]) for p in (1.0, 0.0)
+)
+"""What is seen by both halves of the cameras everywhere, and nowhere."""
 
 
 def box(top: int, left: int, height: int, width: int) -> np.ndarray:
@@ -139,7 +146,7 @@ def test_a_region_is_at_the_depth_that_gains_most_with_the_dark_around_it():
     around = box(10 - HALO_CELLS, 12, 1, 2)  # its outline shows in the dark
     too_far = box(10 - HALO_CELLS - 1, 12, 1, 2)
     focus = focus_with((FIRST, piece, 15.0), (FIRST, around, 7.0), (FIRST, too_far, 900.0))
-    numbers, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    numbers, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     np.testing.assert_array_equal(numbers, piece)
     assert (region.number, region.plane, region.cells, region.spread_px) == (1, 0, 36, 20.0)
     assert region.gain_nats == pytest.approx(22.0, rel=1e-5)  # sums of single precision
@@ -150,7 +157,7 @@ def test_a_region_is_at_the_depth_that_gains_most_with_the_dark_around_it():
 def test_a_region_that_another_depth_explains_better_is_not_there(depth):
     piece = box(10, 10, 6, 6)
     focus = focus_with((FIRST, piece, 40.0), (depth, piece, 41.0 + SURE_NATS))
-    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert not region.is_there
     assert region.plane == -1
     assert region.spread_px == SPREAD_PX[depth]
@@ -160,22 +167,42 @@ def test_a_region_that_another_depth_explains_better_is_not_there(depth):
 def test_noise_does_not_put_a_region_out_of_focus_unless_it_is_a_speck(side_cells, is_there):
     piece = box(10, 10, side_cells, side_cells)
     focus = focus_with((FIRST, piece, 40.0), (BETWEEN, piece, 39.0 + SURE_NATS))
-    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert region.is_there == is_there
 
 
 @pytest.mark.parametrize(("nats", "is_there"), [(SURE_NATS - 1, False), (SURE_NATS + 1, True)])
 def test_a_region_without_sure_evidence_is_not_there(nats, is_there):
     piece = box(10, 10, 6, 6)
-    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus_with((FIRST, piece, nats)), PLANES)
+    _, (region,) = regions_of(
+        np.zeros(SHAPE, np.int64), piece, focus_with((FIRST, piece, nats)), PLANES, AGREED
+    )
     assert region.is_there == is_there
+
+
+def test_a_region_that_the_halves_of_the_cameras_do_not_agree_on_is_not_there():
+    piece = box(10, 10, 6, 6)
+    focus = focus_with((FIRST, piece, 1e6))
+    for halves, is_there in ((AGREED, True), (UNSURE, False)):
+        _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, halves)
+        assert region.is_there == is_there
+
+
+def test_the_halves_need_not_agree_on_each_part_of_a_piece():
+    part, rest = box(10, 10, 6, 6), box(10, 16, 6, 20)
+    there = [np.zeros(shape) for shape in BLOCKS]
+    there[0][:, rest] = 1.0
+    halves = Halves(there, [np.zeros(shape) for shape in BLOCKS])
+    focus = focus_with((FIRST, part, 40.0), (SECOND, rest, 40.0))
+    _, regions = regions_of(np.where(rest, 1, 0), part | rest, focus, PLANES, halves)
+    assert [region.is_there for region in regions] == [True, True]
 
 
 def test_pieces_are_numbered_and_specks_left_out():
     one, other, speck = box(3, 3, 5, 5), box(3, 20, 5, 5), box(20, 20, 1, SMALLEST_CELLS - 1)
     focus = focus_with((FIRST, one, 50.0), (SECOND, other, 50.0), (FIRST, speck, 50.0))
     plane = np.where(other, 1, 0)
-    numbers, regions = regions_of(plane, one | other | speck, focus, PLANES)
+    numbers, regions = regions_of(plane, one | other | speck, focus, PLANES, AGREED)
     assert [region.plane for region in regions] == [0, 1]
     np.testing.assert_array_equal(numbers, one + 2 * other)
 
@@ -189,7 +216,7 @@ def test_a_large_dim_region_is_there_if_its_depth_stands_out_of_the_noise(sigmas
     piece = box(5, 5, 20, 30)
     costs = [(depth, piece, -NOISE_NATS) for depth in range(SPREAD_PX.size)]
     focus = focus_with(*costs, (FIRST, piece, sigmas * np.sqrt(2 * NOISE_NATS)))
-    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert region.is_there == is_there
     assert region.gain_nats == pytest.approx(sigmas**2 / 2, rel=1e-3)
 
@@ -198,7 +225,7 @@ def test_a_large_dim_region_is_there_if_its_depth_stands_out_of_the_noise(sigmas
 def test_of_few_photons_the_evidence_itself_counts(elsewhere):
     piece = box(10, 10, 6, 6)
     focus = focus_with((FIRST, piece, 7.0), *((depth, piece, elsewhere) for depth in (0, BETWEEN, 4)))
-    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES)
+    _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert not region.is_there
 
 
@@ -215,8 +242,10 @@ def test_noise_alone_is_never_sure(photons_per_px):
     )
     for seed in range(5):
         random = np.random.default_rng(seed)
-        events = random.poisson(photons_per_px / 100, (10, 10, size, size))
-        focus = focus_of(PhotonCounts.from_dense(events, grid, cfa="GRBG"), spread_px)
-        _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes)
+        film = random.poisson(photons_per_px / 100, (10, 10, size, size))
+        counts = PhotonCounts.from_dense(film, grid, cfa="GRBG")
+        focus, halves = focus_of(counts, spread_px), halves_of(counts, spread_px)
+        _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes, halves)
+        assert not region.is_there
         assert np.median(focus.gain.sum(axis=(1, 2))) < -50
         assert region.gain_nats < SURE_NATS

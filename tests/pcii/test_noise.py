@@ -1,0 +1,104 @@
+"""Noise gets no answers: films of even light, of any size, brightness and grid, and pixels that are hot."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pcii.depth import estimate_depth
+from pcii.halves import FALSE_RATE
+from pcii.photon_counts import PhotonCounts
+from pcii.score import score
+from pcii.segment import segment
+from pcii.types import CameraGrid, Truth
+
+Z_MM, RANGE_MM = (150.0, 250.0), (100.0, 400.0)  # 18 to 4.5 px of disparity: with 5 x 5 views a film wide
+SIZES = [(1, 1), (2, 3), (7, 90), (64, 7), (14, 10), (33, 5), (64, 72)]
+GRIDS = [(2, 1), (1, 8), (3, 3), (5, 5)]
+LIGHT = [1e-3, 0.05, 1.0, 100.0, 1e4]
+HOT = 10_000
+
+
+def grid_of(views: tuple[int, int], size: tuple[int, int]) -> CameraGrid:
+    rows, cols = views
+    height, width = size
+    return CameraGrid(
+        rows=rows, cols=cols, pitch_mm=(18.0, 18.0), focal_mm=50.0, pixel_mm=0.5, height=height, width=width
+    )
+
+
+def answered(counts: PhotonCounts) -> tuple[float, float]:
+    """Shares of pixels that the depth map answers, and that removal claims."""
+    depth, focus = estimate_depth(counts, RANGE_MM), segment(counts, Z_MM, method="likelihood")
+    return float(np.isfinite(depth.z_mm).mean()), float(focus.in_focus.mean())
+
+
+def noise(
+    views: tuple[int, int], size: tuple[int, int], rate: float, cfa: str | None, seed: int
+) -> PhotonCounts:
+    grid = grid_of(views, size)
+    film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
+    return PhotonCounts.from_dense(film, grid, cfa=cfa)
+
+
+def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, seed: int) -> PhotonCounts:
+    """Even light, and some hot pixels, of one view each or of all."""
+    grid, rng = grid_of(views, (64, 72)), np.random.default_rng(seed)
+    film = rng.poisson(rate, grid.shape_KLHW)
+    # No two beside each other: they are told from their neighbours.
+    for place in rng.choice(8 * 9, pixels, replace=False):
+        i, j = 8 * (place // 9) + 2, 8 * (place % 9) + 2
+        view = np.s_[:, :] if everywhere else (rng.integers(views[0]), rng.integers(views[1]))
+        film[*view, i, j] += HOT
+    return PhotonCounts.from_dense(film, grid, cfa=None)
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("rate", LIGHT)
+def test_even_light_is_not_answered(size, rate):
+    draws = [noise(views, size, rate, cfa, 0) for views, cfa in zip(GRIDS, itertools.cycle(["GRBG", None]))]
+    depth, claimed = np.mean([answered(counts) for counts in draws], axis=0)
+    assert depth <= FALSE_RATE
+    assert claimed <= FALSE_RATE
+
+
+@pytest.mark.parametrize("everywhere", [False, True])
+@pytest.mark.parametrize("pixels", [1, 4])
+@pytest.mark.parametrize("rate", [0.0, 0.01, 1.0])
+def test_hot_pixels_are_not_answered(rate, pixels, everywhere):
+    for views in ((5, 5), (2, 1)):
+        counts = hot(views, rate, pixels, everywhere=everywhere, seed=0)
+        assert max(answered(counts)) <= FALSE_RATE
+
+
+@pytest.mark.slow
+def test_noise_is_answered_as_seldom_as_is_said():
+    cases = itertools.product([*GRIDS, (10, 10)], [*SIZES[2:], (96, 128)], LIGHT, ["GRBG", None], range(3))
+    shares = np.array([answered(noise(*case)) for case in cases])
+    assert np.all(shares.mean(axis=0) <= FALSE_RATE)
+
+
+@pytest.mark.slow
+def test_hot_pixels_are_answered_as_seldom_as_is_said():
+    cases = itertools.product([*GRIDS, (10, 10)], [0.0, 0.01, 1.0, 30.0], [1, 4, 8], [False, True], range(3))
+    shares = np.array(
+        [
+            answered(hot(views, rate, pixels, everywhere=everywhere, seed=seed))
+            for views, rate, pixels, everywhere, seed in cases
+        ]
+    )
+    assert np.all(shares.mean(axis=0) <= FALSE_RATE)
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("count", [3, 255, 65535, 2**40])
+@pytest.mark.parametrize("size", [(1, 1), (3, 2), (20, 24)])
+def test_saturated_counters_tell_nothing_and_can_be_scored(count, size, cfa):
+    grid = grid_of((3, 3), size)
+    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa=cfa)
+    depth = estimate_depth(counts, RANGE_MM)
+    assert np.isnan(depth.z_mm).all()
+    focus = [segment(counts, Z_MM, method=method) for method in ("three-step", "likelihood", "brightness")]
+    assert not any(one.in_focus.any() for one in focus)
+    truth = Truth(np.full(size, np.inf), np.zeros(size, np.int16), {})
+    assert score(focus, depth, truth).depth["coverage"] in (0, None)
