@@ -67,7 +67,7 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     abstains = (at_best < SIGNIFICANT_NATS) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
     halves = halves_of(counts, spread)
-    abstains |= halves.agreement(best) < least_agreement(halves.planes)
+    abstains |= halves.agreement(best, ~abstains) < least_agreement(halves.planes)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.cells import CELL_PX
+from pcii.foreground import box_around
 from pcii.geometry import whole_shifts_px
 from pcii.photon_counts import PhotonCounts
 
@@ -30,6 +31,8 @@ BLOCKS_CELLS = (1, 2, 4, 8)
 """Sides of the blocks that are compared, in cells: 4 to 32 px."""
 WINDOWS_BLOCKS = (4.0, 8.0)
 """Gaussian windows over which products are summed, in blocks: t is at most the root of how many there are."""
+WINDOW_SIGMAS = 4.0
+"""Windows end so far out."""
 ROUNDING = 1e-9
 """Differences of less than this share of the light are rounding errors."""
 
@@ -49,25 +52,23 @@ class Halves:
         """How many depths were looked at."""
         return len(self.products[0])
 
-    def agreement(self, label: np.ndarray) -> np.ndarray:
-        """t (h, w) around each cell at the plane (h, w) that is its label, the largest of all windows."""
-        from scipy.ndimage import gaussian_filter
+    def agreement(self, label: np.ndarray, where: np.ndarray) -> np.ndarray:
+        """t (h, w) around each cell at the plane (h, w) that is its label, the largest of all windows.
 
+        Only cells that are `where` (h, w) are looked at; the others have 0.
+        """
         result = np.zeros(label.shape)
-        for z in np.unique(label):
-            here = label == z
+        for z in np.unique(label[where]):
+            here = where & (label == z)
             for side, products, noise in zip(BLOCKS_CELLS, self.products, self.noise, strict=True):
-                p = products[z]
                 for sigma in WINDOWS_BLOCKS:
-                    ends = {"mode": "constant", "radius": int(4 * sigma)}
-                    total = 2 * np.pi * sigma**2 * gaussian_filter(p, sigma, **ends)
-                    # The square of a Gaussian is one of 1 / sqrt(2) the width; both end at the same place.
-                    squares, expected = (
-                        np.pi * sigma**2 * gaussian_filter(part, sigma / np.sqrt(2), **ends)
-                        for part in (p**2, noise[z])
-                    )
-                    t = _ratio(total, np.maximum(squares, expected)).repeat(side, axis=0).repeat(side, axis=1)
-                    result[here] = np.maximum(result, t[: label.shape[0], : label.shape[1]])[here]
+                    reach = int(WINDOW_SIGMAS * sigma)
+                    box = box_around(_summed(here, side) > 0, (reach, reach))
+                    t = _around_each(products[z][box], noise[z][box], sigma)
+                    t = t.repeat(side, axis=0).repeat(side, axis=1)
+                    cells = tuple(slice(part.start * side, part.stop * side) for part in box)
+                    mine, part = here[cells], result[cells]
+                    part[mine] = np.maximum(part, t[: part.shape[0], : part.shape[1]])[mine]
         return result
 
     def agreement_over(self, rows: slice, cols: slice, where: np.ndarray) -> float:
@@ -165,6 +166,19 @@ def _summed(cells: np.ndarray, side: int) -> np.ndarray:
     h, w = cells.shape
     padded = np.pad(cells, ((0, -h % side), (0, -w % side)))
     return padded.reshape(padded.shape[0] // side, side, -1, side).sum(axis=(1, 3))
+
+
+def _around_each(products: np.ndarray, noise: np.ndarray, sigma: float) -> np.ndarray:
+    """t of Gaussian windows about each block, from the products and their noise."""
+    from scipy.ndimage import gaussian_filter
+
+    ends = {"mode": "constant", "radius": int(WINDOW_SIGMAS * sigma)}
+    total = 2 * np.pi * sigma**2 * gaussian_filter(products, sigma, **ends)
+    # The square of a Gaussian is one of 1 / sqrt(2) the width; both end at the same place.
+    squares, expected = (
+        np.pi * sigma**2 * gaussian_filter(part, sigma / np.sqrt(2), **ends) for part in (products**2, noise)
+    )
+    return _ratio(total, np.maximum(squares, expected))
 
 
 def _ratio(total: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ DISPARITIES_PX = (1, 2, 3, 4, 5, 6)
 
 
 def at(halves: Halves, plane: int, shape: tuple[int, int]) -> np.ndarray:
-    return halves.agreement(np.full(shape, plane))
+    return halves.agreement(np.full(shape, plane), np.ones(shape, dtype=bool))
 
 
 def spreads_of(grid: CameraGrid) -> np.ndarray:
