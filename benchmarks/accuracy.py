@@ -12,15 +12,16 @@ import numpy as np
 
 from benchmarks.photons import setup_of
 from benchmarks.timing import timed
-from pcii.bayer import mosaic
-from pcii.demosaic import METHODS, demosaic
-from pcii.reconstruct import reconstruct
-from pcii.types import CameraGrid, Sections, Views
-from simgen import backend
-from simgen.build import Built, build
-from simgen.recipe import load_recipe
-from simgen.render import render_view
-from simgen.scene import Scene, load_scene
+from pcii.core.bayer import mosaic
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Sections, Views
+from pcii.sections.demosaicing import METHODS, demosaic
+from pcii.sections.reconstruction import reconstruct
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.radiance import render_view
+from simgen.spec.recipe import load_recipe
+from simgen.spec.scene import Scene, load_scene
 
 CFA = "GRBG"
 SIDE_PX = 512
@@ -157,7 +158,7 @@ def _card() -> Iterator[str]:
         yield f"| {name} | {1e3 * seconds:.1f} | {100 * error / contrast:.1f} |"
 
 
-def _centre_view(built: Built, grid: CameraGrid, samples: int) -> np.ndarray:
+def _centre_view(built: RenderScene, grid: CameraGrid, samples: int) -> np.ndarray:
     centre = replace(grid, rows=1, cols=1)
     return render_view(built, centre, 0, 0, samples_per_pixel=samples, seed=7).astype(np.float64)
 

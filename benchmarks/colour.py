@@ -12,13 +12,13 @@ import numpy as np
 
 from benchmarks.photons import setup_of, thinned
 from benchmarks.timing import timed
-from pcii.types import CameraGrid
-from simgen import backend
-from simgen.build import build
-from simgen.recipe import load_recipe
-from simgen.render import render_view
-from simgen.scene import Scene
-from simgen.spectra import PATCHES, illuminant, integral, patch, patch_names, sensitivity
+from pcii.core.camera_grid import CameraGrid
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.renderer.radiance import render_view
+from simgen.spec.recipe import load_recipe
+from simgen.spec.scene import Scene
+from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names, sensitivity
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 LAMPS = ("D65", "A")

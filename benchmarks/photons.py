@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import timed
-from simgen import backend, seeds
-from simgen.build import build
-from simgen.candidates import Setup
-from simgen.photons import PhotonList, draw_photons
-from simgen.recipe import Recipe, load_recipe
-from simgen.render import render_view
-from simgen.scene import load_scene
-from simgen.sensor import draw_counts, photon_rates, scope_energies, sense, sensitivities
+from simgen.base import random_streams as seeds
+from simgen.photons.candidates import Setup
+from simgen.photons.thinning import PhotonList, draw_photons
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.renderer.radiance import render_view
+from simgen.sensor.mosaic import draw_counts, photon_rates, scope_energies, sense, sensitivities
+from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.scene import load_scene
 
 DENSE_VIEWS = 4
 
@@ -87,7 +88,7 @@ def table() -> Iterator[str]:
 
 
 def _costs(recipe: Recipe, per_photon: float, dense_s: dict[int, float]) -> Iterator[str]:
-    """What `simgen.counts` chooses by."""
+    """What `simgen.photons.photon_counting` chooses by."""
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
     yield "| cost | microseconds |"

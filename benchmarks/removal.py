@@ -19,16 +19,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 from benchmarks.drawn import KINDS, TUNING, write_drawn
-from pcii.console import Stages
-from pcii.errors import InputError
-from pcii.evaluate import evaluate, part_of
-from pcii.evaluation_tables import Table, markdown, overview, tables_of
-from pcii.measurements import recipe_of
-from pcii.store import MANIFEST, read_manifest
-from simgen.generate import generate
-from simgen.recipe import Recipe, load_recipe
-from simgen.schema import Strict, read_toml, validate
-from simgen.series import at_seeds, folder_of
+from pcii.core.console import Stages
+from pcii.core.errors import InputError
+from pcii.evaluation.comparison import evaluate, part_of
+from pcii.evaluation.rows import recipe_of
+from pcii.evaluation.tables import Table, markdown, overview, tables_of
+from pcii.io.dataset_layout import MANIFEST, read_manifest
+from simgen.base.strict_models import Strict, read_toml, validate
+from simgen.dataset.generation import generate
+from simgen.dataset.series import at_seeds, folder_of
+from simgen.spec.recipe import Recipe, load_recipe
 
 CORPUS = Path(__file__).with_name("corpus.toml")
 BUDGETS = "30 100 300 1000 3000 10000 300000"

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.timing import timed
-from pcii.demosaic import demosaic
-from pcii.geometry import disparity_px, nearest_shifts_px
-from pcii.photon_counts import PhotonCounts
-from pcii.reconstruct import reconstruct, reconstruct_each
-from pcii.types import CameraGrid, Views
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.geometry import disparity_px, nearest_shifts_px
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.demosaicing import demosaic
+from pcii.sections.reconstruction import reconstruct, reconstruct_each
 
 Z_MM = 540.0
 PLANES = 64

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from simgen.preview import write_preview
-from simgen.recipe import load_recipe
-from simgen.scene import load_scene
+from simgen.figures.preview_picture import write_preview
+from simgen.spec.recipe import load_recipe
+from simgen.spec.scene import load_scene
 
 DOCS = Path(__file__).resolve().parent
 SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"

@@ -13,8 +13,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 import pcii
-from pcii.picture import to_srgb8, white_level
-from pcii.score import object_masks
+from pcii.imaging.pictures import to_srgb8, white_level
+from pcii.metrics.scoring import object_masks
 
 WINDOW = np.s_[330:700, 180:850]
 

@@ -19,8 +19,8 @@ from matplotlib import pyplot as plt
 from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.removal import Entry, load_corpus
-from pcii.evaluation_plots import COLOURS, MARKERS
-from pcii.evaluation_tables import Table, markdown
+from pcii.evaluation.plots import COLOURS, MARKERS
+from pcii.evaluation.tables import Table, markdown
 
 Group = Mapping[str, Any]
 KINDS = ("paper", "textured", "untextured", "cluttered")

@@ -1,23 +1,25 @@
 """Photon-counted integral imaging: reconstruct, remove what is out of focus, score.
 
 Importing this package loads NumPy and nothing heavier: SciPy, Numba, Zarr and Matplotlib are imported
-inside the functions that need them. The imports below are eager because modules and the functions
-they are named for share names, and only an eager import leaves the function under that name.
+inside the functions that need them.
 """
 
 __version__ = "0.1.0"
 
-from pcii.dataset import Dataset, open_dataset
-from pcii.demosaic import demosaic
-from pcii.depth import estimate_depth
-from pcii.errors import InputError
-from pcii.evaluate import evaluate
-from pcii.photon_counts import PhotonCounts
-from pcii.reconstruct import reconstruct, reconstruct_each
-from pcii.score import score
-from pcii.segment import removal_methods, segment
-from pcii.three_step import ThreeStep
-from pcii.types import CameraGrid, DepthMap, Score, Sections, Segmented, Truth, Views
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.images import Sections, Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.depth.depth_map import estimate_depth
+from pcii.evaluation.comparison import evaluate
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.metrics.scoring import score
+from pcii.removal.methods import removal_methods, segment
+from pcii.removal.three_step.three_step_method import ThreeStep
+from pcii.sections.demosaicing import demosaic
+from pcii.sections.reconstruction import reconstruct, reconstruct_each
 
 __all__ = [
     "CameraGrid",

@@ -1,5 +1,6 @@
 """Physically based, photon-limited elemental images from recipes, with their truth."""
 
-from pcii import __version__
+from importlib.metadata import version
 
 __all__ = ["__version__"]
+__version__ = version("photon-integral-imaging")

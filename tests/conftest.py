@@ -11,8 +11,8 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture(scope="session")
 def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The dataset of data_recipes/small.toml: 6 x 6 views of 256 x 256, GRBG, with radiance."""
-    from simgen.generate import generate
-    from simgen.recipe import load_recipe
+    from simgen.dataset.generation import generate
+    from simgen.spec.recipe import load_recipe
 
     out = tmp_path_factory.mktemp("data") / "small"
     recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"))
@@ -23,8 +23,8 @@ def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """2 x 3 views of 64 x 60 with 400 photons each, of which 120 and 30 are kept as smaller budgets."""
-    from simgen.generate import generate
-    from simgen.recipe import Recipe
+    from simgen.dataset.generation import generate
+    from simgen.spec.recipe import Recipe
 
     recipe = TINY_RECIPE | {
         "seed": 5,

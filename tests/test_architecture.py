@@ -3,93 +3,78 @@
 import ast
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"mitsuba", "drjit", "colour"}
-# What simgen may share with pcii: nouns, masks, the file format and how commands behave. Not its
-# geometry or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
-SHARED = {
-    "pcii",
-    "pcii.types",
-    "pcii.photon_counts",
-    "pcii.bayer",
-    "pcii.errors",
-    "pcii.store",
-    "pcii.safe_files",
-    "pcii.sealed",
-    "pcii.zarr_groups",
-    "pcii.dataset",
-    "pcii.verify",
-    "pcii.console",
+# Each room leans only on those before it; a room within another counts by its own name.
+ROOMS = {
+    "pcii": [
+        "core",
+        "io",
+        "imaging",
+        "sections",
+        "evidence",
+        "depth",
+        "removal.three_step",
+        "removal.likelihood",
+        "removal",
+        "metrics",
+        "evaluation",
+        "app",
+    ],
+    "simgen": [
+        "base",
+        "spectral",
+        "spec",
+        "assets",
+        "cameras",
+        "renderer",
+        "sensor",
+        "truth",
+        "photons",
+        "dataset",
+        "check",
+        "figures",
+        "app",
+    ],
 }
-# Arrows run from the top of this list to the bottom, never back; what is on one line is one level.
-PCII_LEVELS = [
-    {"errors", "plain", "timing"},
-    {"brief", "pages"},
-    {"bayer", "cells", "safe_files", "console", "paired", "evaluation_tables", "evaluation_plots"},
-    {"sealed", "kernels"},
-    {"zarr_groups", "results_list"},
-    {
-        "types",
-        "dense_kernels",
-        "demosaic_kernels",
-        "prediction_kernels",
-        "label_kernels",
-        "outline_kernels",
-    },
-    {"photon_counts", "store", "manifest_schema", "focus_kernels", "layer_kernels"},
-    {"stored_radiance"},
-    {"geometry", "dataset", "verify", "demosaic", "picture", "hot_pixels"},
-    {"dense", "boundary"},
-    {"reconstruct", "planes", "foreground", "pieces"},
-    {"statistics", "edge_entropy"},
-    {"focus", "outline", "halves"},
-    {"regions", "layers"},
-    {"guesses"},
-    {"layer_search"},
-    {"duel"},
-    {"likelihood"},
-    {"three_step", "depth", "true_masks", "plugins"},
-    {"baselines", "agreement", "oracle", "depth_score"},
-    {"segment", "score"},
-    {"results", "measurements"},
-    {"pipeline", "summary"},
-    {"report", "evaluation_report"},
-    {"run", "evaluate"},
-    {"cli"},
-]
-SIMGEN_LEVELS = [
-    {"locations", "seeds", "srgb"},
-    {"backend", "schema", "asset_names", "triangles"},
-    {"textures", "areas", "spectra"},
-    {"shapes", "materials", "lights", "camera_grid"},
-    {"solids", "read_ply", "read_obj", "read_image", "paint"},
-    {"recipe", "scene", "filters", "asset_worker"},
-    {"assets"},
-    {"cameras", "shifts", "figures", "thumbnails", "build_shape", "build_colour"},
-    {"build_surface", "build_light"},
-    {"build", "detector", "exposure", "sensor"},
-    {"wavelengths", "prepared"},
-    {"targets"},
-    {"majorant", "paths", "render", "truth", "rays"},
-    {"candidates", "coverage", "visibility"},
-    {"lanes", "singles"},
-    {"pools"},
-    {"pilot"},
-    {"photons", "noise"},
-    {"counts", "truth_file", "unseen"},
-    {"facts", "resources"},
-    {"generate", "probe_scene", "check_sight", "check_depth", "check_photons", "check_cost"},
-    {"check", "preview", "sheet", "series"},
-    {"cli"},
-]
+# What simgen may share with pcii: types, masks, the file format and how commands behave. Not its geometry
+# or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
+SHARED_ROOMS = {"core", "io"}
+NOT_SHARED = {"pcii.core.geometry"}
+MOST_FILES, FEWEST_FILES = 14, 3
+LONGEST_FILE = 300
+# The removal method `likelihood` is to be replaced as a whole, and `depth` to be filled; so they stay as they
+# are.
+LONGER = {
+    "pcii.evidence.prediction_kernels",
+    "pcii.removal.likelihood.layers",
+    "pcii.sections.dense_kernels",
+    "simgen.dataset.generation",
+    "simgen.photons.majorant",
+    "simgen.photons.thinning",
+    "simgen.photons.wavefront_sampler",
+}
+SMALL_ROOMS = {"depth", "removal.three_step", "app", "spectral", "cameras"}
 
 
 def modules(package: str) -> dict[str, ast.Module]:
-    return {file.stem: ast.parse(file.read_text()) for file in sorted((ROOT / package).glob("*.py"))}
+    """Every module of a package by its dotted name; a package by its own."""
+    found: dict[str, ast.Module] = {}
+    for file in sorted((ROOT / package).rglob("*.py")):
+        name = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        found[name] = ast.parse(file.read_text())
+    return found
+
+
+def room_of(name: str) -> str:
+    """The room that a module is in, or that a package is; "" for the package at the root."""
+    parts = name.split(".")[1:]
+    return ".".join(parts if (ROOT / name.replace(".", "/")).is_dir() else parts[:-1])
 
 
 def imported(node: ast.AST) -> set[str]:
@@ -123,50 +108,101 @@ def test_pcii_never_imports_simgen_or_a_renderer() -> None:
 
 
 def test_simgen_takes_from_pcii_only_what_is_no_physics() -> None:
-    known = {f"pcii.{name}" for name in modules("pcii")}
+    known = set(modules("pcii")) - {"pcii"}
+    allowed = {name for name in known if room_of(name) in SHARED_ROOMS} - NOT_SHARED
     for name, tree in modules("simgen").items():
-        taken = all_imports(tree) & (known | {"pcii"})
-        assert taken <= SHARED, f"simgen.{name} imports {sorted(taken - SHARED)}"
+        taken = all_imports(tree) & known
+        assert taken <= allowed, f"{name} imports {sorted(taken - allowed)}"
+
+
+def test_what_simgen_shares_has_no_geometry_in_it() -> None:
+    trees = modules("pcii")
+    for name, tree in trees.items():
+        if room_of(name) in SHARED_ROOMS and name not in NOT_SHARED:
+            assert not all_imports(tree) & NOT_SHARED, name
 
 
 def test_the_renderer_is_loaded_in_one_file_inside_functions() -> None:
     for name, tree in modules("simgen").items():
         assert not roots(top_level_imports(tree)) & HEAVY, name
-        if name != "backend":
+        if name != "simgen.renderer.backend":
             assert not roots(all_imports(tree)) & {"mitsuba", "drjit"}, name
 
 
-@pytest.mark.parametrize(("package", "levels"), [("pcii", PCII_LEVELS), ("simgen", SIMGEN_LEVELS)])
-def test_arrows_run_one_way(package: str, levels: list[set[str]]) -> None:
-    rank = {name: number for number, level in enumerate(levels) for name in level}
+@pytest.mark.parametrize("package", ROOMS)
+def test_rooms_lean_on_those_before_them(package: str) -> None:
+    """Lazy imports count like others."""
     trees = modules(package)
-    trees.pop("__init__")
-    assert set(trees) == set(rank), "a module has no level, or a level no module"
+    rank = {room: number for number, room in enumerate(ROOMS[package])}
+    assert {room_of(name) for name in trees} == {"", *rank}
     for name, tree in trees.items():
-        used = {part for part in trees if f"{package}.{part}" in top_level_imports(tree)}
-        for other in used:
-            assert rank[other] < rank[name], f"{package}.{name} imports {package}.{other}"
+        for other in all_imports(tree) & set(trees):
+            here, there = room_of(name), room_of(other)
+            if here and there != here:
+                assert there, f"{name} imports the root"
+                assert rank[there] < rank[here], f"{name} imports {other}"
 
 
-def test_pages_are_made_in_one_file() -> None:
-    for package in ("pcii", "simgen"):
-        for name, tree in modules(package).items():
-            assert name == "pages" or not roots(all_imports(tree)) & {"jinja2", "markupsafe"}, name
+@pytest.mark.parametrize("package", ROOMS)
+def test_no_room_has_a_cycle(package: str) -> None:
+    trees = modules(package)
+    arrows = {
+        name: {
+            other for other in all_imports(tree) & set(trees) if other != name and other not in parents(name)
+        }
+        for name, tree in trees.items()
+    }
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as fault:
+        pytest.fail(f"cycle: {' -> '.join(fault.args[1])}")
 
 
-def test_importing_pcii_is_light() -> None:
+def parents(name: str) -> set[str]:
+    """The packages that a module is in: naming them in an import makes no arrow."""
+    parts = name.split(".")
+    return {".".join(parts[:end]) for end in range(1, len(parts))}
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_rooms_are_neither_crowded_nor_empty_and_list_their_files(package: str) -> None:
+    for room in ROOMS[package]:
+        folder = ROOT / package / room.replace(".", "/")
+        files = {file.stem for file in folder.glob("*.py")} - {"__init__"}
+        assert len(files) <= MOST_FILES, room
+        assert len(files) >= FEWEST_FILES or room in SMALL_ROOMS, room
+        listed = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
+        for name in files:
+            assert f"\n{name} " in listed, f"{room}/__init__.py does not list {name}"
+
+
+def test_files_are_short() -> None:
+    for package in ROOMS:
+        for name in modules(package):
+            file = ROOT / f"{name.replace('.', '/')}.py"
+            if file.is_file() and name not in LONGER:
+                assert len(file.read_text().splitlines()) <= LONGEST_FILE, name
+
+
+def test_no_module_shares_its_name_with_a_function() -> None:
+    """But for commands: they have the names that users type."""
+    for package in ROOMS:
+        trees = modules(package)
+        del trees[f"{package}.app.commands"]
+        leaves = {name.split(".")[-1] for name in trees}
+        for name, tree in trees.items():
+            own = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+            assert not own & leaves, f"{name}: {sorted(own & leaves)}"
+
+
+def test_importing_pcii_loads_no_renderer_and_no_compiler() -> None:
     script = (
-        "import sys, time; start = time.perf_counter(); import pcii;"
-        "spent = time.perf_counter() - start;"
-        "print(spent, *[m for m in ('mitsuba', 'drjit', 'colour', 'numba', 'simgen') if m in sys.modules])"
+        "import sys, pcii;"
+        "heavy = ('mitsuba', 'drjit', 'colour', 'numba', 'pydantic', 'zarr', 'simgen');"
+        "print(*[m for m in heavy if m in sys.modules])"
     )
-    best = min(
-        (subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout)
-        for _ in range(3)
-    )
-    seconds, *loaded = best.split()
-    assert loaded == []
-    assert float(seconds) < 0.5
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 def test_pcii_offers_the_names_that_users_rely_on() -> None:

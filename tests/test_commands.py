@@ -10,10 +10,10 @@ import pytest
 import zarr
 from PIL import Image
 
-from pcii import cli as pcii_cli
-from pcii import console
-from pcii.store import MANIFEST
-from simgen import cli as simgen_cli
+from pcii.app import commands as pcii_cli
+from pcii.core import console
+from pcii.io.dataset_layout import MANIFEST
+from simgen.app import commands as simgen_cli
 
 pytestmark = pytest.mark.renders
 
@@ -277,7 +277,7 @@ def test_a_failure_is_one_line_and_exit_code_1(
     def full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pcii.results.Results.save_sections", full_disk)
+    monkeypatch.setattr("pcii.app.results.Results.save_sections", full_disk)
     command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
     assert console.run(pcii_cli.app, command) == 1
     assert "No space left" in capsys.readouterr().err

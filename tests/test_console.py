@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 from cyclopts import App
 
-from pcii import cli as pcii_cli
-from pcii import console
-from pcii.store import MARKER
-from simgen import cli as simgen_cli
+from pcii.app import commands as pcii_cli
+from pcii.core import console
+from pcii.io.dataset_layout import MARKER
+from simgen.app import commands as simgen_cli
 
 
 def at_a_terminal(command: list[str], **settings: str) -> tuple["subprocess.Popen[bytes]", int]:
@@ -46,7 +46,7 @@ def all_said(controller: int) -> str:
 def generating(out: Path, samples: int) -> list[str]:
     """A command line for a process that heeds Ctrl-C, whoever started this one."""
     script = "import signal, sys; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    script += "from simgen.cli import main; sys.exit(main())"
+    script += "from simgen.app.commands import main; sys.exit(main())"
     return [
         *(sys.executable, "-c", script, "generate", "small", "-o", str(out)),
         *("--set", f"render.samples_per_pixel={samples}", "--set", "grid.rows=2"),
@@ -153,7 +153,7 @@ def test_of_an_unfinished_dataset_the_way_on_is_told(
 
 
 LOOPS = """
-from pcii.kernels import helper
+from pcii.core.compiled_loops import helper
 
 @helper
 def double(number):
@@ -162,7 +162,7 @@ def double(number):
 WORKS = """
 import sys
 from cyclopts import App
-from pcii import console
+from pcii.core import console
 
 app = App()
 

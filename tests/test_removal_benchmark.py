@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.drawn import KINDS, write_drawn
 from benchmarks.removal import Entry, by_half_and_kind, drawn_corpus, load_corpus, report, work_list
-from pcii.errors import InputError
-from simgen.recipe import load_recipe
-from simgen.scene import load_scene
+from pcii.core.errors import InputError
+from simgen.spec.recipe import load_recipe
+from simgen.spec.scene import load_scene
 
 
 def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, patch_views, square_mask, unit_grid
 
-from pcii.photon_counts import PhotonCounts
-from pcii.types import CameraGrid
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_counts import PhotonCounts
 
 
 class TwoSquares(NamedTuple):

@@ -13,12 +13,10 @@ import time
 from pathlib import Path
 from typing import Any
 
-import numcodecs.zstd
-
-from pcii.dataset import open_dataset
-from pcii.errors import InputError
-from pcii.sealed import list_files
-from pcii.store import COUNTS, MANIFEST, PHOTON_TRUTH, RADIANCE, TRUTH, write_manifest
+from pcii.core.errors import InputError
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, RADIANCE, TRUTH, write_manifest
+from pcii.io.sealed_json import list_files
 
 HUGE_TEXT = "x" * 100_000
 VALUES: list[Any] = [
@@ -88,7 +86,7 @@ def make_hostile(root: Path, rng: random.Random) -> str:
         if kind == "metadata":
             path.write_text(json.dumps(mutated(json.loads(path.read_text()), rng)))
         elif kind == "bomb":
-            path.write_bytes(bytes(numcodecs.zstd.Zstd().encode(bytes(1 << rng.randrange(31)))) + b"crc.")
+            path.write_bytes(bomb(1 << rng.randrange(31)))
         else:
             content = bytearray(path.read_bytes())
             for _ in range(rng.choice((1, 1, 3, 30))):
@@ -98,6 +96,16 @@ def make_hostile(root: Path, rng: random.Random) -> str:
         kind = f"{kind} {path.relative_to(root)}"
     write_manifest(root, {**manifest, "files": files_too})
     return kind
+
+
+def bomb(size: int) -> bytes:
+    """A chunk of one zstd frame (RFC 8878) of so many zeros, of which four bytes tell 128 KiB."""
+    most = 1 << 17
+    blocks = [most] * (size // most) + [size % most] * (size % most > 0)
+    frame = b"\x28\xb5\x2f\xfd\xa0" + size.to_bytes(4, "little")
+    for number, length in enumerate(blocks, start=1):
+        frame += ((number == len(blocks)) | 1 << 1 | length << 3).to_bytes(3, "little") + b"\0"
+    return frame + b"crc."
 
 
 def read_all(root: Path) -> None:

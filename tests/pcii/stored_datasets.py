@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.errors import InputError
-from pcii.sealed import list_files
-from pcii.store import (
+from pcii.core.errors import InputError
+from pcii.io.dataset_layout import (
     COUNTS,
     COUNTS_LABELS,
     PHOTON_TRUTH,
@@ -22,7 +21,8 @@ from pcii.store import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.zarr_groups import write_arrays_safely
+from pcii.io.sealed_json import list_files
+from pcii.io.zarr_groups import write_arrays_safely
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)

@@ -5,12 +5,13 @@ import itertools
 import numpy as np
 import pytest
 
-from pcii.depth import estimate_depth
-from pcii.halves import FALSE_RATE
-from pcii.photon_counts import PhotonCounts
-from pcii.score import score
-from pcii.segment import segment
-from pcii.types import CameraGrid, Truth
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.depth.depth_map import estimate_depth
+from pcii.evidence.half_agreement import FALSE_RATE
+from pcii.metrics.scoring import score
+from pcii.removal.methods import segment
 
 Z_MM, RANGE_MM = (150.0, 250.0), (100.0, 400.0)  # 18 to 4.5 px of disparity: with 5 x 5 views a film wide
 SIZES = [(1, 1), (2, 3), (7, 90), (64, 7), (14, 10), (33, 5), (64, 72)]

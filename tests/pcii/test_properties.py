@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.bayer import PATTERNS
-from pcii.photon_counts import PhotonCounts
-from pcii.reconstruct import reconstruct
-from pcii.types import CameraGrid, Sections
+from pcii.core.bayer import PATTERNS
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Sections
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.reconstruction import reconstruct
 
 pytestmark = pytest.mark.parametrize("number", [400, pytest.param(10_000, marks=pytest.mark.slow)])
 

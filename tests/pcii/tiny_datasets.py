@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 from twins import unit_grid
 
-from pcii.photon_counts import PhotonCounts
-from pcii.reconstruct import reconstruct
-from pcii.sealed import list_files
-from pcii.store import COUNTS, COUNTS_LABELS, TRUTH, TRUTH_LABELS, nested_name, write_manifest
-from pcii.types import Segmented
-from pcii.zarr_groups import write_arrays_safely
+from pcii.core.estimates import Segmented
+from pcii.core.photon_counts import PhotonCounts
+from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, TRUTH, TRUTH_LABELS, nested_name, write_manifest
+from pcii.io.sealed_json import list_files
+from pcii.io.zarr_groups import write_arrays_safely
+from pcii.sections.reconstruction import reconstruct
 
 GRID = unit_grid(2, 2, 8, 12, pitch_mm=(10.0, 10.0))
 Z_MM = (1.0, 2.0)  # 10 and 5 px of disparity: 2.5 px of blur at the other's depth

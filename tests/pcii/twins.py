@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from pcii.bayer import mosaic
-from pcii.types import CameraGrid
+from pcii.core.bayer import mosaic
+from pcii.core.camera_grid import CameraGrid
 
 
 def unit_grid(

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from simgen import backend
-from simgen.build import Built, build
-from simgen.scene import Scene
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.spec.scene import Scene
 
 DEPTH = 3
 """Bounces of a path."""
@@ -30,7 +30,7 @@ def ball(name: str, x_mm: float, z_mm: float, colour: tuple[float, float, float]
     }
 
 
-def lit(objects: list[dict], lights: Sequence[dict] = (LAMP, EVENLY)) -> Built:
+def lit(objects: list[dict], lights: Sequence[dict] = (LAMP, EVENLY)) -> RenderScene:
     """The objects before a dim wall."""
     values = {
         "title": "test",
@@ -41,6 +41,6 @@ def lit(objects: list[dict], lights: Sequence[dict] = (LAMP, EVENLY)) -> Built:
     return build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
 
 
-def two_balls(lights: Sequence[dict] = (LAMP, EVENLY)) -> Built:
+def two_balls(lights: Sequence[dict] = (LAMP, EVENLY)) -> RenderScene:
     balls = ball("red", -130.0, 600.0, (0.9, 0.2, 0.1)), ball("blue", 150.0, 700.0, (0.1, 0.3, 0.9))
     return lit(list(balls), lights)

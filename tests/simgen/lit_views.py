@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.bayer import colour_index, mosaic
-from pcii.store import write_exr_safely
-from pcii.types import CameraGrid
-from simgen import backend
-from simgen.build import Built, build
-from simgen.candidates import Setup
-from simgen.photons import PhotonList, draw_photons
-from simgen.recipe import Photons, Recipe
-from simgen.render import render_view
-from simgen.scene import Scene
-from simgen.sensor import sensitivities
+from pcii.core.bayer import colour_index, mosaic
+from pcii.core.camera_grid import CameraGrid
+from pcii.io.dataset_layout import write_exr_safely
+from simgen.photons.candidates import Setup
+from simgen.photons.thinning import PhotonList, draw_photons
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.radiance import render_view
+from simgen.sensor.mosaic import sensitivities
+from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.scene import Scene
 
 CAMERA = "Nikon 5100 (NPL)"
 SCALAR = backend.choose().kind == "scalar"
@@ -51,7 +51,7 @@ def made(
     max_depth: int = 2,
     folder: Path = Path(),
     **more: Any,
-) -> Built:
+) -> RenderScene:
     values = {"title": "test", "objects": list(objects), "lights": list(lights), **more}
     mi, curves = backend.load(spectral=spectral), None
     if spectral:
@@ -61,18 +61,18 @@ def made(
     return build(mi, Scene.model_validate(values), folder, max_depth, curves)
 
 
-def white(built: Built) -> np.ndarray:
+def white(built: RenderScene) -> np.ndarray:
     """What pixels of each colour see of a luminance of 1 of the scene's light, (3,)."""
     return np.ones(3) if built.filters is None else built.filters.white
 
 
-def seen(built: Built, grid: CameraGrid, samples: int, seed: int = 1) -> np.ndarray:
+def seen(built: RenderScene, grid: CameraGrid, samples: int, seed: int = 1) -> np.ndarray:
     """Radiance (H, W, 3), float64, of which 1 is that of the scene's light at luminance 1."""
     view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=seed)
     return view.astype(np.float64) / white(built)
 
 
-def thinned(built: Built, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1) -> PhotonList:
+def thinned(built: RenderScene, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1) -> PhotonList:
     """Photons, `gain` for each unit of radiance."""
     setup = Setup(built, grid, "GRBG", max_depth)
     photons = Photons(scope="exposure")

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from pcii.types import CameraGrid
-from simgen import backend
-from simgen.build import Built, build
-from simgen.scene import Scene
+from pcii.core.camera_grid import CameraGrid
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.spec.scene import Scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
 
 
-def built(folder: Path, objects: list[dict], *, backdrop_mm: float | None = 3000.0) -> Built:
+def built(folder: Path, objects: list[dict], *, backdrop_mm: float | None = 3000.0) -> RenderScene:
     values: dict = {"title": "test", "objects": objects, "lights": [LIGHT]}
     if backdrop_mm is not None:
         values["backdrop"] = {"z_mm": backdrop_mm}

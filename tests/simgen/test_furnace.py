@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, thinned, white
 
-from pcii.bayer import colour_index
-from simgen import backend
+from pcii.core.bayer import colour_index
+from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVERYWHERE = {"type": "uniform", "luminance_cd_m2": 1.0}

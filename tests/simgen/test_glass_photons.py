@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, in_scalar_mode, seen, sky, surprise, thinned
 
-from simgen.build import Built
+from simgen.renderer.mitsuba_scene import RenderScene
 
 pytestmark = pytest.mark.renders
 DEPTH = 8
@@ -53,7 +53,7 @@ def test_photons_through_glass_are_those_of_rendered_views(light: str, depth: in
     pixels = np.linspace(1.6, 0.4, 16)[:, None, None] * np.ones((16, 32, 3))
     lamp = EVENLY if light == "uniform" else sky(tmp_path, pixels)
 
-    def made(objects: Sequence[dict[str, Any]], max_depth: int) -> Built:
+    def made(objects: Sequence[dict[str, Any]], max_depth: int) -> RenderScene:
         return lit_views.made(objects, [lamp], max_depth=max_depth, folder=tmp_path)
 
     built = made([BEHIND, BALL, PANE], max_depth=depth)

@@ -11,10 +11,11 @@ import OpenEXR
 import pytest
 from hostile_files import BOMB, animation, binary_ply, chunk, obj, picture, ply, png, scene_toml
 
-from pcii.errors import InputError
-from simgen import asset_worker, assets
-from simgen.assets import read_assets, read_environment
-from simgen.scene import load_scene
+from pcii.core.errors import InputError
+from simgen.assets import asset_files as assets
+from simgen.assets import asset_worker
+from simgen.assets.asset_files import read_assets, read_environment
+from simgen.spec.scene import load_scene
 
 LIMIT_S = 2.0
 
@@ -267,7 +268,7 @@ def test_dots_in_a_description_are_no_deep_key(tmp_path: Path) -> None:
 # Faults of a decoder, planted where it is called.
 _PLANTED = """
 import os, sys
-from simgen import asset_worker
+from simgen.assets import asset_worker
 def planted(kind, path):
     %s
     yield
@@ -322,8 +323,16 @@ def test_the_working_directorys_code_is_not_run(tmp_path: Path, monkeypatch: pyt
 @pytest.mark.parametrize("name", ["thing.ply", "thing.png"])
 def test_the_command_leaves_with_2_and_one_line(name: str, tmp_path: Path) -> None:
     scene_with(tmp_path, name, b"nonsense")
-    command = [sys.executable, "-m", "simgen.cli", "preview", str(tmp_path), "-o", str(tmp_path / "x.png")]
-    script = "import sys; from simgen.cli import main; sys.exit(main())"
+    command = [
+        sys.executable,
+        "-m",
+        "simgen.app.commands",
+        "preview",
+        str(tmp_path),
+        "-o",
+        str(tmp_path / "x.png"),
+    ]
+    script = "import sys; from simgen.app.commands import main; sys.exit(main())"
     command = [sys.executable, "-c", script, *command[3:]]
     run = subprocess.run(command, capture_output=True, text=True)
     assert run.returncode == 2

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from lit_views import made
 
-from pcii.dataset import open_dataset
-from simgen import seeds
-from simgen.candidates import Setup
-from simgen.generate import generate
-from simgen.photons import draw_photons
-from simgen.recipe import Grid, Photons, Recipe
+from pcii.io.dataset import open_dataset
+from simgen.base import random_streams as seeds
+from simgen.dataset.generation import generate
+from simgen.photons.candidates import Setup
+from simgen.photons.thinning import draw_photons
+from simgen.spec.recipe import Grid, Photons, Recipe
 
 pytestmark = pytest.mark.renders
 SIDE, VIEWS = 64, 100

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
 
-from pcii.errors import InputError
-from simgen import backend
-from simgen.srgb import LUMINANCE, srgb_to_linear
+from pcii.core.errors import InputError
+from simgen.base.srgb import LUMINANCE, srgb_to_linear
+from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GREY = 0.6

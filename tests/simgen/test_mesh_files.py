@@ -9,11 +9,11 @@ import pytest
 from hostile_files import chunk, ply, scene_toml
 from PIL import Image
 
-from simgen.assets import Assets, read_assets, srgb_to_linear
-from simgen.read_obj import read_obj
-from simgen.read_ply import read_ply
-from simgen.scene import load_scene
-from simgen.triangles import Triangles
+from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
+from simgen.assets.obj_files import read_obj
+from simgen.assets.ply_files import read_ply
+from simgen.assets.triangles import Triangles
+from simgen.spec.scene import load_scene
 
 # A roof: a square and a triangle that share two corners.
 POINTS = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]], np.float32)

@@ -9,15 +9,16 @@ import pytest
 from PIL import Image
 from tiny import TINY_RECIPE
 
-from pcii import console
-from pcii.dataset import open_dataset
-from pcii.photon_counts import PhotonCounts
-from pcii.types import CameraGrid, Views
-from simgen import cli
-from simgen.figures import draw_depth, draw_objects, new_figure, part_of_interest, spread_out
-from simgen.generate import generate
-from simgen.recipe import Recipe
-from simgen.thumbnails import count_tiles, evenly_chosen, joined, radiance_tiles
+from pcii.core import console
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.io.dataset import open_dataset
+from simgen.app import commands as cli
+from simgen.dataset.generation import generate
+from simgen.figures.picture_parts import draw_depth, draw_objects, new_figure, part_of_interest, spread_out
+from simgen.figures.thumbnails import count_tiles, evenly_chosen, joined, radiance_tiles
+from simgen.spec.recipe import Recipe
 
 
 def picture(path: Path) -> np.ndarray:
@@ -91,7 +92,7 @@ def test_a_folder_that_may_not_be_written_is_told(
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("simgen.figures.write_bytes_safely", refuse)
+    monkeypatch.setattr("simgen.figures.picture_parts.write_bytes_safely", refuse)
     out = str(tmp_path / "x.png")
     assert console.run(cli.app, ["preview", "two_objects", "-o", out, "--samples-per-pixel", "1"]) == 2
     assert "cannot be written here (Permission denied)" in capsys.readouterr().err
@@ -202,7 +203,7 @@ def test_joined_tiles_stand_in_the_cameras_order() -> None:
 
 
 def test_a_sheet_names_its_cameras_and_photons(nested_dataset: Path) -> None:
-    from simgen.sheet import facts
+    from simgen.figures.contact_sheet import facts
 
     dataset = open_dataset(nested_dataset)
     cameras, light = facts(dataset, dataset.counts)

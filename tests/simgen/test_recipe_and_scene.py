@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from pcii.errors import InputError
-from simgen.recipe import Recipe, load_recipe
-from simgen.scene import Scene, load_scene, scene_names
-from simgen.schema import validate
+from pcii.core.errors import InputError
+from simgen.base.strict_models import validate
+from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.scene import Scene, load_scene, scene_names
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 

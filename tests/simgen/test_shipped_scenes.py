@@ -12,18 +12,18 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from simgen import backend
-from simgen.build import build
-from simgen.camera_grid import Grid
-from simgen.lights import Light
-from simgen.materials import Finish, Spectrum
-from simgen.probe_scene import coarser
-from simgen.recipe import load_recipe
-from simgen.scene import Scene, load_scene
-from simgen.shapes import Shape
-from simgen.targets import load_target
-from simgen.textures import Texture
-from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view
+from simgen.check.scene_probe import coarser
+from simgen.check.targets import load_target
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.spec.camera_grid import Grid
+from simgen.spec.lights import Light
+from simgen.spec.materials import Finish, Spectrum
+from simgen.spec.recipe import load_recipe
+from simgen.spec.scene import Scene, load_scene
+from simgen.spec.shapes import Shape
+from simgen.spec.textures import Texture
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted(file.parent.name for file in (ROOT / "scenes").glob("*/scene.toml"))
@@ -87,8 +87,8 @@ def test_a_scene_says_what_it_is_for(name: str) -> None:
 
 
 def kinds(union: Any) -> set[str]:
-    members = get_args(get_args(union)[0]) or get_args(union)  # with and without Annotated
-    return {member.model_fields["type"].default for member in members}
+    nested_subset = get_args(get_args(union)[0]) or get_args(union)  # with and without Annotated
+    return {member.model_fields["type"].default for member in nested_subset}
 
 
 def test_the_scenes_show_all_that_scenes_can_hold() -> None:

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from lit_scenes import LAMP, ball
 
-from pcii.bayer import colour_index
-from simgen import backend
-from simgen.build import Built, build
-from simgen.candidates import Setup
-from simgen.counts import absolute_gain
-from simgen.exposure import PHOTONS_PER_LUMEN_SECOND
-from simgen.photons import draw_photons
-from simgen.recipe import Photons, Recipe
-from simgen.render import render_view
-from simgen.scene import Scene
-from simgen.sensor import sensitivities
-from simgen.spectra import patch_names
+from pcii.core.bayer import colour_index
+from simgen.photons.candidates import Setup
+from simgen.photons.photon_counting import absolute_gain
+from simgen.photons.thinning import draw_photons
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.radiance import render_view
+from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND
+from simgen.sensor.mosaic import sensitivities
+from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.scene import Scene
+from simgen.spectral.spectra import patch_names
 
 pytestmark = [
     pytest.mark.renders,
@@ -55,7 +55,7 @@ def recipe(camera: str | None, **changes: Any) -> Recipe:
     return Recipe.model_validate(values | changes)
 
 
-def chart(lamp: str, camera: str | None) -> tuple[Built, Recipe]:
+def chart(lamp: str, camera: str | None) -> tuple[RenderScene, Recipe]:
     """A ColorChecker that fills the view, each patch `SIDE_PX` pixels wide, evenly lit by `LUX`."""
     side_mm = SIDE_PX * PIXEL_MM * 500 / 50
     cards = [

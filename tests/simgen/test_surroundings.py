@@ -9,11 +9,12 @@ import pytest
 from lit_scenes import ball
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
 
-from pcii.errors import InputError
-from simgen import backend, paths
-from simgen.lights import EnvironmentLight
-from simgen.scene import Scene
-from simgen.schema import validate
+from pcii.core.errors import InputError
+from simgen.base.strict_models import validate
+from simgen.renderer import backend
+from simgen.renderer import path_tracing as paths
+from simgen.spec.lights import EnvironmentLight
+from simgen.spec.scene import Scene
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 EVENLY = {"type": "uniform", "luminance_cd_m2": 1.0}

@@ -6,16 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.errors import InputError
-from simgen import backend
-from simgen.build import build
-from simgen.generate import generate
-from simgen.paint import paint
-from simgen.recipe import Grid, Recipe
-from simgen.render import render_view
-from simgen.scene import Scene, load_scene
-from simgen.schema import validate
-from simgen.textures import Checks, Edge, Noise, Star, Stripes, Text
+from pcii.core.errors import InputError
+from simgen.assets.texture_pixels import paint
+from simgen.base.strict_models import validate
+from simgen.dataset.generation import generate
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.renderer.radiance import render_view
+from simgen.spec.recipe import Grid, Recipe
+from simgen.spec.scene import Scene, load_scene
+from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text
 
 
 def scene_of(texture: Any) -> dict[str, Any]:

@@ -10,14 +10,17 @@ import numpy as np
 import pytest
 from plain_scenes import built, card, grid, sphere
 
-from pcii.geometry import project_px
-from pcii.score import pixel_masks
-from pcii.types import CameraGrid, Truth
-from simgen import backend, cameras, visibility
-from simgen.cameras import as_rig, centre_camera
-from simgen.coverage import SAMPLES, coverage
-from simgen.truth import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
-from simgen.visibility import visible_views
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.geometry import project_px
+from pcii.core.truth import Truth
+from pcii.metrics.scoring import pixel_masks
+from simgen.cameras import rig as cameras
+from simgen.cameras.rig import as_rig, centre_camera
+from simgen.renderer import backend
+from simgen.truth import visibility
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
+from simgen.truth.pixel_coverage import SAMPLES, coverage
+from simgen.truth.visibility import visible_views
 
 pytestmark = pytest.mark.renders
 WHITE = {"reflectance": [1, 1, 1]}

@@ -1,0 +1,295 @@
+"""The `pcii` command."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Parameter
+
+from pcii.app.results import Results
+from pcii.core import console
+from pcii.core.console import Stages, say
+from pcii.io.dataset import Dataset, open_dataset
+
+app = App(
+    name="pcii",
+    help="Reconstruct photon-counted integral images, remove what is out of focus, and score it.",
+    version=lambda: version("photon-integral-imaging"),
+)
+
+Out = Annotated[Path, Parameter(name=("--out", "-o"))]
+Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
+
+
+Subpixel = Annotated[int, Parameter(converter=console.whole)]
+Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
+Budget = Annotated[
+    float | None,
+    Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),
+]
+
+
+def _open(dataset: Path, budget: float | None) -> Dataset:
+    data = open_dataset(dataset)
+    return data if budget is None else data.at_budget(budget)
+
+
+@app.command
+def run(
+    dataset: Path, *, out: Out, z_mm: Depths = (), method: tuple[str, ...] = (), budget: Budget = None
+) -> None:
+    """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
+
+    Example:  pcii run out/paper -o out/paper-results
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder, as made by `simgen generate`.
+    out
+        Folder for the results: new, empty, or that of earlier results of the same dataset.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    method
+        A removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
+    """
+    from pcii.app.single_run import run as run_all
+    from pcii.removal.methods import DEFAULT_METHODS
+
+    with Stages() as report:
+        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or DEFAULT_METHODS)
+    for row in outcome.score.planes:
+        if row["truth"] == "object" and row["iou"] is not None:
+            say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
+    say(f"report: {out / 'report.html'}")
+
+
+@app.command
+def reconstruct(
+    dataset: Path,
+    *,
+    out: Out,
+    z_mm: Depths = (),
+    subpixel: Subpixel = 1,
+    shifts: Literal["nearest", "even"] = "nearest",
+    budget: Budget = None,
+) -> None:
+    """Reconstruct sections from the photon counts, with a picture of each.
+
+    Example:  pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    subpixel
+        Divide each pixel into this many voxels per axis.
+    shifts
+        `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
+    """
+    from pcii.imaging.pictures import to_srgb8, white_level, write_png
+    from pcii.io.suggested_depths import planes_of
+    from pcii.sections.demosaicing import demosaic
+    from pcii.sections.reconstruction import reconstruct as make
+
+    data = _open(dataset, budget)
+    sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
+    with Results(out, data).writing() as results:
+        say(f"{results.save_sections(sections)}")
+        for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
+            if sections.cfa is not None:
+                estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
+            picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))
+            with results.replacing(f"section_{z:g}mm.png") as path:
+                write_png(path, picture)
+            say(f"{out / path.name}")
+
+
+@app.command
+def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
+    """Map the depth of every pixel of the virtual centre, with a picture.
+
+    Example:  pcii depth out/paper -o out/depth
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    """
+    from pcii.depth.depth_map import estimate_depth
+    from pcii.imaging.pictures import depth_image, write_png
+    from pcii.io.suggested_depths import depth_range_of
+
+    data = _open(dataset, budget)
+    z_range = depth_range_of(data)
+    found = estimate_depth(data.counts, z_range)
+    with Results(out, data).writing() as results:
+        say(f"{results.save_depth(found)}")
+        with results.replacing("depth.png") as path:
+            write_png(path, depth_image(found.z_mm, *z_range))
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm yellow to {z_range[1]:g} mm violet, black no answer")
+
+
+@app.command
+def segment(
+    dataset: Path,
+    *,
+    out: Out,
+    z_mm: Depths = (),
+    method: str = "likelihood",
+    without: Without = (),
+    subpixel: Subpixel = 1,
+    budget: Budget = None,
+) -> None:
+    """Remove defocused points from sections, with a picture of each mask.
+
+    Example:  pcii segment out/paper --z-mm 540 --method three-step -o out/removed
+
+    Example:  pcii segment out/paper --method three-step --without entropy --subpixel 2 -o out/removed
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the results.
+    z_mm
+        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+    method
+        three-step (the paper's), likelihood (Poisson), brightness, variance or shape-from-focus (to compare
+        with), or a method that an installed package brings.
+    without
+        Leave out one of the three steps; repeat for more.
+    subpixel
+        Find the outlines of the three steps on this many voxels per pixel and axis.
+    """
+    from pcii.core.errors import InputError
+    from pcii.imaging.pictures import mask_image, write_png
+    from pcii.io.suggested_depths import planes_of
+    from pcii.removal.methods import find_method
+    from pcii.removal.methods import segment as remove
+    from pcii.removal.three_step.three_step_method import ThreeStep
+
+    if method != "three-step" and (without or subpixel != 1):
+        option = "--without" if without else "--subpixel"
+        raise InputError(f"{option}: is for --method three-step, not {method}")
+    chosen = find_method(method)
+    if method == "three-step":
+        chosen = ThreeStep(subpixel, **dict.fromkeys(without, False))
+    data = _open(dataset, budget)
+    focus = remove(data.counts, planes_of(data, z_mm), method=chosen)
+    with Results(out, data).writing() as results:
+        say(f"{results.save_segmented(focus)}")
+        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
+            with results.replacing(f"in_focus_{focus.method}_{z:g}mm.png") as path:
+                write_png(path, mask_image(mask))
+            say(f"{out / path.name}: {mask.mean():.2%} of the section in focus")
+
+
+@app.command
+def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
+    """Compare the results in a folder with the dataset's truth; writes score.json there.
+
+    Example:  pcii score out/paper out/paper-results
+
+    Parameters
+    ----------
+    dataset
+        The dataset folder, with truth.
+    out
+        The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
+    """
+    from pcii.app.pipeline import full_light_sections
+    from pcii.core.arrays import check_z_mm
+    from pcii.core.errors import InputError
+    from pcii.metrics.scoring import score as compare
+
+    data = _open(dataset, budget)
+    if not out.is_dir():
+        raise InputError(f"{out}: there is no such folder of results")
+    results = Results(out, data)
+    results.check()
+    focus, found = results.load_segmented(), results.load_depth()
+    if not focus and found is None:
+        steps = "`pcii segment`, `pcii depth` or `pcii run`"
+        raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
+    z_mm = focus[0].z_mm if focus else data.analysis.get("z_mm")
+    knows = data.truth is not None and z_mm is not None
+    with Stages() as report:
+        light = full_light_sections(data, check_z_mm(z_mm), report) if knows else None
+    result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
+    with results.writing():
+        say(f"{results.save_score(result)}")
+
+
+@app.command
+def evaluate(
+    datasets: Annotated[tuple[Path, ...], Parameter(negative=())],
+    *,
+    out: Out,
+    method: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+    budget: Annotated[tuple[float, ...], Parameter(negative=())] = (),
+    part: str = "1/1",
+) -> None:
+    """Compare methods over datasets and photon budgets, with intervals over seeds; run again to go on.
+
+    Writes evaluation.json, evaluation.html and evaluation.md, and rows.jsonl as it goes.
+
+    Examples:
+
+        pcii evaluate out/twenty -o out/compared
+
+        pcii evaluate out/twenty out/slats -o out/compared --method likelihood --budget 300 --part 1/2
+
+    Parameters
+    ----------
+    datasets
+        Dataset folders, or folders of such, as made by `simgen generate --seeds`.
+    out
+        Folder for the evaluation: new, empty, or that of an earlier one, which is added to.
+    method
+        A method of removal, or "depth"; may be repeated. Default: all.
+    budget
+        A photon budget that every dataset has; may be repeated. Default: all that each has.
+    part
+        i/n: measure only every n-th dataset from the i-th on, so that n processes share one OUT.
+    """
+    from pcii.evaluation.comparison import evaluate as compare
+    from pcii.evaluation.comparison import part_of
+
+    with Stages() as report:
+        result = compare(datasets, out, methods=method, budgets=budget, part=part_of(part), report=report)
+    if result["missing"]:
+        say(f"{result['missing']} rows are still to be measured, by other parts")
+    say(f"report: {out / 'evaluation.html'}")
+
+
+@app.command
+def verify(folder: Path) -> None:
+    """Compare every file of a dataset, or of a folder of results, with its manifest.
+
+    Names what is missing, truncated or changed, and what the manifest does not list.
+
+    Example:  pcii verify out/paper-results
+
+    Parameters
+    ----------
+    folder
+        A dataset folder, or one of results.
+    """
+    from pcii.io.verification import verify as compare
+
+    with Stages() as report:
+        count = compare(folder, report)
+    say(f"{folder}: {count} files match the manifest")
+
+
+def main() -> int:
+    """Entry point of the `pcii` command."""
+    return console.run(app, resuming=("evaluate",))

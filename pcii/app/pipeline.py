@@ -1,0 +1,103 @@
+"""The method from dataset to score, in the order of the paper's sections 2 and 3."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pcii.core.console import Report, silent
+from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.images import ArrayLike5D, Sections, Views
+from pcii.depth.depth_map import estimate_depth
+from pcii.io.dataset import Dataset
+from pcii.io.suggested_depths import depth_range_of, planes_of
+from pcii.metrics.scoring import score
+from pcii.removal.methods import DEFAULT_METHODS, segment
+from pcii.sections.reconstruction import reconstruct
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that a run of the method on one dataset gives."""
+
+    dataset: Dataset
+    full_light: Sections | None
+    """Eq. 2, where the dataset has radiance."""
+    sections: Sections
+    """Eq. 3, from the photon counts."""
+    focus: tuple[Segmented, ...]
+    depth: DepthMap
+    score: Score
+    timings_s: dict[str, float] = field(default_factory=dict)
+
+
+def analyse(
+    dataset: Dataset,
+    z_mm: Sequence[float] | None,
+    report: Report = silent,
+    methods: Sequence[str] = DEFAULT_METHODS,
+) -> Outcome:
+    """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
+
+    `z_mm` defaults to the depths that the dataset's recipe names. Raises `InputError` where there
+    are none, no counts, or no method of such a name.
+    """
+    methods = tuple(dict.fromkeys(methods))
+    seconds: dict[str, float] = {}
+    z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
+    counts = dataset.counts
+    total = 4 + len(methods)
+    done = 0
+
+    def finished(name: str, start: float) -> None:
+        nonlocal done
+        done += 1
+        seconds[name] = round(time.perf_counter() - start, 3)
+        report("analysis", done, total)
+
+    start = time.perf_counter()
+    full_light = full_light_sections(dataset, z, report)
+    finished("sections at full light", start)
+
+    start = time.perf_counter()
+    sections = reconstruct(counts, z)
+    finished("sections", start)
+
+    focus: list[Segmented] = []
+    for method in methods:
+        start = time.perf_counter()
+        focus.append(segment(counts, z, method=method))
+        finished(f"removal, {method}", start)
+
+    start = time.perf_counter()
+    depth = estimate_depth(counts, z_range)
+    finished("depth", start)
+
+    start = time.perf_counter()
+    result = score(focus, depth, dataset.truth, full_light=full_light, dataset=dataset.name)
+    finished("score", start)
+    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
+
+
+def full_light_sections(dataset: Dataset, z: np.ndarray, report: Report = silent) -> Sections | None:
+    """Sections of the radiance at the depths z (Eq. 2); None if the dataset has none."""
+    views = dataset.views
+    if views is None:
+        return None
+    counted = _Counted(views.radiance, views.grid.view_count, report)
+    return reconstruct(Views(counted, views.grid, views.cfa), z)
+
+
+class _Counted:
+    """Radiance that reports each view as it is read."""
+
+    def __init__(self, radiance: ArrayLike5D, total: int, report: Report) -> None:
+        self._radiance, self._total, self._report, self._done = radiance, total, report, 0
+        self.shape = radiance.shape
+
+    def __getitem__(self, index: Any, /) -> Any:
+        self._done += 1
+        self._report("views at full light", self._done, self._total)
+        return self._radiance[index]

@@ -1,0 +1,197 @@
+"""The folder of results: what the commands leave behind, so that a later command can go on from it.
+
+results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum
+sections.zarr/           z_mm, counts, coverage
+segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
+depth.zarr/              z_mm, confidence
+score.json               as in `Score.to_dict`
+*.png, report.html       to look at
+
+What replaces something is made whole beside it. Then the old one is taken off the list, the new one put in
+its place, and listed: a kill at any time leaves the old one, none, or the new one.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.images import Sections
+from pcii.core.safe_files import (
+    locked,
+    replace_folder,
+    sweep_temporaries,
+    sync_folder,
+    temporary_folder,
+    write_json_safely,
+)
+from pcii.io.dataset import Dataset
+from pcii.io.dataset_layout import MAP_AXES, lists_part
+from pcii.io.results_list import RESULTS, read_results, write_results
+from pcii.io.sealed_json import list_files
+from pcii.io.zarr_groups import Label, read_array, write_arrays_safely
+from pcii.sections.reconstruction import reconstruct
+
+REMEDY = "make it again"
+LOCK = ".results.lock"
+
+PLANE_AXES = ("plane", *MAP_AXES)
+_Z_MM = Label(("plane",), "planar depth of each section", "mm")
+SECTIONS_LABELS = {
+    "z_mm": _Z_MM,
+    "counts": Label((*PLANE_AXES, "channel"), "sum of the samples that meet at each voxel", "photons"),
+    "coverage": Label((*PLANE_AXES, "channel"), "how many samples that was", "samples"),
+}
+SEGMENTED_LABELS = {
+    "z_mm": _Z_MM,
+    "in_focus": Label(PLANE_AXES, "whether the voxel is in focus"),
+    "photon_in_focus": Label(
+        ("plane", "event"),
+        "whether the photons of each event, in (k, l, i, j) order, come from what is in focus",
+    ),
+}
+DEPTH_LABELS = {
+    "z_mm": Label(MAP_AXES, "planar depth at the virtual centre; NaN where there is no answer", "mm"),
+    "confidence": Label(MAP_AXES, "from 0 (no answer) to 1"),
+}
+
+
+@dataclass(frozen=True)
+class Results:
+    """A folder of results of one dataset and photon budget."""
+
+    path: Path
+    dataset: Dataset
+
+    @property
+    def _origin(self) -> dict[str, Any]:
+        """What tells whose results these are."""
+        data = self.dataset
+        return {"dataset": data.name, "identity": data.manifest.get("identity"), "budget": data.budget}
+
+    def check(self) -> None:
+        """Raise `InputError` unless the folder is new, empty, or holds results of this dataset and budget."""
+        out = self.path
+        if out.exists() and not out.is_dir():
+            raise InputError(f"{out}: this is a file; name a folder for the results")
+        if out.resolve() == self.dataset.path.resolve():
+            raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
+        if not (out / RESULTS).exists():
+            if out.is_dir() and any(path.name != LOCK for path in out.iterdir()):
+                raise InputError(f"{out}: holds something else; name a new or empty folder")
+            return
+        held = read_results(out)
+        if {name: held[name] for name in self._origin} != self._origin:
+            raise InputError(
+                f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
+            )
+
+    @contextmanager
+    def writing(self) -> Iterator["Results"]:
+        """Claim the folder, and keep other writers out of it for the length of the block."""
+        self.check()
+        self.path.mkdir(parents=True, exist_ok=True)
+        with locked(self.path / LOCK, wait=True):
+            try:
+                self.check()
+                sweep_temporaries(self.path)
+                if not (self.path / RESULTS).exists():
+                    self._list({})
+                yield self
+            finally:
+                (self.path / LOCK).unlink(missing_ok=True)
+
+    @contextmanager
+    def replacing(self, name: str) -> Iterator[Path]:
+        """Where to write the new file or folder `name`, which takes its place at the end of the block."""
+        place = self.path / name
+        with temporary_folder(place) as temporary:
+            new = temporary / name
+            yield new
+            files = read_results(self.path)["files"]
+            others = {path: entry for path, entry in files.items() if not lists_part([path], name)}
+            if len(others) < len(files):
+                self._list(others)
+            if new.is_dir():
+                replace_folder(new, place)
+            else:
+                new.replace(place)
+                sync_folder(self.path)
+            self._list(others | list_files(self.path, [name]))
+
+    def _list(self, files: Mapping[str, Any]) -> None:
+        write_results(self.path, {**self._origin, "files": files})
+
+    def save_sections(self, sections: Sections) -> Path:
+        """Write the sums and the coverage; the estimate is one divided by the other."""
+        arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
+        pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
+        return self._save("sections.zarr", arrays, SECTIONS_LABELS, pattern)
+
+    def save_segmented(self, focus: Segmented) -> Path:
+        """Write the in-focus masks of one method, and its photons in focus if it tells them."""
+        arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
+        if focus.photon_in_focus is not None:
+            arrays["photon_in_focus"] = focus.photon_in_focus
+        return self._save(
+            f"segmented_{focus.method}.zarr", arrays, SEGMENTED_LABELS, {"method": focus.method}
+        )
+
+    def save_depth(self, depth: DepthMap) -> Path:
+        """Write the depth map and its confidence."""
+        return self._save("depth.zarr", {"z_mm": depth.z_mm, "confidence": depth.confidence}, DEPTH_LABELS)
+
+    def save_score(self, result: Score) -> Path:
+        """Write score.json."""
+        with self.replacing("score.json") as path:
+            write_json_safely(path, result.to_dict())
+        return self.path / "score.json"
+
+    def _save(
+        self,
+        name: str,
+        arrays: Mapping[str, np.ndarray],
+        labels: Mapping[str, Label],
+        attributes: Mapping[str, Any] | None = None,
+    ) -> Path:
+        with self.replacing(name) as path:
+            write_arrays_safely(path, arrays, labels, attributes)
+        return self.path / name
+
+    def load_segmented(self) -> list[Segmented]:
+        """The in-focus masks of every method in the folder; their sections are reconstructed anew."""
+        files = read_results(self.path)["files"]
+        tops = {name.split("/")[0] for name in files}
+        found: list[Segmented] = []
+        for top in sorted(top for top in tops if top.startswith("segmented_") and top.endswith(".zarr")):
+            tells = lists_part(files, f"{top}/photon_in_focus")
+            names = ("z_mm", "in_focus", *(["photon_in_focus"] if tells else []))
+            arrays = {name: self._read(f"{top}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
+            photons = arrays.pop("photon_in_focus", None)
+            if photons is not None and photons.shape[-1] != self.dataset.counts.events.n.size:
+                raise InputError(f"{self.path / top}: its photon_in_focus is of other counts; {REMEDY}")
+            method = top.removeprefix("segmented_").removesuffix(".zarr")
+            try:
+                sections = reconstruct(self.dataset.counts, arrays["z_mm"])
+                z_mm, in_focus = arrays["z_mm"], arrays["in_focus"]
+                found.append(Segmented(z_mm, in_focus, method, sections, photon_in_focus=photons))
+            except InputError as fault:
+                raise InputError(f"{self.path / top}: {fault}; {REMEDY}") from None
+        return found
+
+    def load_depth(self) -> DepthMap | None:
+        """The depth map in the folder, or None."""
+        files = read_results(self.path)["files"]
+        if not lists_part(files, "depth.zarr"):
+            return None
+        return DepthMap(**{n: self._read(f"depth.zarr/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
+
+    def _read(self, name: str, files: Mapping[str, Any], label: Label) -> np.ndarray:
+        grid = self.dataset.grid
+        sizes = {"row": grid.height, "col": grid.width}
+        return read_array(self.path, name, files, label, sizes, REMEDY)

@@ -1,0 +1,40 @@
+"""One dataset, everything: analyse it and leave sections, masks, depth, scores and the report."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pcii.app.pipeline import Outcome, analyse
+from pcii.app.report import write_report
+from pcii.app.results import Results
+from pcii.core.console import Report, silent
+from pcii.io.dataset import Dataset
+from pcii.io.suggested_depths import planes_of
+from pcii.removal.methods import DEFAULT_METHODS, find_method
+
+
+def run(
+    dataset: Dataset,
+    out: Path,
+    z_mm: Sequence[float] | None,
+    report: Report = silent,
+    methods: Sequence[str] = DEFAULT_METHODS,
+) -> Outcome:
+    """Analyse `dataset` and write everything into `out`.
+
+    Raises `InputError` if `out` holds something else, and like `analyse`.
+    """
+    for method in methods:  # a misspelt name is told before the work, and leaves no folder behind
+        find_method(method)
+    planes_of(dataset, z_mm)
+    results = Results(out, dataset)
+    results.check()
+    outcome = analyse(dataset, z_mm, report, methods)
+    with results.writing():
+        results.save_sections(outcome.sections)
+        for focus in outcome.focus:
+            results.save_segmented(focus)
+        results.save_depth(outcome.depth)
+        results.save_score(outcome.score)
+        with results.replacing("report.html") as page:
+            write_report(page, outcome)
+    return outcome

@@ -1,0 +1,59 @@
+"""Bayer colour filter arrays: which colour each pixel sees.
+
+A pattern is named by its first two rows, read left to right, top to bottom: in ``GRBG`` the pixel
+(0, 0) is green, (0, 1) red, (1, 0) blue and (1, 1) green (Muniraj et al. 2017, Fig. 3).
+"""
+
+import numpy as np
+
+from pcii.core.errors import InputError
+
+COLOURS = "RGB"
+PATTERNS = ("GRBG", "RGGB", "BGGR", "GBRG")
+
+
+def check_cfa(cfa: str | None) -> str | None:
+    """Return `cfa` if it names a Bayer pattern or is None (monochrome), else raise `InputError`."""
+    if cfa is None or cfa in PATTERNS:
+        return cfa
+    raise InputError(
+        f"cfa: there is no Bayer pattern {cfa!r}; use one of {', '.join(PATTERNS)}, "
+        "or none for a monochrome sensor"
+    )
+
+
+def channel_count(cfa: str | None) -> int:
+    """Number of colours behind the pattern: 3, or 1 for a monochrome sensor."""
+    return 1 if cfa is None else 3
+
+
+def colour_cells(cfa: str | None) -> np.ndarray:
+    """Colour of each cell of the 2 x 2 pattern, shape (2, 2), int; 0, 1, 2 = R, G, B.
+
+    A monochrome sensor has the single colour 0 everywhere.
+    """
+    check_cfa(cfa)
+    if cfa is None:
+        return np.zeros((2, 2), dtype=np.int64)
+    return np.array([COLOURS.index(letter) for letter in cfa], dtype=np.int64).reshape(2, 2)
+
+
+def sites_of_colours(cfa: str | None) -> np.ndarray:
+    """How many of the 2 x 2 cells are of each colour, (C,) float64."""
+    return np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa)).astype(np.float64)
+
+
+def colour_index(height: int, width: int, cfa: str | None) -> np.ndarray:
+    """Colour seen by each pixel, shape (height, width), uint8; 0, 1, 2 = R, G, B."""
+    cells = colour_cells(cfa).astype(np.uint8)
+    return np.tile(cells, ((height + 1) // 2, (width + 1) // 2))[:height, :width]
+
+
+def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
+    """What a Bayer sensor keeps of a colour image: (..., H, W, 3) to (..., H, W), same dtype."""
+    if rgb.ndim < 3 or rgb.shape[-1] != 3:
+        raise InputError(f"rgb: expected an array (..., H, W, 3), got shape {rgb.shape}")
+    raw = np.empty(rgb.shape[:-1], dtype=rgb.dtype)
+    for (a, b), colour in np.ndenumerate(colour_cells(cfa)):
+        raw[..., a::2, b::2] = rgb[..., a::2, b::2, colour]
+    return raw

@@ -1,0 +1,73 @@
+"""The grid of cameras: where they stand, how they see."""
+
+import math
+from dataclasses import dataclass
+from typing import TypeGuard
+
+import numpy as np
+
+from pcii.core.errors import InputError
+
+
+def _check_size(name: str, value: object) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+        raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
+
+
+def _is_finite(value: object) -> TypeGuard[float]:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    return number and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _check_length(name: str, value: object) -> None:
+    if not (_is_finite(value) and value > 0):
+        raise InputError(f"{name}: expected a finite length above 0 mm, got {value!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraGrid:
+    """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
+
+    Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
+    Y = (k - (rows-1)/2) pitch_y. `pitch_mm` is (pitch_x, pitch_y). Each image has `height` x `width`
+    square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
+    ((height-1)/2, (width-1)/2). In a sheared grid `shear_px` (x, y) is not 0: each camera's axis meets it
+    further right (down) by so many px per camera step, counted from the centre of the grid, so that what
+    has that much disparity stands still. Raises `InputError` for a size below 1, a length not above 0 or
+    a shear that is not finite.
+    """
+
+    rows: int
+    cols: int
+    pitch_mm: tuple[float, float]
+    focal_mm: float
+    pixel_mm: float
+    height: int
+    width: int
+    shear_px: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("rows", "cols", "height", "width"):
+            _check_size(name, getattr(self, name))
+        pitch = self.pitch_mm
+        if not isinstance(pitch, tuple | list) or len(pitch) != 2:
+            raise InputError(f"pitch_mm: expected two lengths (x, y) in mm, got {pitch!r}")
+        for name, value in (("pitch_mm", pitch[0]), ("pitch_mm", pitch[1])):
+            _check_length(name, value)
+        for name in ("focal_mm", "pixel_mm"):
+            _check_length(name, getattr(self, name))
+        object.__setattr__(self, "pitch_mm", (float(pitch[0]), float(pitch[1])))
+        shear = self.shear_px
+        if not isinstance(shear, tuple | list) or len(shear) != 2 or not all(map(_is_finite, shear)):
+            raise InputError(f"shear_px: expected two finite numbers (x, y) of pixels, got {shear!r}")
+        object.__setattr__(self, "shear_px", (float(shear[0]), float(shear[1])))
+
+    @property
+    def view_count(self) -> int:
+        """Number of cameras, rows x cols."""
+        return self.rows * self.cols
+
+    @property
+    def shape_KLHW(self) -> tuple[int, int, int, int]:
+        """Shape (K, L, H, W) of one monochrome stack of views."""
+        return (self.rows, self.cols, self.height, self.width)

@@ -1,0 +1,116 @@
+"""What methods answer, and how right that was: in-focus masks, depth maps, scores."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pcii.core.arrays import check_z_mm, read_only
+from pcii.core.errors import InputError
+from pcii.core.images import Sections
+from pcii.core.short_form import Brief, listed, span, table, times
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Segmented(Brief):
+    """Which points of each section are in focus: `in_focus` (Z, H, W) bool.
+
+    `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at. A method that decides
+    about single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
+    (`PhotonCounts.events`, in their order) come from what is in focus in each plane; else that is None.
+    """
+
+    z_mm: np.ndarray
+    in_focus: np.ndarray
+    method: str
+    sections: Sections
+    steps: Mapping[str, np.ndarray] = field(default_factory=dict)
+    photon_in_focus: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        expected = self.sections.counts.shape[:3]
+        if self.in_focus.dtype != np.bool_ or self.in_focus.shape != expected:
+            raise InputError(
+                f"in_focus: expected bool {expected}, got {self.in_focus.dtype} {self.in_focus.shape}"
+            )
+        kept = self.photon_in_focus
+        if kept is not None:
+            if kept.dtype != np.bool_ or kept.ndim != 2 or kept.shape[0] != expected[0]:
+                raise InputError(
+                    f"photon_in_focus: expected bool ({expected[0]}, events), got {kept.dtype} {kept.shape}"
+                )
+            object.__setattr__(self, "photon_in_focus", read_only(kept))
+        object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
+        object.__setattr__(self, "in_focus", read_only(self.in_focus))
+
+    def _facts(self) -> dict[str, object]:
+        shares = [f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))]
+        return {
+            "method": self.method,
+            "z_mm": listed(self.z_mm.tolist()),
+            "shape": times(self.in_focus.shape),
+            "in_focus": listed(shares),
+        }
+
+    @property
+    def cleaned(self) -> np.ndarray:
+        """Section estimates with what is defocused set to zero, (Z, H, W, C)."""
+        return self.sections.estimate * self.in_focus[..., None]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthMap(Brief):
+    """Depth per pixel of the virtual centre: `z_mm` (H, W), NaN where the method abstains.
+
+    `confidence` (H, W) is in [0, 1]: 0 where it abstains.
+    """
+
+    z_mm: np.ndarray
+    confidence: np.ndarray
+
+    def __post_init__(self) -> None:
+        if self.z_mm.ndim != 2 or self.confidence.shape != self.z_mm.shape:
+            raise InputError("z_mm, confidence: expected two maps (H, W) of the same shape")
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "confidence", read_only(self.confidence))
+
+    def _facts(self) -> dict[str, object]:
+        answered = self.z_mm[np.isfinite(self.z_mm)]
+        share = f"{answered.size / max(1, self.z_mm.size):.2%}"
+        return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
+
+
+@dataclass(frozen=True, repr=False)
+class Score(Brief):
+    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map, bounds."""
+
+    planes: tuple[Mapping[str, Any], ...]
+    objects: tuple[Mapping[str, Any], ...]
+    depth: Mapping[str, Any]
+    dataset: str | None = None
+    bounds: Mapping[str, Any] = field(default_factory=dict)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "dataset": self.dataset,
+            "methods": listed(list(dict.fromkeys(row["method"] for row in self.planes))),
+            "planes": len(self.planes),
+            "objects": len(self.objects),
+            "depth median_mm": self.depth.get("median_mm"),
+        }
+
+    def _repr_html_(self) -> str:
+        names = ("z_mm", "method", "truth", "object", "iou", "precision", "recall", "boundary_f")
+        rows = [[row.get(name) for name in names] for row in self.planes]
+        return table(repr(self), rows, names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The score as plain Python values, in the spelling of `score.json`."""
+        return {
+            "dataset": self.dataset,
+            "planes": [dict(row) for row in self.planes],
+            "objects": [dict(row) for row in self.objects],
+            "depth": dict(self.depth),
+            "bounds": dict(self.bounds),
+        }

@@ -1,0 +1,235 @@
+"""Photon counts: what a camera delivers when light is scarce, as sparse events or as a dense stack."""
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from pcii.core.arrays import read_only
+from pcii.core.bayer import channel_count, check_cfa, colour_cells
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.short_form import Brief, times
+
+LARGEST_TOTAL = (1 << 63) - 1
+LARGEST_COUNT = 1 << 40
+"""Photons in a pixel; millions of such pixels still add up in 64 bits."""
+
+
+@dataclass(frozen=True, repr=False)
+class PhotonEvents(Brief):
+    """Pixels that caught photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,)."""
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    n: np.ndarray
+
+    def _facts(self) -> dict[str, object]:
+        return {"events": self.n.size, "photons": int(self.n.sum())}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotonCounts(Brief):
+    """Photon counts of every elemental image, as sparse events or as a dense stack.
+
+    Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.
+    There is no truth in it: this is all that a camera would deliver.
+    """
+
+    grid: CameraGrid
+    cfa: str | None
+    _events: PhotonEvents | None = field(default=None, repr=False)
+    _dense: np.ndarray | None = field(default=None, repr=False)
+
+    @classmethod
+    def from_dense(
+        cls, counts_KLHW: np.ndarray, grid: CameraGrid, *, cfa: str | None = None
+    ) -> "PhotonCounts":
+        """Counts from a dense stack (K, L, H, W) of whole numbers >= 0; raises `InputError`."""
+        check_cfa(cfa)
+        _check_grid(grid)
+        counts = _whole_counts("counts", counts_KLHW)
+        if counts.shape != grid.shape_KLHW:
+            raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
+        _check_total("counts", counts)
+        return cls(grid, cfa, _dense=read_only(counts))
+
+    @classmethod
+    def from_events(
+        cls,
+        k: np.ndarray,
+        l: np.ndarray,
+        i: np.ndarray,
+        j: np.ndarray,
+        n: np.ndarray,
+        grid: CameraGrid,
+        *,
+        cfa: str | None = None,
+    ) -> "PhotonCounts":
+        """Counts from five equal-length lists: camera (k, l), pixel (i, j), photons n.
+
+        A pixel may appear more than once; its photons add up. Raises `InputError` for an index
+        outside the grid, a negative or fractional count, or lists of different lengths.
+        """
+        check_cfa(cfa)
+        _check_grid(grid)
+        where: dict[str, np.ndarray] = {}
+        for (name, values), limit in zip(
+            {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
+        ):
+            column = _whole_counts(name, np.atleast_1d(values))
+            if column.ndim != 1:
+                raise InputError(f"{name}: expected a one-dimensional list")
+            if column.size and column.max() >= limit:
+                raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
+            where[name] = column.astype(np.int32)
+        photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
+        if len({column.shape for column in (*where.values(), photons)}) != 1:
+            raise InputError("k, l, i, j, n: the five lists must have the same length")
+        _check_total("n", photons)
+        return cls(grid, cfa, _events=_canonical_events(tuple(where.values()), photons, grid))
+
+    def _facts(self) -> dict[str, object]:
+        kept = "events" if self.is_sparse else "dense"
+        return {"shape": times(self.grid.shape_KLHW), "cfa": self.cfa, "photons": self.total, "kept": kept}
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the counts are kept as events."""
+        return self._events is not None
+
+    @property
+    def dense(self) -> np.ndarray:
+        """The counts (K, L, H, W) as they are kept; `InputError` if they are sparse."""
+        if self._dense is None:
+            raise InputError("dense: these counts are kept as events; use .view(k, l) or .events")
+        return self._dense
+
+    @cached_property
+    def lit_share(self) -> float:
+        """Share of the pixels that caught photons."""
+        lit = self.events.n.size if self._dense is None else int(np.count_nonzero(self._dense))
+        return lit / math.prod(self.grid.shape_KLHW)
+
+    @cached_property
+    def events(self) -> PhotonEvents:
+        """The counts as events, one per pixel that caught photons, in (k, l, i, j) order."""
+        if self._events is not None:
+            return self._events
+        assert self._dense is not None
+        where = np.nonzero(self._dense)
+        n = self._dense[where].astype(np.int64)
+        return _events(where, n)
+
+    @cached_property
+    def event_colours(self) -> np.ndarray:
+        """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
+        return read_only(colour_cells(self.cfa)[self.events.i % 2, self.events.j % 2])
+
+    @cached_property
+    def view_starts(self) -> np.ndarray:
+        """Where each view's events begin, (K L + 1,) int64: view k L + l ends where the next begins."""
+        view = self.events.k.astype(np.int64) * self.grid.cols + self.events.l
+        return read_only(np.searchsorted(view, np.arange(self.grid.view_count + 1)))
+
+    def view(self, k: int, l: int) -> np.ndarray:
+        """Dense counts (H, W) of camera (k, l); `InputError` if there is none such."""
+        if not (0 <= k < self.grid.rows and 0 <= l < self.grid.cols):
+            raise InputError(
+                f"view: there is no camera ({k}, {l}) in a grid of {self.grid.rows} x {self.grid.cols}"
+            )
+        if self._dense is not None:
+            return self._dense[k, l]
+        events = self.events
+        image = np.zeros((self.grid.height, self.grid.width), dtype=np.int64)
+        number = k * self.grid.cols + l
+        here = slice(self.view_starts[number], self.view_starts[number + 1])
+        image[events.i[here], events.j[here]] = events.n[here]
+        return image
+
+    @cached_property
+    def total(self) -> int:
+        """Photons in all views together."""
+        if self._dense is not None:
+            return int(self._dense.sum(dtype=np.int64))
+        return int(self.events.n.sum())
+
+    @property
+    def channel_count(self) -> int:
+        """Colours that sections of these counts will have: 3, or 1 for monochrome."""
+        return channel_count(self.cfa)
+
+    def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
+        """Counts of about `most` photons, each photon kept with the same probability.
+
+        The number that is kept is binomial with mean `most`: Poisson counts stay Poisson counts. Counts of no
+        more than `most` photons are returned as they are.
+        """
+        if self.total <= most:
+            return self
+        events = self.events
+        n = rng.binomial(events.n, most / self.total)
+        kept = n > 0
+        where = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
+        return PhotonCounts(self.grid, self.cfa, _events=_events(where, n[kept]))
+
+
+def check_depth_counts(value: object) -> None:
+    """Raise `InputError` unless `value` is `PhotonCounts` of at least two views, which depth needs."""
+    if not isinstance(value, PhotonCounts):
+        raise InputError(f"counts: expected PhotonCounts, got {type(value).__name__}")
+    if value.grid.view_count < 2:
+        raise InputError("counts: one view has no depth; at least 2 cameras are needed")
+
+
+def _check_grid(value: object) -> None:
+    if not isinstance(value, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
+
+
+def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
+    """Counts as they are if integer and >= 0, floats only if whole; else `InputError`."""
+    array = np.asarray(values)
+    if array.dtype.kind == "f":
+        whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
+        if not whole or (array.size and np.abs(array).max() > 2**53):
+            raise InputError(f"{name}: photon counts must be whole numbers")
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iub":
+        raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
+    if array.dtype.kind == "b":
+        array = array.astype(np.uint8)
+    array = array.astype(array.dtype.newbyteorder("="), copy=False)
+    if array.size and array.min() < 0:
+        raise InputError(f"{name}: photon counts must not be negative")
+    if array.size and array.max() > LARGEST_COUNT:
+        raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
+    return array
+
+
+def _check_total(name: str, counts: np.ndarray) -> None:
+    """Raise `InputError` if the counts, each at most `LARGEST_COUNT`, add up to more than int64 holds."""
+    if counts.size == 0 or counts.size * int(counts.max()) <= LARGEST_TOTAL:
+        return
+    wide, half = counts.astype(np.uint64), np.uint64(32)
+    total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
+    if total > LARGEST_TOTAL:
+        raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")
+
+
+def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
+    """Sort by (k, l, i, j), add up repeats, drop zeros: one form per content."""
+    flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
+    where, inverse = np.unique(flat, return_inverse=True)
+    photons = np.zeros(where.size, dtype=np.int64)
+    np.add.at(photons, inverse, n)
+    where, photons = where[photons > 0], photons[photons > 0]
+    return _events(np.unravel_index(where, grid.shape_KLHW), photons)
+
+
+def _events(where: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
+    k, l, i, j = (read_only(index.astype(np.int32)) for index in where)
+    return PhotonEvents(k, l, i, j, read_only(n))

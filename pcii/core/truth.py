@@ -1,0 +1,82 @@
+"""What is really there, as far as a dataset knows it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.core.arrays import read_only
+from pcii.core.errors import InputError
+from pcii.core.short_form import Brief, listed, span, times
+
+
+@dataclass(frozen=True, repr=False)
+class PhotonTruth(Brief):
+    """Where each detected photon came from: five arrays and a depth, (N,).
+
+    Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of what its path hit first.
+    """
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    object_id: np.ndarray
+    z_mm: np.ndarray
+
+    def _facts(self) -> dict[str, object]:
+        return {"photons": self.z_mm.size, "objects": np.unique(self.object_id).size}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(Brief):
+    """What the virtual centre camera really sees, from first hits at pixel centres.
+
+    `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
+    backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
+
+    More is there if the dataset has it. `normal` (H, W, 3) float32: unit normal of the surface in world axes,
+    on the side that the camera sees; 0 where nothing is hit. `coverage` (H, W) float32: the share of the
+    pixel's square that belongs to the object (or to none) that its centre hits. `visible_views` (H, W)
+    uint16: how many cameras of the grid see the point; 0 where nothing is hit.
+    """
+
+    z_mm: np.ndarray
+    object_id: np.ndarray
+    names: Mapping[int, str]
+    photons: PhotonTruth | None = None
+    normal: np.ndarray | None = None
+    coverage: np.ndarray | None = None
+    visible_views: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
+            raise InputError("z_mm, object_id: expected two maps (H, W) of the same shape")
+        if not (self.z_mm > 0).all():
+            raise InputError("z_mm: true depths are above 0 mm and never NaN; a miss is +inf")
+        unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
+        if unknown:
+            raise InputError(f"object_id: id {min(unknown)} has no name")
+        H, W = self.z_mm.shape
+        self._check_map("normal", (H, W, 3), np.float32, -1, 1)
+        self._check_map("coverage", (H, W), np.float32, 0, 1)
+        self._check_map("visible_views", (H, W), np.uint16, 0, np.inf)
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "object_id", read_only(self.object_id))
+
+    def _facts(self) -> dict[str, object]:
+        hit = self.z_mm[np.isfinite(self.z_mm)]
+        photons = None if self.photons is None else self.photons.z_mm.size
+        objects = listed(list(self.names.values()))
+        return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
+    def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
+        """An optional map, made read-only; lengths of 1 may be rounded by 1e-6."""
+        values = getattr(self, name)
+        if values is None:
+            return
+        if values.shape != shape or values.dtype != dtype:
+            raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
+        if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
+            raise InputError(f"{name}: expected values from {least} to {most}")
+        object.__setattr__(self, name, read_only(values))

@@ -1,0 +1,183 @@
+"""Methods compared: every dataset, photon budget and method once, scored against the truth and timed."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pcii.core.console import Report, silent
+from pcii.core.errors import InputError
+from pcii.depth.depth_map import estimate_depth
+from pcii.evaluation.evaluation_pages import write_evaluation
+from pcii.evaluation.rows import (
+    DEPTH,
+    Key,
+    Row,
+    all_rows,
+    append_row,
+    claim_rows,
+    described,
+    identity_of,
+    key_of,
+)
+from pcii.evaluation.summary import summarise
+from pcii.evaluation.timing import timed
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_layout import MANIFEST, MARKER, TRUTH
+from pcii.io.suggested_depths import depth_range_of, planes_of
+from pcii.metrics.scoring import score
+from pcii.removal.methods import removal_methods, segment
+
+
+def known_methods() -> tuple[str, ...]:
+    """Names of what can be evaluated: the methods of removal, and the depth map."""
+    return (*removal_methods(), DEPTH)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One row to measure."""
+
+    dataset: Dataset
+    budget: float | None
+    method: str
+
+    @property
+    def key(self) -> Key:
+        """Key of its row."""
+        return identity_of(self.dataset.manifest), self.budget, self.method
+
+
+def evaluate(
+    datasets: Sequence[str | Path],
+    out: str | Path,
+    *,
+    methods: Sequence[str] = (),
+    budgets: Sequence[float] = (),
+    part: tuple[int, int] = (1, 1),
+    report: Report = silent,
+) -> dict[str, Any]:
+    """Score methods on datasets and compare them; the content of evaluation.json, as `summarise` gives it.
+
+    `datasets` are dataset folders, or folders of such. `methods` default to all; "depth" stands for the
+    depth map. `budgets` default to all that each dataset has. Of the datasets only those of `part` (i, n) are
+    measured: every n-th from the i-th on, so that n processes share the work on one `out`.
+
+    Rows are added to out/rows.jsonl as they are made, and what is there is not made again; evaluation.json,
+    .html and .md tell of all rows that `out` holds. `missing` counts those that were asked for and are not
+    there yet. The seconds of a row are wall time of the method alone, after one call that warms up, of a
+    call in which nothing was compiled or loaded. Raises `InputError` for a dataset without truth, depths or
+    counts, or an unknown method or budget.
+    """
+    folder = Path(out)
+    tasks = _tasks([open_dataset(path) for path in find_datasets(datasets)], _checked(methods), budgets)
+    number, parts = part
+    if not 1 <= number <= parts:
+        raise InputError(f"part: expected one of 1/{parts} to {parts}/{parts}, got {number}/{parts}")
+    claim_rows(folder)
+    with all_rows(folder) as rows:
+        done = {key_of(row) for row in rows}
+    own = [task for position, each in enumerate(tasks) if position % parts == number - 1 for task in each]
+    left = [task for task in own if task.key not in done]
+    warm: set[tuple[float | None, str]] = set()
+    for finished, task in enumerate(left, start=1):
+        append_row(folder, _measured(task, warm))
+        report("scores", finished, len(left))
+    with all_rows(folder) as rows:
+        there = {key_of(row) for row in rows}
+        missing = sum(task.key not in there for each in tasks for task in each)
+        result = {"missing": missing, **summarise(rows)}
+        write_evaluation(folder, result)
+    return result
+
+
+def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
+    """Folders of datasets: those named, and those in the folders named; `InputError` where there is none.
+
+    An unfinished one, or a folder seed_<n> without a manifest, counts too, so that who opens it learns what
+    it lacks.
+    """
+    found: list[Path] = []
+    for path in map(Path, paths):
+        if _is_begun(path):
+            found.append(path)
+            continue
+        if not path.is_dir():
+            raise InputError(f"{path}: there is no such dataset folder")
+        inside = [
+            folder
+            for folder in path.iterdir()
+            if folder.is_dir() and (_is_begun(folder) or re.fullmatch(r"seed_\d+", folder.name))
+        ]
+        if not inside:
+            raise InputError(f"{path}: neither a finished dataset nor a folder of such")
+        found += sorted(inside, key=lambda folder: (len(folder.name), folder.name))
+    if not found:
+        raise InputError("datasets: name at least one dataset folder")
+    return found
+
+
+def _is_begun(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
+
+
+def part_of(text: str) -> tuple[int, int]:
+    """The part (i, n) that `i/n` names; `InputError` for anything else."""
+    match = re.fullmatch(r"(\d+)/(\d+)", text)
+    if match is None:
+        raise InputError(f"--part: expected i/n such as 1/2, got {text!r}")
+    return int(match[1]), int(match[2])
+
+
+def _checked(methods: Sequence[str]) -> tuple[str, ...]:
+    known = known_methods()
+    for name in methods:
+        if name not in known:
+            raise InputError(f"method: there is no method named {name!r}; use {', '.join(known)}")
+    return tuple(dict.fromkeys(methods)) or known
+
+
+def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float]) -> list[list[Task]]:
+    """The rows of each dataset; what is missing in one shows before any work."""
+    tasks: dict[str, list[Task]] = {}
+    for dataset in datasets:
+        if not dataset.has(TRUTH):
+            raise InputError(f"{dataset.path}: has no truth to score with; its recipe left it out")
+        planes_of(dataset, ())
+        own = dict.fromkeys(budgets or dataset.budgets)
+        for budget in own:
+            dataset.at_budget(budget)
+        each = [Task(dataset, budget, method) for budget in own for method in methods]
+        tasks.setdefault(identity_of(dataset.manifest), each)
+    return list(tasks.values())
+
+
+def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
+    """The row of a task; the first call of a method at a budget is made twice, and the second one timed."""
+    data = task.dataset.at_budget(task.budget)
+    counts, z_mm, z_range_mm = data.counts, planes_of(data, ()), depth_range_of(data)
+
+    def work() -> Any:
+        if task.method == DEPTH:
+            return estimate_depth(counts, z_range_mm)
+        return segment(counts, z_mm, method=task.method)
+
+    if (task.budget, task.method) not in warm:
+        work()
+        warm.add((task.budget, task.method))
+    seconds, found = timed(work)
+    row = described(data) | {
+        "budget": task.budget,
+        "photons_per_view": counts.total / counts.grid.view_count,
+        "method": task.method,
+        "seconds": round(seconds, 6),
+    }
+    if task.method == DEPTH:
+        return row | {"depth": dict(score(None, found, data.truth, grid=data.grid).depth)}
+    result = score(found, None, data.truth)
+    planes = [
+        {name: value for name, value in (known | plane).items() if name != "method"}
+        for plane, known in zip(result.planes, result.bounds["planes"], strict=True)
+    ]
+    return row | {"planes": planes, "objects": [dict(thing) for thing in result.objects]}

@@ -1,0 +1,77 @@
+"""An evaluation to keep and to read: evaluation.json, a self-contained page, and Markdown."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pcii.core.plain_text import in_markdown
+from pcii.core.safe_files import write_bytes_safely, write_json_safely
+from pcii.evaluation.pages import page
+from pcii.evaluation.plots import accuracy_plots
+from pcii.evaluation.tables import budget_name, markdown, overview, tables_of, told
+
+
+def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
+    """Write evaluation.json, evaluation.md and evaluation.html of what `summarise` gives."""
+    write_json_safely(out / "evaluation.json", evaluation)
+    write_bytes_safely(out / "evaluation.md", _markdown(evaluation).encode())
+    write_bytes_safely(out / "evaluation.html", _page(evaluation))
+
+
+def _methods(evaluation: Mapping[str, Any]) -> list[str]:
+    rows = [row for group in evaluation["groups"] for row in group["results"] if "object" in row]
+    return sorted({row["method"] for row in rows})
+
+
+def _notes(evaluation: Mapping[str, Any]) -> list[str]:
+    """What has to be known to read the tables."""
+    notes = [
+        "Figures are against the objects that belong to each plane, and means over the planes where none is "
+        "named. In brackets: " + evaluation["interval"] + ".",
+        "p: sign-flip permutation test on the same datasets, two-sided, not corrected for many comparisons.",
+    ]
+    if evaluation.get("missing"):
+        notes.append(f"Not finished: {evaluation['missing']} rows are still to be measured.")
+    return notes
+
+
+def _falls(group: Mapping[str, Any]) -> list[str]:
+    return [
+        f"IoU of {fall['method']} is worse with {budget_name(fall['to'])} photons than with "
+        f"{budget_name(fall['from'])}, by {told(fall['difference'])}."
+        for fall in group["monotonic"]
+    ]
+
+
+def _markdown(evaluation: Mapping[str, Any]) -> str:
+    parts = ["# Evaluation", *_notes(evaluation)]
+    table = overview(evaluation["groups"])
+    if table.rows:
+        parts += [f"## {table.title}", markdown(table)]
+    for group in evaluation["groups"]:
+        parts.append(f"## {in_markdown(group['label'])}")
+        parts += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
+        parts += map(in_markdown, _falls(group))
+    return "\n\n".join(parts) + "\n"
+
+
+def _page(evaluation: Mapping[str, Any]) -> bytes:
+    methods = _methods(evaluation)
+    groups = [
+        {
+            "label": group["label"],
+            "datasets": group["datasets"],
+            "recipe": group["recipe"],
+            "plot": accuracy_plots(group, methods) if methods else "",
+            "tables": tables_of(group),
+            "falls": _falls(group),
+        }
+        for group in evaluation["groups"]
+    ]
+    content = {
+        "version": evaluation["version"],
+        "notes": _notes(evaluation),
+        "overview": overview(evaluation["groups"]),
+        "groups": groups,
+    }
+    return page("evaluation.html.j2", content)

@@ -1,0 +1,83 @@
+"""Pictures of sections, masks and depth: linear values to 8-bit sRGB, cropped to what matters."""
+
+import base64
+import io
+from pathlib import Path
+
+import numpy as np
+
+from pcii.core.estimates import Segmented
+from pcii.core.truth import Truth
+
+AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
+"""Colours of the comparison with the truth: claimed and true, true only, claimed only."""
+
+
+def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
+    """Linear values (H, W) or (H, W, C) as 8-bit sRGB (H, W, 3); `white` and above become 255."""
+    x = np.clip(np.nan_to_num(linear) / max(white, 1e-30), 0, 1)
+    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    image = np.round(255 * encoded).astype(np.uint8)
+    if image.ndim == 2:
+        image = image[..., None]
+    return np.repeat(image, 3, axis=2) if image.shape[2] == 1 else image
+
+
+def white_level(linear: np.ndarray, box: tuple[slice, slice]) -> float:
+    """The level to show as white: the brightest but for one value in 50 of what is lit."""
+    part = linear[box]
+    lit = part[part > 0]
+    return float(np.quantile(lit, 0.98)) if lit.size else 1.0
+
+
+def mask_image(mask: np.ndarray) -> np.ndarray:
+    """A mask (H, W) as black and white."""
+    return np.repeat(np.where(mask, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
+
+
+def agreement_image(claimed: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Masks compared: agreed light grey, missed blue, wrongly claimed red-orange."""
+    image = np.zeros((*true.shape, 3), np.uint8)
+    image[claimed & true] = AGREED
+    image[~claimed & true] = MISSED
+    image[claimed & ~true] = WRONG
+    return image
+
+
+def depth_image(z_mm: np.ndarray, near_mm: float, far_mm: float) -> np.ndarray:
+    """Depth in viridis from near (bright) to far (dark); no answer and nothing hit are black."""
+    from matplotlib import colormaps
+
+    known = np.isfinite(z_mm)
+    place = (far_mm - np.where(known, z_mm, far_mm)) / max(far_mm - near_mm, 1e-9)
+    image = (colormaps["viridis"](np.clip(place, 0, 1))[..., :3] * 255).astype(np.uint8)
+    image[~known] = 0
+    return image
+
+
+def png_bytes(image: np.ndarray) -> bytes:
+    """An 8-bit RGB image (H, W, 3) as PNG."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(image)).save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
+
+
+def data_uri(image: np.ndarray) -> str:
+    """An 8-bit RGB image as a data URI for HTML."""
+    return "data:image/png;base64," + base64.b64encode(png_bytes(image)).decode("ascii")
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """Write an 8-bit RGB image (H, W, 3)."""
+    from pcii.core.safe_files import write_bytes_safely
+
+    write_bytes_safely(path, png_bytes(image))
+
+
+def interesting_part(truth: Truth | None, focus: list[Segmented]) -> np.ndarray:
+    """Where to look, (H, W) bool: the objects if known, else whatever a method found."""
+    if truth is not None and (truth.object_id > 0).any():
+        return truth.object_id > 0
+    return np.logical_or.reduce([one.in_focus.any(axis=0) for one in focus])

@@ -1,0 +1,188 @@
+"""The dataset folder on disk: its layout, and what may be in its manifest.
+
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
+                             its own checksum (see `pcii.io.sealed_json`)
+    counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
+    photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
+    truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
+    radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
+
+The manifest is written last and lists what belongs to the dataset: a dataset without a manifest is
+unfinished, a file whose hash differs is damaged, and what is not listed is not read.
+"""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from pcii.core.safe_files import sync_folder
+from pcii.io.sealed_json import read_sealed, write_sealed
+from pcii.io.zarr_groups import Label
+
+FORMAT = "photon-integral-imaging dataset"
+FORMAT_VERSION = 2
+MANIFEST = "manifest.json"
+MARKER = ".unfinished.json"
+"""In a dataset's folder while it is made."""
+COUNTS = "counts.zarr"
+TRUTH = "truth.zarr"
+PHOTON_TRUTH = "photon_truth.zarr"
+RADIANCE = "radiance"
+REMEDY = "generate the dataset again"
+
+VIEW_AXES = ("camera_row", "camera_col", "row", "col")
+CAMERA_AXES = VIEW_AXES[:2]
+MAP_AXES = VIEW_AXES[2:]
+
+COUNTS_LABELS = {
+    "k": Label(("event",), "row of the camera, from the top"),
+    "l": Label(("event",), "column of the camera, from the left"),
+    "i": Label(("event",), "row of the pixel, from the top"),
+    "j": Label(("event",), "column of the pixel, from the left"),
+    "n": Label(("event",), "photons that the pixel counted", "photons"),
+    "dense": Label(VIEW_AXES, "photons that each pixel counted", "photons"),
+}
+PHOTON_TRUTH_LABELS = {
+    "object_id": Label(
+        ("photon",),
+        "key of the manifest's objects that the photon's path hit first; 0 for the "
+        "backdrop, -1 for a count without a photon",
+    ),
+    "z_mm": Label(("photon",), "planar depth of the first hit; +inf for none", "mm"),
+}
+_MAPS = {
+    "z_mm": Label(MAP_AXES, "planar depth; +inf where nothing is hit", "mm"),
+    "object_id": Label(
+        MAP_AXES, "key of the manifest's objects; 0 for the backdrop and where nothing is hit"
+    ),
+    "normal": Label(
+        (*MAP_AXES, "axis"),
+        "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
+        "0 where nothing is hit",
+    ),
+    "coverage": Label(
+        MAP_AXES, "share of the pixel's square that belongs to the object (or to none) that its centre hits"
+    ),
+}
+TRUTH_LABELS = {
+    **_MAPS,
+    **{
+        f"view_{name}": Label((*CAMERA_AXES, *label.dims), f"of every camera: {label.meaning}", label.unit)
+        for name, label in _MAPS.items()
+    },
+    "in_focus": Label(
+        ("plane", *MAP_AXES), "blur half-extent of at most 1 px at each depth of in_focus_z_mm"
+    ),
+    "visible_views": Label(MAP_AXES, "cameras that see the point; 0 where nothing is hit", "cameras"),
+    "camera_position_mm": Label((*CAMERA_AXES, "axis"), "where the cameras really are", "mm"),
+    "camera_rotation": Label(
+        (*CAMERA_AXES, "axis", "direction"), "its columns are the cameras' right, down and forward directions"
+    ),
+}
+
+
+def radiance_name(k: int, l: int) -> str:
+    """Path of one view's radiance inside the dataset."""
+    return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
+
+
+def nested_name(part: str, budget: float | None) -> str:
+    """Name of a part of the dataset for a smaller photon budget; the part's own name for None."""
+    if budget is None:
+        return part
+    stem, suffix = part.rsplit(".", 1)
+    return f"{stem}-{budget:.12g}.{suffix}"
+
+
+def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
+    """Write the manifest of a dataset, with its checksum; from then on the dataset is finished."""
+    write_sealed(root / MANIFEST, {"format": FORMAT, "format_version": FORMAT_VERSION, **manifest})
+
+
+def read_manifest(root: Path) -> dict[str, Any]:
+    """The manifest of a finished dataset, every field that this package uses checked.
+
+    Raises `InputError` if there is none, if it was changed since it was written, or if it is not one.
+    """
+    from pcii.io.manifest_schema import DatasetManifest, validate
+
+    path = root / MANIFEST
+    if not root.is_dir():
+        raise InputError(f"{root}: there is no such dataset folder")
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
+    if not path.is_file():
+        raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
+    manifest = read_sealed(path, REMEDY)
+    if manifest.get("format") != FORMAT:
+        raise InputError(f"{path}: not the manifest of a {FORMAT}")
+    if manifest.get("format_version") != FORMAT_VERSION:
+        raise InputError(
+            f"{path}: format version {manifest.get('format_version')!r} is not supported; "
+            f"this release reads version {FORMAT_VERSION}"
+        )
+    validate(DatasetManifest, manifest, path, REMEDY)
+    return manifest
+
+
+def lists_part(files: Iterable[str], part: str) -> bool:
+    """Whether any of the listed files is `part` or in it."""
+    return any(name == part or name.startswith(f"{part}/") for name in files)
+
+
+def write_exr_safely(path: Path, image: np.ndarray) -> None:
+    """A float32 image (H, W, C), C = 1 or 3, as EXR with ZIP compression."""
+    import OpenEXR
+
+    names = ("Y",) if image.shape[2] == 1 else ("R", "G", "B")
+    planes = {name: np.ascontiguousarray(image[..., c], np.float32) for c, name in enumerate(names)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with OpenEXR.File(header, planes) as file:
+            file.write(str(temporary))
+        with temporary.open("rb") as written:
+            os.fsync(written.fileno())
+        temporary.replace(path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B.
+
+    Raises `InputError` if it cannot be read or, where `shape` is given, has another; that is seen in its
+    header, before there is memory asked for its pixels.
+    """
+    import OpenEXR
+
+    try:
+        if shape is not None and _exr_shape(path) != tuple(shape):
+            raise InputError(f"{path}: expected an image {tuple(shape)}, got {_exr_shape(path)}")
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            channels = file.channels()
+            names = ("Y",) if "Y" in channels else ("R", "G", "B")
+            return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
+    except InputError:
+        raise
+    except (KeyError, RuntimeError, TypeError, ValueError) as fault:
+        raise InputError(f"{path}: cannot be read as an EXR image ({fault})") from None
+
+
+def _exr_shape(path: Path) -> tuple[int, int, int]:
+    """Shape (H, W, C) that an EXR file's header tells."""
+    import OpenEXR
+
+    with OpenEXR.File(str(path), header_only=True) as file:
+        header = file.header()
+        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
+        is_mosaic = any(channel.name == "Y" for channel in header["channels"])
+    return bottom - top + 1, right - left + 1, 1 if is_mosaic else 3

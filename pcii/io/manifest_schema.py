@@ -1,0 +1,159 @@
+"""What a manifest must hold, as pydantic models; what they do not name is allowed and not looked at.
+
+Imported when a manifest is read, not with the package: pydantic takes a tenth of a second to load.
+"""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from pcii.core.bayer import check_cfa
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.plain_text import visible
+
+MOST_FILE_BYTES = 1 << 50
+MOST_PHOTONS = 1 << 62
+"""More cannot be added up in 64 bits."""
+
+
+def _relative(path: str) -> str:
+    parts = PurePosixPath(path).parts
+    if not parts or path != "/".join(parts) or ".." in parts or path.startswith("/") or "\0" in path:
+        raise ValueError(f"expected a path inside the folder such as counts.zarr/k/zarr.json, got {path!r}")
+    return path
+
+
+def _text(value: Any) -> str:
+    # pydantic's own str refuses names of files whose bytes are no characters.
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, got {type(value).__name__}")
+    return value
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow", frozen=True, allow_inf_nan=False)
+
+
+Real = Annotated[float, Field(strict=False)]
+Text = Annotated[Any, AfterValidator(_text)]
+Seconds = Annotated[Real, Field(ge=0)]
+Photons = Annotated[Real, Field(ge=0, le=MOST_PHOTONS)]
+Depth = Annotated[Real, Field(gt=0)]
+FileName = Annotated[str, AfterValidator(_relative)]
+ObjectKey = Annotated[str, Field(pattern=re.compile(r"\A-?[0-9]{1,9}\Z"))]
+
+
+class FileEntry(_Part):
+    """Size and hash of a file."""
+
+    bytes: Annotated[int, Field(ge=0, le=MOST_FILE_BYTES)]
+    sha256: Annotated[str, Field(pattern=re.compile(r"\A[0-9a-f]{64}\Z"))]
+
+
+class Analysis(_Part):
+    """Depths that the recipe suggests."""
+
+    z_mm: Annotated[list[Depth] | None, Field(max_length=10_000)] = None
+    z_range_mm: Annotated[list[Depth] | None, Field(min_length=2, max_length=2)] = None
+
+
+class RecipePhotons(_Part):
+    """Photon budgets of the recipe."""
+
+    scope: str | None = None
+    budget: Photons | None = None
+    nested: list[Photons] | None = None
+
+
+class RecipeRender(_Part):
+    """How the recipe asked for radiance."""
+
+    samples_per_pixel: int | None = None
+
+
+class Recipe(_Part):
+    """What is read of the recipe."""
+
+    scene: str | None = None
+    seed: int | None = None
+    photons: RecipePhotons = RecipePhotons()
+    render: RecipeRender | None = None
+
+
+class Backend(_Part):
+    """What rendered the data."""
+
+    variant: str
+    mitsuba: str
+
+
+class PhotonLog(_Part):
+    """How the photons were drawn."""
+
+    method: str | None = None
+    total: int | None = None
+    paths: int | None = None
+    dense_paths_instead: int | None = None
+    samples_per_pixel: int | None = None
+    rendering_noise: Real | None = None
+
+
+class Grid(_Part):
+    """The members of a `CameraGrid`, which looks at their values itself."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rows: Any
+    cols: Any
+    pitch_mm: Any
+    focal_mm: Any
+    pixel_mm: Any
+    height: Any
+    width: Any
+    shear_px: Any = (0.0, 0.0)
+
+
+class DatasetManifest(_Part):
+    """The manifest of a dataset."""
+
+    title: Text | None = None
+    identity: str | None = None
+    grid: Grid
+    cfa: str | None
+    radiance_channels: Literal[1, 3] | None = None
+    objects: dict[ObjectKey, Text] = {}
+    analysis: Analysis | None = None
+    recipe: Recipe = Recipe()
+    backend: Backend | None = None
+    photons: PhotonLog | None = None
+    timings_s: dict[str, Seconds] = {}
+    files: dict[FileName, FileEntry]
+
+
+class ResultsManifest(_Part):
+    """The manifest of a folder of results."""
+
+    dataset: Text
+    identity: str | None
+    budget: Photons | None
+    files: dict[FileName, FileEntry]
+
+
+def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:
+    """Raise `InputError` for the first member that is not as the model says; it names path and member."""
+    try:
+        model.model_validate(document)
+        if model is DatasetManifest:
+            CameraGrid(**document["grid"])
+            check_cfa(document["cfa"])
+    except ValidationError as fault:
+        first = fault.errors(include_url=False)[0]
+        where = ".".join(str(step) for step in first["loc"] if step != "[key]")
+        sentence = f"{where}: {first['msg'].removeprefix('Value error, ')}"
+        raise InputError(f"{path}: {visible(sentence)}; {remedy}") from None
+    except InputError as fault:
+        raise InputError(f"{path}: {visible(str(fault))}; {remedy}") from None

@@ -1,0 +1,126 @@
+"""JSON documents that list the files of a folder and carry a checksum of themselves.
+
+The last member of such a document is "sha256": the SHA-256 of the file's bytes with 64 zeros in its place.
+"""
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from pcii.core.errors import InputError
+from pcii.core.safe_files import json_bytes, write_bytes_safely
+
+LARGEST_DOCUMENT_BYTES = 1 << 24
+"""JSON takes up to 30 times its length in memory; a list of 100 000 files is shorter than this."""
+_BLANK = b"0" * 64
+_SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"\n\}\n\Z')
+_CHUNK = 1 << 20
+
+
+def write_sealed(path: Path, document: Mapping[str, Any]) -> None:
+    """Write `document` with its checksum, safely."""
+    blank = json_bytes({**document, "sha256": _BLANK.decode()})
+    write_bytes_safely(path, _with_seal(blank, hashlib.sha256(blank).hexdigest().encode()))
+
+
+def read_sealed(path: Path, remedy: str) -> dict[str, Any]:
+    """The members of a sealed document; `InputError`, ending in `remedy`, if its checksum is not right."""
+    content = read_small(path, LARGEST_DOCUMENT_BYTES, remedy)
+    found = _SEAL.search(content)
+    if found is None:
+        raise InputError(f"{path}: damaged or of another release, it does not end in its checksum; {remedy}")
+    blank = _with_seal(content, _BLANK)
+    if hashlib.sha256(blank).hexdigest().encode() != found[1]:
+        raise InputError(f"{path}: changed since it was written, its checksum does not match; {remedy}")
+    document = parse_json(content, path, remedy)
+    return {name: value for name, value in document.items() if name != "sha256"}
+
+
+def _with_seal(content: bytes, seal: bytes) -> bytes:
+    end = len(content) - len(b'"\n}\n')
+    return content[: end - len(seal)] + seal + content[end:]
+
+
+def read_small(path: Path, limit: int, remedy: str) -> bytes:
+    """Content of a regular file of at most `limit` bytes; else `InputError`."""
+    if not path.is_file():
+        raise InputError(f"{path}: missing; {remedy}")
+    try:
+        with path.open("rb") as file:
+            content = file.read(limit + 1)
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
+    if len(content) > limit:
+        raise InputError(f"{path}: larger than the {limit} bytes that such a file has at most; {remedy}")
+    return content
+
+
+def parse_json(content: bytes, path: Path, remedy: str) -> dict[str, Any]:
+    """The JSON object in `content`; `InputError` that names `path` for anything else."""
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is no JSON")
+
+    try:
+        document = json.loads(content.decode("utf-8"), parse_constant=refuse)
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{path}: damaged, it is not valid JSON ({fault}); {remedy}") from None
+    if not isinstance(document, dict):
+        raise InputError(f"{path}: damaged, it is not a JSON object; {remedy}")
+    return document
+
+
+def hash_file(path: Path) -> str:
+    """SHA-256 of a file, in hex."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def list_files(root: Path, parts: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Size and SHA-256 of every file of the named parts (files or folders), by path relative to `root`."""
+    entries: dict[str, dict[str, Any]] = {}
+    for part in parts:
+        top = root / part
+        files = [top] if top.is_file() else sorted(p for p in top.rglob("*") if p.is_file())
+        for file in files:
+            name = file.relative_to(root).as_posix()
+            entries[name] = {"bytes": file.stat().st_size, "sha256": hash_file(file)}
+    return entries
+
+
+def check_file(root: Path, name: str, entry: Mapping[str, Any], remedy: str, *, content: bool) -> None:
+    """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
+    path = root / name
+    try:
+        if not path.is_file():
+            raise InputError(f"{path}: listed in the manifest but missing; {remedy}")
+        size = path.stat().st_size
+        if size != entry["bytes"]:
+            raise InputError(
+                f"{path}: truncated or changed, {size} bytes where the manifest says {entry['bytes']}; "
+                f"{remedy}"
+            )
+        if content and hash_file(path) != entry["sha256"]:
+            raise InputError(f"{path}: its content does not match the manifest's SHA-256; {remedy}")
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
+
+
+def strays(root: Path, listed: Iterable[str]) -> list[str]:
+    """What is in the folder `root` and is neither listed nor a folder of what is, by path relative to it."""
+    files = set(listed)
+    folders = {parent.as_posix() for name in files for parent in Path(name).parents}
+    found: list[str] = []
+    for top, inner, names in os.walk(root):
+        here = Path(top).relative_to(root)
+        found += [name for name in ((here / n).as_posix() for n in names) if name not in files]
+        for folder in list(inner):
+            name = (here / folder).as_posix()
+            if name not in folders or (root / name).is_symlink():
+                inner.remove(folder)
+                found.append(f"{name}/")
+    return sorted(found)

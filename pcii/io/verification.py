@@ -1,0 +1,38 @@
+"""Whether a dataset, or a folder of results, is what was written: every file, and no more."""
+
+from pathlib import Path
+
+from pcii.core.console import Report, silent
+from pcii.core.errors import InputError
+from pcii.io.dataset_layout import MANIFEST, REMEDY, read_manifest
+from pcii.io.results_list import RESULTS, read_results
+from pcii.io.sealed_json import check_file, strays
+
+MOST_TOLD = 5
+"""So many faults are told by name."""
+
+
+def verify(path: Path, report: Report = silent) -> int:
+    """Compare every file of a dataset or of results with its manifest; the number of files.
+
+    Raises `InputError` that names the faults: files that are missing, truncated or changed, and what is
+    there although the manifest does not list it.
+    """
+    is_results = (path / RESULTS).exists() and not (path / MANIFEST).exists()
+    name, remedy = (RESULTS, "make them again") if is_results else (MANIFEST, REMEDY)
+    files = read_results(path)["files"] if is_results else read_manifest(path)["files"]
+    faults: list[str] = []
+    for done, (file, entry) in enumerate(files.items(), start=1):
+        try:
+            check_file(path, file, entry, remedy, content=True)
+        except InputError as fault:
+            faults.append(str(fault))
+        report("verify", done, len(files))
+    if faults:
+        more = f", and {len(faults) - 1} more of {len(files)} files are wrong" if len(faults) > 1 else ""
+        raise InputError(f"{faults[0]}{more}")
+    extra = strays(path, [name, *files])
+    if extra:
+        named = ", ".join(extra[:MOST_TOLD]) + (", ..." if len(extra) > MOST_TOLD else "")
+        raise InputError(f"{path}: not listed in {name}, and read by nothing: {named}; move it away")
+    return len(files)

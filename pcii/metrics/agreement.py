@@ -1,0 +1,71 @@
+"""How well two masks agree, and whether the photons that a method keeps are the right ones."""
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from pcii.core.estimates import Segmented
+from pcii.core.geometry import blur_half_extent_px, project_to_section
+from pcii.core.truth import PhotonTruth, Truth
+from pcii.imaging.mask_outlines import boundary_f
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, objects_by_plane
+
+
+def mask_agreement(
+    claimed: np.ndarray, true: np.ndarray | None, true_share: np.ndarray | None = None
+) -> dict[str, float | None]:
+    """IoU, precision, recall, F1 and boundary F of two masks (H, W).
+
+    `true_share` (H, W) is how much of each pixel is true, if that is known more finely. Two empty masks
+    agree fully. Precision is None if nothing is claimed, recall if nothing is true.
+    """
+    if true is None:
+        return dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f"))
+    both, claims, facts = (int(np.count_nonzero(m)) for m in (claimed & true, claimed, true))
+    either = claims + facts - both
+    return {
+        "iou": both / either if either else 1.0,
+        "precision": both / claims if claims else None,
+        "recall": both / facts if facts else None,
+        "f1": 2 * both / (claims + facts) if either else 1.0,
+        "boundary_f": boundary_f(claimed, true, true_share) if either else 1.0,
+    }
+
+
+def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: str) -> dict[str, float | None]:
+    """Precision and recall of the photons that a method keeps, against where each came from.
+
+    A photon is kept if `photon_in_focus` says so of its event or, without one, if the voxel that it lands
+    on in the section is claimed. It is rightly kept if its object belongs to the plane ("object"), or if
+    its first hit is in focus there ("pixel"). Photons that land outside the section do not count.
+    Raises `InputError` if `photon_in_focus` is of other events than the truth.
+    """
+    if truth is None or truth.photons is None:
+        return {"photon_precision": None, "photon_recall": None}
+    grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
+    row, col, inside = project_to_section(grid, photons, z0)
+    if focus.photon_in_focus is None:
+        kept = focus.in_focus[plane][row[inside], col[inside]]
+    else:
+        kept = _by_photon(focus.photon_in_focus[plane], photons)[inside]
+    if kind == "object":
+        own = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
+        right = np.isin(photons.object_id[inside], own)
+    else:
+        right = blur_half_extent_px(grid, photons.z_mm[inside], z0) <= FOCUS_TOLERANCE_PX
+    both = int(np.count_nonzero(kept & right))
+    return {
+        "photon_precision": both / int(kept.sum()) if kept.any() else None,
+        "photon_recall": both / int(right.sum()) if right.any() else None,
+    }
+
+
+def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
+    """What is said of each event (N,) for each of its photons: in the truth they are a run of one pixel."""
+    where = np.stack([photons.k, photons.l, photons.i, photons.j])
+    event = np.cumsum(np.any(np.diff(where, axis=1, prepend=-1), axis=0)) - 1
+    events = int(event[-1]) + 1 if event.size else 0
+    if by_event.size != events:
+        raise InputError(
+            f"photon_in_focus: tells of {by_event.size} events, and the truth's photons are of {events}"
+        )
+    return by_event[event]

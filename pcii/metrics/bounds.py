@@ -1,0 +1,168 @@
+"""How good it could be: masks from the true depth, and how well photons can tell depth at all.
+
+Notation: u total disparity spread in px; g gradient of the logarithm of the rate, per px; N photons; the
+rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k), where a_l = (l - (L-1)/2)
+d_x / u and b_k likewise. The Fisher information of u is then N (<a^2> <g_x^2> + <b^2> <g_y^2>).
+"""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import Segmented
+from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
+from pcii.core.images import Sections
+from pcii.core.truth import Truth
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, object_masks, objects_by_plane, pixel_masks
+
+TEXTURE_SIGMA_PX = 0.5
+"""Rates are smoothed by this before their gradient is taken: enough to fill voxels that miss a colour.
+
+Natural texture has more gradient the closer one looks: with 1 px bounds are about half as large again.
+"""
+AWAY_FROM_EDGES_PX = 4
+"""Three of these sigmas, one pixel of blur and one of the difference: no outline gets into the texture."""
+
+
+def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"] = "pixel") -> Segmented:
+    """In-focus masks (Z, H, W) of a method that knows each pixel's true depth and nothing else.
+
+    A pixel belongs to the plane of `sections` that is nearest in disparity. For the truth by "pixel" it
+    is claimed there if its blur half-extent is at most the tolerance of that truth, 1 px; for the truth
+    by "object", which has no tolerance, if it shows an object. Raises `InputError` for another kind, or
+    if shapes differ.
+    """
+    if kind not in ("object", "pixel"):
+        raise InputError(f"kind: use 'object' or 'pixel', not {kind!r}")
+    if sections.counts.shape[1:3] != truth.z_mm.shape:
+        raise InputError(f"truth: its maps are {truth.z_mm.shape}, the sections {sections.counts.shape[1:3]}")
+    z_mm = sections.z_mm
+    blur = np.stack([blur_half_extent_px(sections.grid, truth.z_mm, z) for z in z_mm])
+    nearest = np.argmin(blur, axis=0) == np.arange(z_mm.size)[:, None, None]
+    shown = truth.object_id > 0 if kind == "object" else blur <= FOCUS_TOLERANCE_PX
+    return Segmented(z_mm, nearest & shown, "oracle", sections)
+
+
+def camera_information(grid: CameraGrid) -> tuple[float, float]:
+    """Mean square of the cameras' shifts per px of total disparity spread, (horizontal, vertical).
+
+    (n + 1) / (12 (n - 1)) along an axis of n cameras that has the whole spread: 0.102 for 10. An axis
+    of less spread has less by its square, one of a single camera 0.
+    """
+    spread = float(total_disparity_px(grid, 1.0))
+    if spread == 0:
+        return 0.0, 0.0
+    d_x, d_y = (float(d) / spread for d in parallax_px(grid, 1.0))
+    return (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
+
+
+def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[float, float]) -> float | None:
+    """Least standard deviation of total disparity spread that any unbiased method can have, in px.
+
+    The Cramer-Rao bound 1 / sqrt(N (c_x <g_x^2> + c_y <g_y^2>)) for a surface at one depth with a known
+    texture that shows N = `photons` in all views together; `gradient_squared` is (<g_x^2>, <g_y^2>), means
+    over the photons. None where nothing tells depths apart: no photon, no texture, a single camera.
+    """
+    c_x, c_y = camera_information(grid)
+    information = photons * (c_x * gradient_squared[0] + c_y * gradient_squared[1])
+    return float(1 / np.sqrt(information)) if information > 0 else None
+
+
+def log_gradient_squared(
+    counts: np.ndarray, coverage: np.ndarray, inside: np.ndarray
+) -> tuple[float, float] | None:
+    """(<g_x^2>, <g_y^2>) per px^2 of the rate counts / coverage (H, W, C), over the photons `inside` (H, W).
+
+    Each colour weighs as many photons as its sites bring; a mean over photons of (grad rate / rate)^2 is
+    the sum of (grad rate)^2 / rate over that of rate. None if there is no light inside.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    smooth = {"sigma": (TEXTURE_SIGMA_PX, TEXTURE_SIGMA_PX, 0), "mode": "constant"}
+    samples = gaussian_filter(coverage.astype(np.float64), **smooth)
+    rate = gaussian_filter(counts.astype(np.float64), **smooth) / np.maximum(samples, 1e-9)
+    weight = coverage[inside].mean(axis=0, dtype=np.float64)
+    light = float((weight * rate[inside]).sum())
+    if light <= 0:
+        return None
+    down, across = (np.gradient(rate, axis=axis)[inside] for axis in (0, 1))
+    # A rate of 0 has no photons, so its gradient counts for nothing.
+    per_rate = weight / np.maximum(rate[inside], 1e-6 * rate.max())
+    return float((per_rate * across**2).sum() / light), float((per_rate * down**2).sum() / light)
+
+
+def plane_bounds(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
+    """For each row of the score's planes: the IoU that `oracle` would have there."""
+    grid, z_mm = focus.sections.grid, focus.z_mm
+    true = {"object": object_masks(grid, truth, z_mm), "pixel": pixel_masks(grid, truth, z_mm)}
+    known = {
+        "object": oracle(focus.sections, truth, kind="object").in_focus,
+        "pixel": oracle(focus.sections, truth, kind="pixel").in_focus,
+    }
+    return [
+        {
+            "z_mm": float(depth),
+            "method": focus.method,
+            "truth": kind,
+            "iou_oracle": _iou(known[kind][plane], true[kind][plane]),
+        }
+        for plane, depth in enumerate(z_mm)
+        for kind in true
+    ]
+
+
+def object_bounds(
+    truth: Truth, full_light: Sections | None, sections: Sections | None
+) -> list[dict[str, Any]]:
+    """For each object: its photons, its texture and the bound on its depth that follows from them.
+
+    The texture is that of the full-light section at the object's plane, where the object is in focus there
+    and away from its edges. Photons are counted by where they came from if the truth knows it, else in the
+    object's pixels of the photon section. `depth_sigma_px` is None without full light, texture or photons.
+    """
+    rows: list[dict[str, Any]] = []
+    for number, name in sorted(truth.names.items()):
+        photons = _photons(number, truth, sections)
+        gradient = None if full_light is None else _texture(number, truth, full_light)
+        sigma = None
+        if full_light is not None and gradient is not None and photons is not None:
+            sigma = depth_bound_px(full_light.grid, photons, gradient)
+        rows.append(
+            {
+                "name": name,
+                "photons": photons,
+                "log_gradient_per_px": None if gradient is None else float(np.sqrt(sum(gradient))),
+                "depth_sigma_px": sigma,
+            }
+        )
+    return rows
+
+
+def _photons(number: int, truth: Truth, sections: Sections | None) -> int | None:
+    if truth.photons is not None:
+        return int(np.count_nonzero(truth.photons.object_id == number))
+    if sections is None:
+        return None
+    plane = objects_by_plane(sections.grid, truth, sections.z_mm).get(number)
+    return 0 if plane is None else int(sections.counts[plane][truth.object_id == number].sum())
+
+
+def _texture(number: int, truth: Truth, full_light: Sections) -> tuple[float, float] | None:
+    from scipy.ndimage import binary_erosion
+
+    plane = objects_by_plane(full_light.grid, truth, full_light.z_mm).get(number)
+    if plane is None:
+        return None
+    blur = blur_half_extent_px(full_light.grid, truth.z_mm, full_light.z_mm[plane])
+    sharp = (truth.object_id == number) & (blur <= FOCUS_TOLERANCE_PX)
+    inside = binary_erosion(sharp, iterations=AWAY_FROM_EDGES_PX)
+    if not inside.any():
+        return None
+    return log_gradient_squared(full_light.counts[plane], full_light.coverage[plane], inside)
+
+
+def _iou(claimed: np.ndarray, true: np.ndarray) -> float:
+    either = int(np.count_nonzero(claimed | true))
+    return int(np.count_nonzero(claimed & true)) / either if either else 1.0

@@ -1,0 +1,142 @@
+"""How right it was: masks, depth and entropies against the truth.
+
+The one place where estimate and truth meet.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.geometry import blur_half_extent_px
+from pcii.core.images import Sections
+from pcii.core.truth import Truth
+from pcii.imaging.mask_outlines import object_share
+from pcii.metrics.agreement import mask_agreement, photon_agreement
+from pcii.metrics.bounds import object_bounds, plane_bounds
+from pcii.metrics.depth_accuracy import depth_errors
+from pcii.metrics.true_masks import object_masks, objects_by_plane, pixel_masks
+from pcii.sections.photon_statistics import (
+    entropy_bits,
+    pooled_estimate,
+    region_entropy_bits,
+    section_window_px,
+)
+
+
+def score(
+    focus: Segmented | Sequence[Segmented] | None,
+    depth: DepthMap | None,
+    truth: Truth | None,
+    *,
+    grid: CameraGrid | None = None,
+    full_light: Sections | None = None,
+    dataset: str | None = None,
+) -> Score:
+    """Compare in-focus masks and a depth map with the truth.
+
+    `planes` has a row per method and plane for each kind of truth. "object": the objects whose
+    visible surface is closest to this plane. "pixel": the points whose blur half-extent
+    |disparity(z) - disparity(z0)| (N - 1) / 2 is at most 1 px. `boundary_f` is the F-measure of the
+    outlines with a tolerance of 2 px, located within pixels if the truth has `coverage`;
+    `entropy_before` and `entropy_after` are Eq. 9 of the section as a whole, before and after removal,
+    in bits; `claimed_share` is the share of the section that is claimed. `objects` is Table 1: the entropy
+    of each object, with the blur it has at the other planes, at each plane. `depth` is `depth_errors`.
+    `bounds` tells how good it could be: `iou_oracle` for each row of `planes`, and `depth_sigma_px` for
+    each object if `full_light`, the sections of the radiance (Eq. 2), tells its texture.
+
+    A depth map without masks needs `grid`, the cameras. What cannot be known is None. Raises `InputError`
+    if shapes differ or the grid is missing.
+    """
+    methods = [focus] if isinstance(focus, Segmented) else list(focus or ())
+    if methods:
+        grid = methods[0].sections.grid
+    if truth is not None:
+        shapes = [one.in_focus.shape[1:] for one in methods]
+        shapes += [] if depth is None else [depth.z_mm.shape]
+        for shape in shapes:
+            if shape != truth.z_mm.shape:
+                raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shape}")
+        if depth is not None and grid is None:
+            raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
+    pooled = [pooled_estimate(one.sections, section_window_px(one.sections)) for one in methods]
+    rows = [
+        row for one, section in zip(methods, pooled, strict=True) for row in _plane_rows(one, section, truth)
+    ]
+    objects = _object_rows(methods[0], pooled[0], truth) if methods and truth is not None else []
+    bounds: dict[str, Any] = {"planes": [], "objects": []}
+    if truth is not None:
+        bounds["planes"] = [row for one in methods for row in plane_bounds(one, truth)]
+        bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
+    return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds)
+
+
+def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> list[dict[str, Any]]:
+    grid, z_mm = focus.sections.grid, focus.z_mm
+    before, after = _section_entropies(focus, pooled)
+    kinds: list[tuple[str, np.ndarray | None]] = [("object", None), ("pixel", None)]
+    names: dict[int, list[str]] = {}
+    if truth is not None:
+        kinds = [("object", object_masks(grid, truth, z_mm)), ("pixel", pixel_masks(grid, truth, z_mm))]
+        for number, plane in objects_by_plane(grid, truth, z_mm).items():
+            names.setdefault(plane, []).append(truth.names[number])
+    rows: list[dict[str, Any]] = []
+    for plane, depth in enumerate(z_mm):
+        for kind, masks in kinds:
+            owner = ", ".join(names.get(plane, [])) if kind == "object" else ""
+            rows.append(
+                {
+                    "z_mm": float(depth),
+                    "method": focus.method,
+                    "object": owner or None,
+                    "truth": kind,
+                    **_plane_agreement(focus.in_focus[plane], None if masks is None else masks[plane], truth),
+                    **photon_agreement(focus, truth, plane, kind),
+                    "entropy_before": before[plane],
+                    "entropy_after": after[plane],
+                    "claimed_share": float(focus.in_focus[plane].mean()),
+                }
+            )
+    return rows
+
+
+def _plane_agreement(
+    claimed: np.ndarray, true: np.ndarray | None, truth: Truth | None
+) -> dict[str, float | None]:
+    if true is None or truth is None or truth.coverage is None:
+        return mask_agreement(claimed, true)
+    return mask_agreement(claimed, true, object_share(true, truth.object_id, truth.coverage))
+
+
+def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:
+    """Entropy of each section before and after removal, mean over the colours, in bits."""
+    tops = pooled.max(axis=1).max(axis=1)  # axis by axis takes a tenth of the time
+    before: list[float] = []
+    after: list[float] = []
+    for plane, mask, top in zip(pooled, focus.in_focus, tops, strict=True):
+        colours = range(plane.shape[-1])
+        before.append(float(np.mean([entropy_bits(plane[..., c], top[c]) for c in colours])))
+        after.append(float(np.mean([entropy_bits(plane[..., c] * mask, top[c]) for c in colours])))
+    return before, after
+
+
+def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dict[str, Any]]:
+    from scipy.ndimage import binary_dilation
+
+    grid = focus.sections.grid
+    tops = pooled.max(axis=1).max(axis=(0, 1))
+    rows: list[dict[str, Any]] = []
+    for number, name in sorted(truth.names.items()):
+        mask = truth.object_id == number
+        entropy: dict[str, float | None] = {f"{z:g}": None for z in focus.z_mm}
+        if mask.any():
+            surface = truth.z_mm[mask]
+            blur = max(float(blur_half_extent_px(grid, surface, z).mean()) for z in focus.z_mm)
+            region = binary_dilation(mask, iterations=max(1, round(2 * blur)))
+            for z, plane in zip(focus.z_mm, pooled, strict=True):
+                entropy[f"{z:g}"] = region_entropy_bits(plane, region, tops)
+        rows.append({"name": name, "entropy": entropy})
+    return rows

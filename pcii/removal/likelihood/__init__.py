@@ -1,0 +1,14 @@
+"""Removal by likelihood: regions, duels of depths, opaque layers, outlines.
+
+duel               Duels of depths, photon by photon: what does each predict that the others do not?
+guesses            Pieces that may belong to another layer than the one that is seen there now.
+layer_kernels      Compiled loops over rays: which layer does each camera see, and what is behind it?
+layer_search       The search for the opaque layers of least energy: from several starts, then guess by
+                   guess.
+layers             Opaque layers at the requested depths, fitted to all photons together: what hides what?
+likelihood_method  Removal of defocused points by likelihood: what is in focus at each plane, down to a
+                   few photons a pixel.
+outline            Outlines of regions to the pixel: where does a region's light end?
+outline_kernels    The compiled loop that finds an outline of least length (serial: pictures are small).
+regions            Regions of one plane, and whether the light says that they are there.
+"""

@@ -1,0 +1,144 @@
+"""Removal as textbooks would do it: by brightness, by variance, by sharpness. To compare others with.
+
+Each uses one cue alone, with windows as large as the photons demand. All work on the square root of the
+photons in a window, whose noise is the same everywhere (see `pcii.imaging.bright_regions.brightness`).
+"""
+
+import numpy as np
+
+from pcii.core.estimates import Segmented
+from pcii.core.images import Sections
+from pcii.core.photon_counts import PhotonCounts
+from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
+from pcii.imaging.bright_regions import brightness as root_photons
+from pcii.sections.photon_statistics import cells_to_pixels, pooled_estimate, section_window_px, view_samples
+from pcii.sections.probe_planes import with_probes
+from pcii.sections.reconstruction import coverage_of, reconstruct
+
+NOISE = 0.5
+"""Standard deviation of the square root of a Poisson count."""
+LEAST_CONTRAST_SIGMAS = 4.0
+"""Noise alone, cut in two at its mean, gives halves whose means are 2 sqrt(2 / pi) = 1.6 sigma apart."""
+WINDOW_CELLS = 4
+PHOTONS_PER_VIEW = 10.0
+LARGEST_CELL_PX = 8
+POISSON_QUANTILE = 0.999
+"""The variance test passes what Poisson noise exceeds in one window of a thousand."""
+FOCUS_WINDOW = 6
+"""Sharpness is summed over this many pooling windows along each axis."""
+
+
+def brightness(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+    """In focus is what is bright in the section at z: Otsu's threshold on its pooled brightness.
+
+    Otsu 1979. A section whose two classes differ by no more than noise can make is all dark.
+    """
+    sections = reconstruct(counts, z_mm)
+    bright = _bright(_root_photons(sections, section_window_px(sections)))
+    return Segmented(z_mm, bright, "brightness", sections)
+
+
+def variance(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+    """In focus is what is bright at z and varies over the views no more than Poisson noise does.
+
+    Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point follows chi-square
+    with V - 1 degrees of freedom if they all see one rate. A sample x is the photons of one view in a
+    square of even side, which holds each Bayer colour alike, large enough for about 10 of them where it
+    is bright. `steps` holds `bright` and `even`, the outcome of the test.
+    """
+    sections = reconstruct(counts, z_mm)
+    window_px = section_window_px(sections)
+    bright = _bright(_root_photons(sections, window_px))
+    cell_px = _cell_px(pooled_estimate(sections, window_px), bright)
+    even = np.stack([_is_even(counts, z, cell_px) for z in z_mm])
+    return Segmented(z_mm, bright & even, "variance", sections, {"bright": bright, "even": even})
+
+
+def shape_from_focus(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+    """In focus is what is bright at z and sharper there than at any other requested or probe plane.
+
+    Nayar and Nakagawa 1994: sharpness is the modified Laplacian |2 I - I(left) - I(right)| +
+    |2 I - I(above) - I(below)|, one pooling window apart, summed over a window where it exceeds the
+    noise. `steps` holds `bright` and `sharpness`.
+    """
+    compared = with_probes(counts.grid, z_mm)
+    everything = reconstruct(counts, compared)
+    window_px = section_window_px(everything)
+    image = _root_photons(everything, window_px)
+    sharpness = np.stack([sum_modified_laplacian(plane, window_px) for plane in image])
+    count = z_mm.size
+    bright = _bright(image[:count])
+    sharpest = np.argmax(sharpness, axis=0) == np.arange(count)[:, None, None]
+    sections = Sections(counts.grid, z_mm, everything.counts[:count], everything.coverage[:count])
+    steps = {"bright": bright, "sharpness": sharpness[:count]}
+    return Segmented(z_mm, bright & sharpest, "shape-from-focus", sections, steps)
+
+
+def sum_modified_laplacian(image: np.ndarray, step_px: int) -> np.ndarray:
+    """Sharpness (H, W) of an image (H, W) whose noise is `NOISE`, its samples `step_px` apart.
+
+    Nayar and Nakagawa 1994, Eqs. 5 and 6. What is below the noise of a modified Laplacian, sqrt(6) times
+    that of a sample, is not added; borders continue the image.
+    """
+    from scipy.ndimage import correlate1d, uniform_filter
+
+    kernel = np.zeros(2 * step_px + 1)
+    kernel[[0, step_px, -1]] = -1, 2, -1
+    sharp = sum(np.abs(correlate1d(image, kernel, axis, mode="nearest")) for axis in (0, 1))
+    return uniform_filter(np.where(sharp > np.sqrt(6) * NOISE, sharp, 0.0), FOCUS_WINDOW * step_px + 1)
+
+
+def _root_photons(sections: Sections, window_px: int) -> np.ndarray:
+    """Square root of the photons of a pooling window, (Z, H, W)."""
+    pooled = pooled_estimate(sections, window_px)
+    samples = (window_px**2 * float(plane.mean()) * plane.shape[-1] for plane in sections.coverage)
+    return np.stack([root_photons(*pair) for pair in zip(pooled, samples, strict=True)])
+
+
+def _bright(image: np.ndarray) -> np.ndarray:
+    """What exceeds Otsu's threshold in each plane of (Z, H, W), without specks, bool."""
+    from skimage.filters import threshold_otsu
+
+    masks: list[np.ndarray] = []
+    for plane in image:
+        # No two classes are farther apart than the darkest and the brightest; Otsu's histogram needs two.
+        if np.ptp(plane) <= LEAST_CONTRAST_SIGMAS * NOISE:
+            masks.append(np.zeros(plane.shape, dtype=bool))
+            continue
+        mask = plane > threshold_otsu(plane)
+        contrast = plane[mask].mean() - plane[~mask].mean() if mask.any() else 0.0
+        is_real = contrast > LEAST_CONTRAST_SIGMAS * NOISE
+        masks.append(without_specks(mask & is_real, SMALLEST_REGION_PX))
+    return np.stack(masks)
+
+
+def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
+    """Cell size at which a window of `WINDOW_CELLS` holds about 10 photons per view where it is bright."""
+    if not bright.any():
+        return LARGEST_CELL_PX
+    per_pixel = float(pooled.mean(axis=-1)[bright].mean())
+    window_px = np.sqrt(PHOTONS_PER_VIEW / per_pixel)
+    return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
+
+
+def _is_even(counts: PhotonCounts, z_mm: float, cell_px: int) -> np.ndarray:
+    """Where the views' samples vary no more than Poisson noise, (H, W) bool; so does what has no photons."""
+    from scipy.special import chdtri
+
+    samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
+    views = _views(counts, z_mm, cell_px)
+    total = samples.number * samples.mean
+    squares = np.maximum(samples.number - 1, 0) * samples.variance + samples.mean * total
+    dispersion = views * squares / np.maximum(total, 1) - total
+    # chdtri is the inverse of the upper tail.
+    even = dispersion <= chdtri(np.maximum(views - 1, 1), 1 - POISSON_QUANTILE)
+    return cells_to_pixels(even, cell_px, counts.grid)
+
+
+def _views(counts: PhotonCounts, z_mm: float, cell_px: int) -> np.ndarray:
+    """How many views see the middle of each cell, at least 1."""
+    grid = counts.grid
+    coverage = coverage_of(grid, None, 1, z_mm, 1)[..., 0].astype(np.float64)
+    rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in (grid.height, grid.width))
+    at = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
+    return np.maximum(coverage[at], 1)

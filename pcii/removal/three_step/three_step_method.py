@@ -1,0 +1,238 @@
+"""Removal of defocused points in the paper's three steps (Muniraj et al. 2017, section 3).
+
+1. Adaptive threshold on the variance of the non-zero samples (Eq. 7): in focus, the views' samples of
+   a voxel differ by Poisson noise alone.
+2. Boundary detection by Roberts' cross (Eq. 8): the outline of what is bright runs along it, and its
+   ridges cut what is bright into regions.
+3. Entropy criterion (Eq. 9): a region is in focus at the plane where its entropy is lowest.
+
+Where the paper is silent we chose; docs/removal.md gives the reasons and the figures.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import Segmented
+from pcii.core.geometry import total_disparity_px
+from pcii.core.images import Sections
+from pcii.core.photon_counts import PhotonCounts
+from pcii.imaging.bright_regions import (
+    EDGE_SMOOTHING_PX,
+    SMALLEST_REGION_PX,
+    brightness,
+    large_pieces,
+    outlined,
+    roberts_magnitude,
+)
+from pcii.imaging.watershed_pieces import pieces_along_ridges
+from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
+from pcii.sections.photon_statistics import (
+    ViewSamples,
+    cells_to_pixels,
+    photons_around_a_photon,
+    pooled_estimate,
+    section_window_px,
+    truncated_poisson_variance,
+    view_samples,
+)
+from pcii.sections.probe_planes import PROBE_STEPS_PX, with_probes
+from pcii.sections.reconstruction import reconstruct
+
+WINDOW_CELLS = 4
+PHOTONS_PER_SAMPLE = 10.0
+LARGEST_CELL_PX = 8
+"""Eq. 7 pools over 4 x 4 cells, wide enough for about 5 photons per view where the photons are."""
+SIGMAS = 3.0
+FEWEST_SAMPLES = 8
+PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
+LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2
+"""Half-extent of the blur at the farthest probe of what is in focus at its plane."""
+
+
+@dataclass(frozen=True)
+class ThreeStep:
+    """The paper's removal as a method for `pcii.segment`, each step to be left out at will.
+
+    Without `threshold` no point is removed for its variance. Without `boundary` whatever is lit by a photon
+    nearby may stay, and sub-images for the entropy are square tiles. Without `entropy` no region is
+    removed for being sharper elsewhere. Without any, all that is lit stays at every plane.
+
+    With `subpixel` = M outlines are found on voxels M times finer (section 3.1); a pixel is in focus if half
+    of its voxels are. Raises `InputError` for a division below 1.
+
+    >>> focus = pcii.segment(counts, [540, 620], method=ThreeStep(entropy=False))  # doctest: +SKIP
+    """
+
+    subpixel: int = 1
+    threshold: bool = True
+    boundary: bool = True
+    entropy: bool = True
+
+    def __post_init__(self) -> None:
+        M = self.subpixel
+        if isinstance(M, bool) or not isinstance(M, int | np.integer) or M < 1:
+            raise InputError(f"subpixel: expected a whole number of at least 1, got {M!r}")
+
+    @property
+    def name(self) -> str:
+        """What results are called: three-step, and what is different."""
+        missing = [f"without-{step.name}" for step in fields(self) if getattr(self, step.name) is False]
+        fine = [f"subpixel-{self.subpixel}"] if self.subpixel > 1 else []
+        return "-".join(["three-step", *fine, *missing])
+
+    def __call__(self, counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+        """In-focus masks (Z, H, W) at the depths `z_mm` (Z,), with the maps of each step in `steps`.
+
+        Step 1: `mean` and `variance` of the non-zero samples, `threshold` (T of Eq. 7), `answered` (where
+        there were enough samples) and `kept`. Step 2: `edges` (Roberts magnitude), `bright` (what it
+        outlines), `regions` (their numbers, from 1). Step 3: `entropy` of each region at each plane in bits,
+        0 outside, and `winner`, the plane where it is lowest, -1 outside; numbers from Z on are probes.
+        With `subpixel` > 1 `fine` holds the masks (Z, H M, W M) that the pixels are made from.
+        """
+        compared = with_probes(counts.grid, z_mm, clear_px=PROBE_STEP_PX)
+        sections = reconstruct(counts, compared)
+        own = range(z_mm.size)
+        cell_px = _cell_px(sections)
+        first = [
+            adaptive_threshold(counts, z, cell_px, _tolerance_px(counts.grid, z, compared)) for z in z_mm
+        ]
+        steps = {name: np.stack([maps[name] for maps in first]) for name in first[0]}
+
+        window_px = section_window_px(sections)
+        pooled = pooled_estimate(sections, window_px)
+        edges = np.stack([_edges(plane, _samples(sections, p, window_px)) for p, plane in enumerate(pooled)])
+        smooth = _smoothed(edges)
+        fine = np.stack(
+            [self._bright(counts, z, pooled[p], sections, p, window_px) for p, z in enumerate(z_mm)]
+        )
+        bright = _half_of_each_pixel(fine, self.subpixel)
+        anywhere: np.ndarray = np.logical_or.reduce(bright)
+        margin = int(LARGEST_BLUR_PX)
+        if self.boundary:
+            ridges = smooth[: z_mm.size].max(axis=0)
+            regions = pieces_along_ridges(anywhere, ridges, margin**2)
+        else:
+            ridges, regions = None, _tiles(anywhere, 2 * margin)
+        steps |= {"edges": edges[: z_mm.size], "bright": bright, "regions": _for_each(regions, own)}
+
+        kept = np.ones_like(bright)
+        if self.threshold:
+            kept &= steps["kept"]
+        if self.entropy:
+            entropies = edge_entropies(smooth, regions, margin)
+            planes = planes_of_least_entropy(entropies, regions, ridges, window_px)
+            winner = planes[regions]
+            kept &= winner == np.arange(z_mm.size)[:, None, None]
+            steps |= {"entropy": entropies.T[: z_mm.size][:, regions], "winner": _for_each(winner, own)}
+        if self.subpixel > 1:
+            M = self.subpixel
+            steps["fine"] = fine & kept.repeat(M, axis=1).repeat(M, axis=2)
+        requested = Sections(counts.grid, z_mm, sections.counts[: z_mm.size], sections.coverage[: z_mm.size])
+        return Segmented(z_mm, bright & kept, self.name, requested, steps)
+
+    def _bright(
+        self,
+        counts: PhotonCounts,
+        z_mm: float,
+        pooled: np.ndarray,
+        sections: Sections,
+        plane: int,
+        window_px: int,
+    ) -> np.ndarray:
+        """Step 2 on voxels M times finer: what is outlined, (H M, W M); without the step what is lit."""
+        M = self.subpixel
+        samples = _samples(sections, plane, window_px)
+        if M > 1:
+            finer = reconstruct(counts, z_mm, subpixel=M)
+            window = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
+            pooled, samples = pooled_estimate(finer, window)[0], _samples(finer, 0, window)
+        if not self.boundary:
+            return pooled.max(axis=-1) > 0
+        return outlined(pooled, samples, SMALLEST_REGION_PX, M)[1]
+
+
+def adaptive_threshold(
+    counts: PhotonCounts, z_mm: float, cell_px: int, tolerance_px: float
+) -> dict[str, np.ndarray]:
+    """Step 1: where the variance of the non-zero samples is at most T (Eq. 7), and all that it takes.
+
+    Maps (H, W): `mean`, `variance` and `threshold` float32, `kept` and `answered` bool. T is the variance of
+    non-zero Poisson samples of the same mean, plus `SIGMAS` times the sampling error of a variance, about
+    var sqrt(2 / (n - 1)) for n samples, plus what the section changes over the shifts that a surface in
+    focus may have: up to `tolerance_px` either way and the rounding to whole pixels, each uniform. Where
+    there are fewer than `FEWEST_SAMPLES` the step does not object, nor to less than a window of cells.
+    """
+    samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
+    limit = _threshold(samples, cell_px, tolerance_px)
+    known = samples.number >= FEWEST_SAMPLES
+    # One window above T is chance: there are many, and the cells around share its samples.
+    rejected = large_pieces(known & (samples.variance > limit), WINDOW_CELLS**2)
+    maps = {
+        "mean": samples.mean.astype(np.float32),
+        "variance": samples.variance.astype(np.float32),
+        "threshold": limit.astype(np.float32),
+        "answered": known,
+        "kept": ~rejected,
+    }
+    return {name: cells_to_pixels(cells, cell_px, counts.grid) for name, cells in maps.items()}
+
+
+def _threshold(samples: ViewSamples, cell_px: int, tolerance_px: float) -> np.ndarray:
+    noise = truncated_poisson_variance(samples.mean)
+    noise = noise * (1 + SIGMAS * np.sqrt(2 / np.maximum(samples.number - 1, 1)))
+    # The two diagonal differences of Roberts' cross square to twice the squared slope per cell.
+    slope2 = roberts_magnitude(samples.mean) ** 2 / (2 * cell_px**2)
+    return noise + slope2 * (tolerance_px**2 / 3 + 1 / 12)
+
+
+def _tolerance_px(grid: CameraGrid, z_mm: float, compared: np.ndarray) -> float:
+    """Blur half-extent halfway to the nearest other plane: what is nearer to this one may stay."""
+    apart = np.abs(total_disparity_px(grid, compared) - total_disparity_px(grid, z_mm))
+    others = apart[apart > 0]
+    return float(others.min()) / 4 if others.size else 0.0
+
+
+def _cell_px(sections: Sections) -> int:
+    """Cell size at which a window holds `PHOTONS_PER_SAMPLE` photons per view where the photons are."""
+    per_view = photons_around_a_photon(sections) / sections.grid.view_count
+    if per_view == 0:
+        return LARGEST_CELL_PX
+    window_px = np.sqrt(PHOTONS_PER_SAMPLE / per_view)
+    return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
+
+
+def _samples(sections: Sections, plane: int, window: int) -> float:
+    """Samples of all colours in a window of a plane."""
+    return window**2 * float(sections.coverage[plane].mean()) * sections.coverage.shape[-1]
+
+
+def _edges(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
+    return roberts_magnitude(brightness(pooled, samples_per_window)).astype(np.float32)
+
+
+def _smoothed(edges: np.ndarray) -> np.ndarray:
+    from scipy.ndimage import gaussian_filter, uniform_filter
+
+    # As for outlines: from corners to pixels.
+    return gaussian_filter(uniform_filter(edges, 2, axes=(1, 2)), EDGE_SMOOTHING_PX, axes=(1, 2))
+
+
+def _half_of_each_pixel(fine: np.ndarray, M: int) -> np.ndarray:
+    """Pixels (Z, H, W) of which at least half of the M x M voxels are set."""
+    Z, H, W = fine.shape
+    parts = fine.reshape(Z, H // M, M, W // M, M)
+    return 2 * parts.sum(axis=(2, 4), dtype=np.int64) >= M * M
+
+
+def _tiles(lit: np.ndarray, side_px: int) -> np.ndarray:
+    """Sub-images of what is lit without boundaries: square tiles, numbered from 1; 0 where it is dark."""
+    row, col = (np.arange(size) // side_px for size in lit.shape)
+    numbers = 1 + row[:, None] * (col[-1] + 1) + col
+    return np.where(lit, numbers, 0).astype(np.int32)
+
+
+def _for_each(values: np.ndarray, planes: range) -> np.ndarray:
+    return np.broadcast_to(values, (len(planes), *values.shape))

@@ -1,0 +1,14 @@
+"""Sections of the scene: Eqs. 2 and 3 from events and from images, demosaicing (Eqs. 4-6), statistics.
+
+demosaic_kernels   Compiled loops of Laroche-Prescott demosaicing.
+demosaicing        Demosaicing of Bayer images: Laroche and Prescott's gradient based interpolation, and
+                   others to compare.
+dense_kernels      Compiled loops that add up whole images, with their variances.
+dense_sections     Sections of dense images: whole rows of every view added to whole rows of the section.
+event_kernels      Compiled loops over photons: sections, and samples of windows.
+photon_statistics  Statistics of photon counts: pooled samples, entropy, and what Poisson noise alone
+                   would give.
+probe_planes       Planes to compare: an object is in focus at z only if no other depth explains it
+                   better.
+reconstruction     Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.
+"""

@@ -1,0 +1,74 @@
+"""Compiled loops of Laroche-Prescott demosaicing."""
+
+import numba as nb
+import numpy as np
+
+from pcii.core.compiled_loops import compiled, helper
+
+
+@compiled
+def interpolate_green(green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
+    """Green at every pixel of a mosaic (H, W): Eqs. 4 and 5 of Muniraj et al. 2017.
+
+    `cells` (2, 2) are the colours of the Bayer cells. The image goes on by reflection about its border
+    pixels.
+    """
+    height, width = raw.shape
+    for i in nb.prange(height):
+        here, above, below = raw[i], raw[_reflected(i - 1, height)], raw[_reflected(i + 1, height)]
+        far_above, far_below = raw[_reflected(i - 2, height)], raw[_reflected(i + 2, height)]
+        for parity in range(2):
+            if cells[i % 2, parity] == 1:
+                for j in range(parity, width, 2):
+                    green[i, j] = here[j]
+                continue
+            for j in range(parity, width, 2):
+                if 2 <= j < width - 2:
+                    left, right, far_left, far_right = here[j - 1], here[j + 1], here[j - 2], here[j + 2]
+                else:
+                    left, right = here[_reflected(j - 1, width)], here[_reflected(j + 1, width)]
+                    far_left, far_right = here[_reflected(j - 2, width)], here[_reflected(j + 2, width)]
+                alpha = abs((far_left + far_right) / 2 - here[j])
+                beta = abs((far_above[j] + far_below[j]) / 2 - here[j])
+                if alpha < beta:
+                    green[i, j] = (left + right) / 2
+                elif alpha > beta:
+                    green[i, j] = (above[j] + below[j]) / 2
+                else:  # a corner case for photographs, the usual case for photon counts: most are 0
+                    green[i, j] = (above[j] + left + right + below[j]) / 4
+
+
+@compiled
+def interpolate_chroma(image: np.ndarray, green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
+    """Colours (H, W, 3) from a mosaic and its green: Eq. 6, differences from green at their own sites."""
+    height, width = raw.shape
+    for i in nb.prange(height):
+        up, down = _reflected(i - 1, height), _reflected(i + 1, height)
+        for parity in range(2):
+            own, beside = cells[i % 2, parity], cells[i % 2, 1 - parity]
+            across = cells[1 - i % 2, parity]
+            for j in range(parity, width, 2):
+                left, right = j - 1, j + 1
+                if j == 0 or j == width - 1:
+                    left, right = _reflected(left, width), _reflected(right, width)
+                here = green[i, j]
+                image[i, j, 1] = here
+                if own == 1:
+                    horizontal = (raw[i, left] - green[i, left]) + (raw[i, right] - green[i, right])
+                    vertical = (raw[up, j] - green[up, j]) + (raw[down, j] - green[down, j])
+                    image[i, j, beside] = horizontal / 2 + here
+                    image[i, j, across] = vertical / 2 + here
+                else:
+                    above = (raw[up, left] - green[up, left]) + (raw[up, right] - green[up, right])
+                    diagonal = above + (raw[down, left] - green[down, left])
+                    diagonal += raw[down, right] - green[down, right]
+                    image[i, j, own] = raw[i, j]
+                    image[i, j, 2 - own] = diagonal / 4 + here
+
+
+@helper
+def _reflected(index: int, size: int) -> int:
+    """The index inside 0 .. size-1 that stands for this one under reflection about the border pixels."""
+    while index < 0 or index >= size:
+        index = -index if index < 0 else 2 * (size - 1) - index
+    return index

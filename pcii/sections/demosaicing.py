@@ -1,0 +1,87 @@
+"""Demosaicing of Bayer images: Laroche and Prescott's gradient based interpolation, and others to compare.
+
+Muniraj et al. 2017, Eqs. 4-6, with their misprints put right: Eq. 4's second case is the vertical
+pair (G33 + G53) / 2, Eq. 5's (G24 + G44) / 2, and Eq. 6 is three kinds of site, not three cases of
+one. Written for the site, not for the pattern, so all four Bayer patterns are one code. Bilinear
+interpolation, Malvar et al. 2004 and Menon et al. 2007 come from the package colour-demosaicing.
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+
+import numpy as np
+
+from pcii.core.bayer import check_cfa, colour_cells
+from pcii.core.errors import InputError
+
+
+def demosaic(
+    mosaic_HW: np.ndarray, *, cfa: str | None = "GRBG", method: str = "laroche-prescott"
+) -> np.ndarray:
+    """Colour image (H, W, 3) float64 from a Bayer mosaic (H, W).
+
+    `method` is "laroche-prescott", "bilinear", "malvar" or "menon". Borders continue the image by
+    reflection about the border pixels, which keeps the Bayer phase.
+    Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity.
+
+    >>> demosaic(np.ones((4, 4)), cfa="GRBG").shape
+    (4, 4, 3)
+    """
+    if not isinstance(method, str) or method not in METHODS:
+        raise InputError(f"method: no demosaicing named {method!r}; use {', '.join(METHODS)}")
+    check_cfa(cfa)
+    if cfa is None:
+        raise InputError("cfa: a monochrome image has nothing to demosaic")
+    raw = np.asarray(mosaic_HW, dtype=np.float64)
+    if raw.ndim != 2 or min(raw.shape) < 2:
+        raise InputError(f"mosaic: expected an image (H, W) of at least 2 x 2, got {raw.shape}")
+    if not np.all(np.isfinite(raw)):
+        raise InputError("mosaic: holds NaN or infinity")
+    return METHODS[method](raw, cfa)
+
+
+def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
+    from pcii.sections import demosaic_kernels
+
+    cells = colour_cells(cfa).astype(np.int64)
+    green, image = np.empty(raw.shape), np.empty((*raw.shape, 3))
+    demosaic_kernels.interpolate_green(green, raw, cells)
+    demosaic_kernels.interpolate_chroma(image, green, raw, cells)
+    return image
+
+
+def bilinear(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """The mean of the nearest sites of each colour."""
+    return _by_package("demosaicing_CFA_Bayer_bilinear", raw, cfa)
+
+
+def malvar(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Linear interpolation corrected by gradients: Malvar, He and Cutler 2004."""
+    return _by_package("demosaicing_CFA_Bayer_Malvar2004", raw, cfa)
+
+
+def menon(raw: np.ndarray, cfa: str) -> np.ndarray:
+    """Directional filtering with a decision afterwards: Menon, Andriani and Calvagno 2007."""
+    return _by_package("demosaicing_CFA_Bayer_Menon2007", raw, cfa)
+
+
+BORDER_PX = 8
+"""Further than any of these looks; even, so that the Bayer phase stays."""
+
+
+def _by_package(name: str, raw: np.ndarray, cfa: str) -> np.ndarray:
+    """A method of colour-demosaicing on the image continued by reflection: its own borders mix colours."""
+    printing = np.get_printoptions()
+    package = import_module("colour_demosaicing")
+    np.set_printoptions(**printing)  # which the package changes for everyone
+    image = getattr(package, name)(np.pad(raw, BORDER_PX, mode="reflect"), cfa)
+    return np.ascontiguousarray(image[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX])
+
+
+METHODS: dict[str, Callable[[np.ndarray, str], np.ndarray]] = {
+    "laroche-prescott": laroche_prescott,
+    "bilinear": bilinear,
+    "malvar": malvar,
+    "menon": menon,
+}

@@ -1,0 +1,95 @@
+"""Compiled loops over photons: sections, and samples of windows."""
+
+import numba as nb
+import numpy as np
+
+from pcii.core.compiled_loops import compiled
+
+
+@compiled
+def scatter(
+    counts: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    starts: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    n: np.ndarray,
+    bands: int,
+) -> None:
+    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
+
+    `rows` (Z, K, h) and `cols` (Z, L, w) say where each pixel of each camera belongs; `starts` (K L + 1,)
+    where each view's photons begin, which are sorted by row. The sections are cut into `bands` of rows
+    each; a thread clears a band and looks through the photons that fall there.
+    """
+    planes, height, width, _ = counts.shape
+    across = cols.shape[1]
+    for part in nb.prange(planes * bands):
+        plane, band = part // bands, part % bands
+        first, last = height * band // bands, height * (band + 1) // bands
+        counts[plane, first:last] = 0
+        for view in range(starts.size - 1):
+            row_of, col_of = rows[plane, view // across], cols[plane, view % across]
+            low, high = starts[view], starts[view + 1]
+            while low < high:  # the first photon at or below the band's first row
+                middle = (low + high) // 2
+                if row_of[i[middle]] < first:
+                    low = middle + 1
+                else:
+                    high = middle
+            for e in range(low, starts[view + 1]):
+                row = row_of[i[e]]
+                if row >= last:
+                    break
+                col = col_of[j[e]]
+                if 0 <= col < width:
+                    counts[plane, row, col, colour[e]] += n[e]
+
+
+@compiled
+def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
+    """Each row of `target` (N, M) is one of the few `rows` (P, M), by its `kinds` (N,)."""
+    for row in nb.prange(target.shape[0]):
+        target[row] = rows[kinds[row]]
+
+
+@compiled
+def window_samples(
+    number: np.ndarray,
+    total: np.ndarray,
+    squares: np.ndarray,
+    row: np.ndarray,
+    col: np.ndarray,
+    n: np.ndarray,
+    starts: np.ndarray,
+    window: int,
+    bands: int,
+) -> None:
+    """Number, sum and sum of squares of each window's samples that are not zero, (H, W) int64, from zeros.
+
+    A sample is the sum of one view's photons in a window of `window` x `window` cells about a cell. `row`,
+    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
+    thread owns a band of rows. The cost follows the photons times the cells of a window.
+    """
+    height, width = number.shape
+    above = (window - 1) // 2  # of an even window the larger half lies above and left of its cell
+    below = window // 2
+    for band in nb.prange(bands):
+        first, last = height * band // bands, height * (band + 1) // bands
+        sample = np.zeros((last - first, width), np.int64)
+        for view in range(starts.size - 1):
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        sample[i - first, j] += n[e]
+            for e in range(starts[view], starts[view + 1]):
+                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                    for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
+                        here = sample[i - first, j]
+                        if here > 0:  # else another photon of the window has been here
+                            number[i, j] += 1
+                            total[i, j] += here
+                            squares[i, j] += here * here
+                            sample[i - first, j] = 0

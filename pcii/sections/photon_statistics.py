@@ -1,0 +1,157 @@
+"""Statistics of photon counts: pooled samples, entropy, and what Poisson noise alone would give.
+
+At 1000 photons per view a voxel's own samples are degenerate: nine voxels of ten have no photon and
+hardly any has two different non-zero samples. So samples are pooled over small neighbourhoods, which
+is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.geometry import project_to_section
+from pcii.core.images import Sections
+from pcii.core.photon_counts import PhotonCounts
+
+GREY_LEVELS = 256
+"""Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
+PHOTONS_PER_WINDOW = 64.0
+SMALLEST_WINDOW_PX = 3  # below that a Bayer colour may have no site in the window
+LARGEST_WINDOW_PX = 15
+
+
+def entropy_bits(values: np.ndarray, top: float) -> float:
+    """Entropy of the grey-level histogram of `values`, in bits (Eq. 9).
+
+    Levels are 256 equal steps from 0 to `top`; the histogram is normalised, 0 log 0 = 0, and an
+    empty region has entropy 0.
+
+    >>> entropy_bits(np.array([0.0, 0.0, 1.0, 1.0]), top=1.0)
+    1.0
+    """
+    if values.size == 0 or top <= 0:
+        return 0.0
+    levels = np.clip(values * (GREY_LEVELS / top), 0, GREY_LEVELS - 1).astype(np.int64)
+    histogram = np.bincount(levels.ravel())
+    share = histogram[histogram > 0] / values.size
+    return float(abs((share * np.log2(share)).sum()))  # abs: -0.0 is 0
+
+
+def section_window_px(sections: Sections) -> int:
+    """Odd side of the square over which sections are pooled before edges and entropies are taken.
+
+    It holds about 64 photons where the photons are: a relative noise of 1/8.
+    """
+    rate = photons_around_a_photon(sections)
+    side = np.sqrt(PHOTONS_PER_WINDOW / rate) if rate > 0 else LARGEST_WINDOW_PX
+    return int(np.clip(2 * np.floor(side / 2) + 1, SMALLEST_WINDOW_PX, LARGEST_WINDOW_PX))
+
+
+def photons_around_a_photon(sections: Sections) -> float:
+    """How many photons a voxel holds where the photons are, over all colours: the rate that a photon sees.
+
+    That is sum K (K - 1) / sum K, which Poisson noise does not bias; 0 without photons.
+    """
+    photons = squares = 0.0
+    for plane in sections.counts:
+        total = plane[..., 0].astype(np.float64)
+        for colour in range(1, plane.shape[-1]):  # a sum over a last axis of three would take longer
+            total += plane[..., colour]
+        photons += float(total.sum())
+        squares += float(np.vdot(total, total))
+    return squares / photons - 1 if photons > 0 else 0.0
+
+
+def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
+    """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
+
+    Sums before it divides, so that each sample weighs the same; a window that no sample reaches is 0.
+    """
+    from scipy.ndimage import uniform_filter
+
+    size = (0, window_px, window_px, 0)
+    options = {"size": size[1:3], "axes": (1, 2), "mode": "constant"}
+    counts = uniform_filter(sections.counts.astype(np.float64), **options)
+    samples = uniform_filter(sections.coverage.astype(np.float64), **options)
+    # Running sums leave a residue of rounding where there is nothing.
+    floor = 0.5 / window_px**2
+    mean = np.zeros_like(counts)
+    np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
+    return mean
+
+
+def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:
+    """Entropy of one section inside a region (H, W), the mean over its colours.
+
+    `pooled` (H, W, C) is one plane of `pooled_estimate`; `tops` (C,) the brightest level of each
+    colour, the same for all planes that are to be compared.
+    """
+    bits = [entropy_bits(pooled[..., c][region], tops[c]) for c in range(pooled.shape[-1])]
+    return float(np.mean(bits))
+
+
+@dataclass(frozen=True)
+class ViewSamples:
+    """The samples that the views contribute to pooled voxels of one section.
+
+    A cell is `cell_px` pixels wide and a window `window_cells` cells; each view's photons in the
+    window are one sample. All arrays are (H / cell_px, W / cell_px), rounded up.
+    """
+
+    number: np.ndarray
+    """Views whose sample is not zero."""
+    mean: np.ndarray
+    """Mean of the non-zero samples; 0 where there is none."""
+    variance: np.ndarray
+    """Unbiased variance of the non-zero samples; 0 below two samples."""
+
+
+def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
+    """Mean and variance of the non-zero samples of each pooled voxel at depth z (for Eq. 7).
+
+    With cells and windows of 1 these are the samples of single voxels, whatever their colour.
+
+    In focus all views see the same piece of surface, so their samples differ by Poisson noise only;
+    out of focus they see different pieces, and the variance grows. A window of an even number of
+    pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
+    """
+    from pcii.core.compiled_loops import threads
+    from pcii.sections import event_kernels as kernels
+
+    grid, events = counts.grid, counts.events
+    row, col, inside = project_to_section(grid, events, z_mm)
+    shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
+    number, total, squares = (np.zeros(shape, dtype=np.int64) for _ in range(3))
+    # Events are sorted by view, so each view's are one run.
+    starts = np.append(0, np.cumsum(inside))[counts.view_starts]
+    cells = row[inside] // cell_px, col[inside] // cell_px
+    kernels.window_samples(number, total, squares, *cells, events.n[inside], starts, window_cells, threads())
+    mean = total / np.maximum(number, 1)
+    # n Q - S^2 in integers cannot cancel.
+    spread = number * squares - total * total
+    variance = spread / np.maximum(number * (number - 1), 1)
+    return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
+
+
+def cells_to_pixels(cells: np.ndarray, cell_px: int, grid: CameraGrid) -> np.ndarray:
+    """Values on cells, (H / cell_px, W / cell_px) rounded up, as values on pixels (H, W)."""
+    full = cells.repeat(cell_px, axis=0).repeat(cell_px, axis=1)
+    return full[: grid.height, : grid.width]
+
+
+def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
+    """Variance of the non-zero samples of a Poisson variable whose non-zero samples have this mean.
+
+    If the rate is r, non-zero samples have the mean m = r / (1 - exp(-r)) and the variance
+    m (1 + r - m). The rate is found from the mean by Newton's method; a mean of 1 or less is rate 0.
+    """
+    m = np.maximum(np.asarray(mean, dtype=np.float64), 1.0)
+    rate = np.maximum(2 * (m - 1), 1e-9)  # exact to second order at small rates; m itself at large
+    rate = np.where(rate > 1.5, m, rate)
+    for _ in range(30):
+        decay = np.exp(-rate)
+        value = rate - m * (1 - decay)
+        slope = 1 - m * decay
+        rate = np.maximum(rate - value / np.where(np.abs(slope) < 1e-12, 1e-12, slope), 1e-9)
+    return np.where(m > 1 + 1e-9, m * np.maximum(1 + rate - m, 0.0), 0.0)

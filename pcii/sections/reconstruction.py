@@ -1,0 +1,221 @@
+"""Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.
+
+Each view is shifted to the virtual centre and added; the mean over the samples that meet at a voxel
+is the section. Colours are summed apart, each with its own coverage, so that any shift is exact and
+raw Bayer colours never mix. Photon counts stay integers until that last division, and no count is
+ever spread by interpolation.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pcii.core.arrays import check_z_mm
+from pcii.core.bayer import colour_cells
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.geometry import target_indices
+from pcii.core.images import Normalisation, Sections, Shifts, Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.dense_sections import Moves, colours_apart, moves, step_px, sum_counts, sum_fine, sum_views
+
+MUCH_LIGHT = 1 / 16
+"""Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.
+
+Measured on 100 views of 1024 x 1024: 24 ms for the images, 26 ms for the photons of 5.8 % of their pixels.
+"""
+
+
+def reconstruct(
+    data: PhotonCounts | Views,
+    z_mm: object,
+    *,
+    subpixel: int = 1,
+    normalisation: Normalisation = "overlap",
+    shifts: Shifts = "nearest",
+    variance: bool = False,
+) -> Sections:
+    """Sections of photon counts (Eq. 3) or radiance (Eq. 2) at the depths `z_mm`.
+
+    Returns `Sections` with arrays (Z, H M, W M, C): M = `subpixel`, C = 3 for Bayer or colour data,
+    1 for monochrome. `normalisation` "overlap" divides by the samples that reach a voxel, "views"
+    by the number of cameras as the paper does, which darkens borders. `variance` adds the unbiased
+    variance of the samples at each voxel, 0 below two.
+
+    `shifts` are "nearest" (views move by whole pixels), "bilinear" (radiance only: each sample is shared
+    by the four voxels around its place; `coverage` is then the sum of the shares) or "even". With "even"
+    raw Bayer samples are added without telling colours apart, as the paper does, and the section is a
+    mosaic to be demosaiced: `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for
+    even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
+
+    Raises `InputError` for a depth not above 0, a subpixel division below 1, or options that do not go
+    together.
+
+    >>> sections = reconstruct(counts, z_mm=[540, 620])          # doctest: +SKIP
+    >>> sections.estimate.shape                                  # doctest: +SKIP
+    (2, 1024, 1024, 3)
+    """
+    z = check_z_mm(z_mm)
+    _check(data, subpixel, normalisation, shifts, variance)
+    grid, spread = data.grid, None
+    cfa, channels = colours_apart(data, shifts)
+    shape = (z.size, grid.height * subpixel, grid.width * subpixel, channels)
+    rows, cols = _targets(grid, z, subpixel, step_px(shifts))
+    if shifts == "bilinear":
+        coverage = _shared_coverage(grid, cfa, shape, z)
+    else:
+        coverage = _coverage(grid, cfa, shape, rows, cols)
+    if isinstance(data, PhotonCounts):
+        if not data.is_sparse and subpixel == 1 and data.lit_share > MUCH_LIGHT:
+            sums = sum_counts(data, z, shifts)
+        else:
+            sums = _scatter(data, data.events.n, shape, rows, cols)
+        if variance:
+            spread = _count_variance(data, sums, coverage, rows, cols)
+    elif subpixel > 1:
+        sums, spread = sum_fine(data, z, subpixel, coverage, variance=variance)
+    else:
+        sums, spread = sum_views(data, z, shifts, variance=variance)
+    mosaic = data.cfa if shifts == "even" else None
+    return Sections(grid, z, sums, coverage, subpixel, normalisation, spread, mosaic)
+
+
+def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
+    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane."""
+    for depth in check_z_mm(z_mm):
+        yield reconstruct(data, depth, **options)
+
+
+def _check(
+    data: PhotonCounts | Views, subpixel: int, normalisation: Normalisation, shifts: Shifts, variance: bool
+) -> None:
+    if not isinstance(data, PhotonCounts | Views):
+        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
+    if isinstance(subpixel, bool) or not isinstance(subpixel, int | np.integer) or subpixel < 1:
+        raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
+    if normalisation not in ("overlap", "views"):
+        raise InputError(f"normalisation: use 'overlap' or 'views', not {normalisation!r}")
+    if shifts not in ("nearest", "bilinear", "even"):
+        raise InputError(f"shifts: use 'nearest', 'bilinear' or 'even', not {shifts!r}")
+    if shifts != "nearest" and subpixel > 1:
+        raise InputError(f"shifts: {shifts!r} is for whole pixels (subpixel = 1)")
+    if shifts == "even" and data.cfa is None:
+        raise InputError("shifts: 'even' is for Bayer mosaics; these data have no pattern (cfa)")
+    if shifts == "bilinear" and isinstance(data, PhotonCounts):
+        raise InputError("shifts: photon counts are never interpolated; use 'nearest', or finer voxels")
+    if shifts == "bilinear" and variance:
+        raise InputError("variance: samples that are shared between voxels have none; use 'nearest' shifts")
+
+
+def _scatter(
+    data: PhotonCounts,
+    n: np.ndarray,
+    shape: tuple[int, ...],
+    rows: np.ndarray,
+    cols: np.ndarray,
+) -> np.ndarray:
+    """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
+    from pcii.core.compiled_loops import threads
+    from pcii.sections import event_kernels as kernels
+
+    events = data.events
+    # No voxel gets more than the whole; half the bytes are half the time.
+    counts = np.empty(shape, dtype=np.int32 if n is events.n and data.total < 2**31 else np.int64)
+    # A band for each thread: of one section if there is but one, else a section is a band.
+    bands = max(1, threads() // shape[0])
+    colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
+    kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n, bands)
+    return counts
+
+
+def _count_variance(
+    data: PhotonCounts, sums: np.ndarray, coverage: np.ndarray, rows: np.ndarray, cols: np.ndarray
+) -> np.ndarray:
+    """Unbiased variance of the counts that meet at each voxel, those of zero included: float64.
+
+    (m Q - S^2) / (m (m - 1)) of m samples with the sum S and sum of squares Q: in integers, it cannot cancel.
+    """
+    n = data.events.n
+    # No sum of squares is above the largest count times the largest sum.
+    if n.size and int(n.max()) * int(sums.max()) * int(coverage.max()) >= 2**63:
+        raise InputError("variance: the counts are too large for their squares to be added up exactly")
+    squares = _scatter(data, n * n, sums.shape, rows, cols)
+    samples = coverage.astype(np.int64)
+    spread = samples * squares - sums.astype(np.int64) ** 2
+    return spread / np.maximum(samples * (samples - 1), 1)
+
+
+def _targets(
+    grid: CameraGrid, z: np.ndarray, subpixel: int, step_px: int = 1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Voxel rows (Z, K, H) and columns (Z, L, W) of each pixel of each camera."""
+    targets = [target_indices(grid, depth, subpixel, step_px) for depth in z]
+    rows, cols = (np.stack(axis).astype(np.int32) for axis in zip(*targets, strict=True))
+    return rows, cols
+
+
+def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, subpixel: int) -> np.ndarray:
+    """How many samples of each colour meet at each voxel, (H M, W M, C), in closed form."""
+    shape = (1, grid.height * subpixel, grid.width * subpixel, channels)
+    return _coverage(grid, cfa, shape, *_targets(grid, np.array([z_mm]), subpixel))[0]
+
+
+def _shared_coverage(grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], z: np.ndarray) -> np.ndarray:
+    """The sum of the shares that samples have in each voxel (Z, H, W, C), float64: it separates too."""
+    coverage = np.zeros(shape)
+    for plane, depth in zip(coverage, z, strict=True):
+        by_row, by_col = (
+            np.sum([_shares(move, size) for move in axis], axis=0)
+            for axis, size in zip(moves(grid, depth, "bilinear"), shape[1:3], strict=True)
+        )
+        _add_product(plane, by_row, by_col, cfa)
+    return coverage
+
+
+def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, cfa: str | None) -> None:
+    """Add what rows (2, H) and columns (2, W) of each parity bring to a plane (H, W, C), by colour."""
+    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
+    for (a, b), colour in np.ndenumerate(cells):
+        coverage[..., colour] += (by_row[a][:, None] * by_col[b]).astype(coverage.dtype, copy=False)
+    if cfa is None:
+        coverage[..., 1:] = coverage[..., :1]  # all pixels see all colours
+
+
+def _shares(move: Moves, size: int) -> np.ndarray:
+    """What samples at pixels of even and of odd number bring to each voxel row (or column), (2, size)."""
+    pixel = np.arange(size) - move.px[:, None]
+    inside = (pixel >= 0) & (pixel < size)
+    weight = np.where(inside, move.weight[:, None], 0)
+    return np.array([np.where(pixel % 2 == parity, weight, 0).sum(axis=0) for parity in (0, 1)])
+
+
+def _coverage(
+    grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
+) -> np.ndarray:
+    """The same for all planes (Z, H M, W M, C).
+
+    The samples of Bayer phase (a, b) at voxel (r, c) are (camera rows whose pixel of row parity a
+    lands on r) x (camera columns whose pixel of column parity b lands on c): it separates.
+    """
+    from pcii.sections import event_kernels as kernels
+
+    planes, H, W, C = shape
+    coverage = np.empty(shape, np.uint16 if grid.view_count < 1 << 16 else np.uint32)
+    for plane in range(planes):
+        by_row, by_col = (
+            np.array([_landings(targets[plane, :, parity::2], size) for parity in (0, 1)])
+            for targets, size in ((rows, H), (cols, W))
+        )
+        # There are but a few kinds of rows: away from the borders the pattern repeats.
+        _, first, kinds = np.unique(by_row[0] << 32 | by_row[1], return_index=True, return_inverse=True)
+        some = np.zeros((first.size, W, C), dtype=coverage.dtype)
+        _add_product(some, by_row[:, first], by_col, cfa)
+        kernels.copy_rows(coverage[plane].reshape(H, W * C), kinds, some.reshape(-1, W * C))
+    return coverage
+
+
+def _landings(targets: np.ndarray, size: int) -> np.ndarray:
+    """How many targets fall on each of the voxel rows 0 .. size-1."""
+    inside = targets[(targets >= 0) & (targets < size)]
+    return np.bincount(inside, minlength=size)

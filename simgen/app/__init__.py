@@ -1,0 +1,4 @@
+"""The `simgen` command.
+
+commands  The `simgen` command.
+"""

@@ -1,0 +1,185 @@
+"""Textures as pixels: linear reflectance, with every border antialiased by area in linear light."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from simgen.assets.pattern_areas import half_plane, sine_wave, square_wave
+from simgen.base.srgb import srgb_to_linear
+from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
+
+BAND_ROWS = 256
+"""Rows painted at once, to bound memory."""
+SUBPIXELS = 8
+"""Per side, where a pixel of a star may hold several borders."""
+TEXT_SHARE = 0.9
+"""Of the width or height that text fills."""
+
+
+@dataclass(frozen=True)
+class _Canvas:
+    """Where the pixels lie; the longer side has length 1, the centre is (0, 0), Y runs down."""
+
+    width: float
+    height: float
+    columns: int
+    rows: int
+
+    @property
+    def pixel(self) -> tuple[float, float]:
+        """Width and height of a pixel: equal but for whole numbers of pixels."""
+        return self.width / self.columns, self.height / self.rows
+
+    @property
+    def x(self) -> np.ndarray:
+        """Of the columns' centres, (1, W)."""
+        return ((np.arange(self.columns) + 0.5) / self.columns - 0.5)[None] * self.width
+
+    @property
+    def y(self) -> np.ndarray:
+        """Of the rows' centres, (H, 1)."""
+        return ((np.arange(self.rows) + 0.5) / self.rows - 0.5)[:, None] * self.height
+
+
+def paint(texture: Texture, width_over_height: float) -> np.ndarray:
+    """Linear reflectance (H, W, 3), float32 in [0, 1], of a surface of this aspect.
+
+    Row 0 is at the top and column 0 at the left for who looks at the front. The longer side has
+    `texture.pixels` pixels.
+    """
+    width, height = min(width_over_height, 1.0), min(1 / width_over_height, 1.0)
+    columns, rows = (max(1, round(side * texture.pixels)) for side in (width, height))
+    canvas = _Canvas(width, height, columns, rows)
+    match texture:
+        case Noise():
+            return _noise(texture, canvas)
+        case Checks():
+            share = _checks(texture, canvas)
+        case Stripes():
+            share = _stripes(texture, canvas)
+        case Star():
+            share = _by_bands(canvas, lambda x, y: _star(x, y, canvas.pixel, texture.spokes))
+        case Edge():
+            share = _edge(texture, canvas)
+        case Text():
+            share = _text(texture, canvas)
+    first, second = srgb_to_linear(np.array(texture.colours)).astype(np.float32)
+    share = share[..., None].astype(np.float32)
+    return share * first + (1 - share) * second
+
+
+def _by_bands(canvas: _Canvas, share: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """What `share` says of x (1, W) and y (h, 1), for all rows, (H, W) float32."""
+    starts = range(0, canvas.rows, BAND_ROWS)
+    bands = (share(canvas.x, canvas.y[start : start + BAND_ROWS]).astype(np.float32) for start in starts)
+    return np.concatenate(list(bands))
+
+
+def _checks(texture: Checks, canvas: _Canvas) -> np.ndarray:
+    # A chessboard is the product of two square waves, and so is its mean over a pixel.
+    across, down = (
+        square_wave((np.arange(count) + 0.5) * cells / (2 * count), cells / (2 * count), 0.0)
+        for count, cells in ((canvas.columns, texture.columns), (canvas.rows, texture.rows))
+    )
+    return (1 + down[:, None] * across) / 2
+
+
+def _stripes(texture: Stripes, canvas: _Canvas) -> np.ndarray:
+    angle = math.radians(texture.angle_deg)
+    cycles_x = math.cos(angle) * texture.periods / canvas.width
+    cycles_y = math.sin(angle) * texture.periods / canvas.width
+    span_x, span_y = abs(cycles_x) * canvas.pixel[0], abs(cycles_y) * canvas.pixel[1]
+    wave = {"square": square_wave, "sine": sine_wave}[texture.profile]
+
+    def share(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return (1 + wave(texture.periods / 2 + cycles_x * x + cycles_y * y, span_x, span_y)) / 2
+
+    return _by_bands(canvas, share)
+
+
+def _edge(texture: Edge, canvas: _Canvas) -> np.ndarray:
+    angle = math.radians(texture.angle_deg)
+    normal_x, normal_y = -math.cos(angle), -math.sin(angle)  # to the left, where the first colour is
+    span_x, span_y = abs(normal_x) * canvas.pixel[0], abs(normal_y) * canvas.pixel[1]
+    return _by_bands(canvas, lambda x, y: half_plane(normal_x * x + normal_y * y, span_x, span_y))
+
+
+def _star(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], spokes: int) -> np.ndarray:
+    """Share of the first colour, exact where no more than one border can cross a pixel."""
+    x, y = np.broadcast_arrays(x, y)
+    share = _nearest_border(x, y, pixel, spokes)
+    crowded = np.hypot(x, y) < math.hypot(*pixel) / (2 * math.sin(math.pi / (2 * spokes)))
+    inside = (np.arange(SUBPIXELS) + 0.5) / SUBPIXELS - 0.5
+    sub_x = x[crowded][:, None, None] + inside[:, None] * pixel[0]
+    sub_y = y[crowded][:, None, None] + inside * pixel[1]
+    finer = pixel[0] / SUBPIXELS, pixel[1] / SUBPIXELS
+    share[crowded] = _nearest_border(sub_x, sub_y, finer, spokes).mean(axis=(1, 2))
+    return share
+
+
+def _nearest_border(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], spokes: int) -> np.ndarray:
+    """Share where sin(spokes x angle) > 0, as if the nearest border were the only one."""
+    angle = np.arctan2(y, x)
+    number = np.rint(angle * (spokes / math.pi))
+    border = number * (math.pi / spokes)
+    distance = np.hypot(x, y) * np.sin(angle - border)
+    beyond = half_plane(distance, np.abs(np.sin(border)) * pixel[0], np.abs(np.cos(border)) * pixel[1])
+    return np.where(number % 2 == 0, beyond, 1 - beyond)
+
+
+def _text(texture: Text, canvas: _Canvas) -> np.ndarray:
+    from PIL import Image
+
+    size = 256.0
+    for _ in range(2):  # again, since letters keep whole pixels apart
+        ink = _ink(texture.text, size)
+        fill = min(canvas.columns / ink.width, canvas.rows / ink.height)
+        size = max(1.0, size * TEXT_SHARE * fill)
+    ink = _ink(texture.text, size)
+    page = Image.new("L", (canvas.columns, canvas.rows))
+    page.paste(ink, ((page.width - ink.width) // 2, (page.height - ink.height) // 2))
+    # FreeType's grey levels are the covered area, so they are shares of linear light as they are.
+    return np.asarray(page) / 255
+
+
+def _ink(text: str, size: float) -> Any:
+    """A picture of the text as tight as its ink, 8 bits of coverage."""
+    import matplotlib as mpl
+    from PIL import Image, ImageDraw, ImageFont
+
+    file = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"  # the same on every machine
+    font = ImageFont.truetype(str(file), size, layout_engine=ImageFont.Layout.BASIC)
+    left, top, right, bottom = font.getbbox(text)
+    line = Image.new("L", (max(1, int(right - left)), max(1, int(bottom - top))))
+    ImageDraw.Draw(line).text((-left, -top), text, fill=255, font=font)
+    return line.crop(line.getbbox())
+
+
+def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
+    generator = np.random.default_rng(texture.seed)
+    shared = _spectral_noise(generator, texture.exponent, canvas)
+    channels = []
+    for mean in srgb_to_linear(np.array(texture.colour)).tolist():
+        mixed = shared
+        if texture.chroma > 0:
+            own = _spectral_noise(generator, texture.exponent, canvas)
+            mixed = math.sqrt(1 - texture.chroma) * shared + math.sqrt(texture.chroma) * own
+            mixed /= mixed.std()
+        channels.append(np.clip(mean * (1 + texture.contrast * mixed), 0, 1).astype(np.float32))
+    return np.stack(channels, axis=-1)
+
+
+def _spectral_noise(generator: np.random.Generator, exponent: float, canvas: _Canvas) -> np.ndarray:
+    """Normal noise (H, W), periodic, with amplitude ~ frequency^-exponent, mean 0 and deviation 1."""
+    columns, rows = canvas.columns, canvas.rows
+    across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])
+    frequency = np.hypot(down[:, None], across)
+    frequency[0, 0] = 1.0  # the mean, which is taken out below
+    spectrum = np.fft.rfft2(generator.standard_normal((rows, columns))) * frequency**-exponent
+    spectrum[0, 0] = 0
+    noise = np.fft.irfft2(spectrum, (rows, columns))
+    return noise / noise.std()

@@ -1,0 +1,5 @@
+"""Where cameras stand and which way their pixels look; disparities.
+
+disparities  What a camera grid does to depth: disparities, whole-pixel shifts, and colours that meet.
+rig          Where the cameras stand and which way pixels look, from first principles.
+"""

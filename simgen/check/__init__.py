@@ -1,0 +1,20 @@
+"""What a scene or recipe will give, found without rendering it.
+
+costs             Findings on cost: bytes of each product, memory at the peak, which way the counts are
+                  made, time.
+depths            Findings on depth: disparities, how far objects stand apart in px of blur, planes,
+                  colours that alias.
+expected_photons  Findings on photons: who sends them, how many an object and a voxel get, and how many
+                  come by mistake.
+linter            `simgen check`: what a scene or recipe will give, told without rendering it, but for one
+                  coarse probe.
+scene_facts       What a coarse look at a scene tells, and what follows from it: the nouns of `simgen
+                  check`.
+scene_probe       The coarse probe of `simgen check`: what few, large pixels of the centre and of the
+                  corner cameras see.
+sight             Findings on what the cameras see: objects hidden, cut or never seen, cameras inside
+                  things, lamps.
+targets           What `check` and `preview` look at: a scene or a recipe, by name or path.
+unseen            Why an object of a scene is not seen: what stands before it, how large it is on the
+                  film, and where.
+"""

@@ -1,0 +1,115 @@
+"""Why an object of a scene is not seen: what stands before it, how large it is on the film, and where."""
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from simgen.cameras.rig import Camera, as_rig, centre_camera
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.spec.lights import AreaLight, UniformLight
+from simgen.spec.materials import Material
+from simgen.spec.scene import Scene
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre
+
+SAME_DEPTH = 1e-3
+"""So near to the backdrop's depth, as a share of it, a hit is taken to be on it."""
+LEAST_SHARE = 0.05
+"""What hides less than this share of an object is not named."""
+
+
+@dataclass(frozen=True)
+class OnFilm:
+    """Where an object's bounding box falls."""
+
+    size_px: tuple[float, float]
+    """Columns and rows that it covers of the virtual centre's film, however far that reaches."""
+    in_view: bool
+    """Whether part of it falls on the film of the virtual centre or of a corner camera."""
+
+
+def seen_alone(built: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid) -> np.ndarray:
+    """Where the virtual centre sees object `number` (from 1), alone but for the lamps, (H, W) bool."""
+    lamps = tuple(light for light in scene.lights if isinstance(light, AreaLight))
+    return _seen(built, scene, folder, number, grid, lamps)
+
+
+def hidden_by(
+    built: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid, centre: FirstHits
+) -> tuple[str, ...]:
+    """What stands before object `number` (from 1), which the virtual centre does not see.
+
+    Names of objects, "the backdrop", and lamps as "lamp 1 (lights[0])"; what hides most of it comes first.
+    `centre` are the first hits of the whole scene on the same grid. Empty if nothing hides it.
+    """
+    alone = _seen(built, scene, folder, number, grid, ())
+    row, col = np.nonzero(alone & np.isfinite(centre.z_mm))
+    z_mm, owner = centre.z_mm[row, col].astype(np.float64), centre.object_id[row, col]
+    point = centre_camera(grid).towards(row, col) * z_mm[:, None]
+    found = Counter(built.names[own] for own in owner[owner > 0].tolist())
+    other = owner == 0
+    on_wall = np.zeros(other.shape, dtype=bool)
+    if scene.backdrop is not None:
+        on_wall = np.abs(z_mm - scene.backdrop.z_mm) <= SAME_DEPTH * scene.backdrop.z_mm
+    found["the backdrop"] = int((other & on_wall).sum())
+    found.update(_lamps_at(scene, point[other & ~on_wall]))
+    least = max(1, LEAST_SHARE * row.size)
+    return tuple(name for name, times in found.most_common() if times >= least)
+
+
+def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
+    """Where a bounding box (2, 3), smallest and largest X, Y, Z in mm, falls on the films."""
+    if box[0, 2] <= 0:
+        return OnFilm((np.inf, np.inf), in_view=True)
+    rig, centre = as_rig(grid), centre_camera(grid)
+    ends = [rig.camera(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
+    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+    across, down = np.ptp(_projected(corners, centre), axis=0).tolist()
+    return OnFilm((across, down), any(_meets(corners, one) for one in (centre, *ends)))
+
+
+def _seen(
+    built: RenderScene,
+    scene: Scene,
+    folder: Path,
+    number: int,
+    grid: CameraGrid,
+    lamps: tuple[AreaLight, ...],
+) -> np.ndarray:
+    # Only its shape and lamps in view matter, so that no more files than its mesh are needed.
+    plain = scene.objects[number - 1].model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5))})
+    single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
+    return first_hits_at_centre(build(built.mi, single, folder, 2), grid).object_id == 1
+
+
+def _lamps_at(scene: Scene, points: np.ndarray) -> Counter[str]:
+    """How many of the points (N, 3) lie on which lamp: the one whose rectangle is nearest."""
+    away: dict[str, np.ndarray] = {}
+    for number, lamp in enumerate(scene.lights):
+        if isinstance(lamp, AreaLight):
+            facing = np.subtract(lamp.target_mm, lamp.position_mm)
+            offset = points - lamp.position_mm
+            reach = np.hypot(lamp.width_mm, lamp.height_mm) / 2
+            beside = np.maximum(np.linalg.norm(offset, axis=1) - reach, 0)
+            away[f"lamp {number + 1} (lights[{number}])"] = beside + np.abs(
+                offset @ (facing / np.linalg.norm(facing))
+            )
+    if not away or not len(points):
+        return Counter()
+    names = list(away)
+    return Counter(names[nearest] for nearest in np.argmin(list(away.values()), axis=0).tolist())
+
+
+def _projected(points: np.ndarray, camera: Camera) -> np.ndarray:
+    """Columns and rows (N, 2) of points before a camera, in px from the film's middle."""
+    x, y, z = ((points - camera.position_mm) @ camera.rotation).T
+    scale_px = camera.grid.focal_mm / camera.grid.pixel_mm
+    return np.stack([x / z * scale_px + camera.shift_px[0], y / z * scale_px + camera.shift_px[1]], axis=1)
+
+
+def _meets(points: np.ndarray, camera: Camera) -> bool:
+    """Whether the outline of points reaches onto the film."""
+    px, half = _projected(points, camera), np.array([camera.grid.width, camera.grid.height]) / 2
+    return bool(np.all(px.min(axis=0) < half) and np.all(px.max(axis=0) > -half))

@@ -1,0 +1,152 @@
+"""A contact sheet of a finished dataset: its truth, its photons and its full-light images on one page."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.core.photon_counts import PhotonCounts
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_layout import COUNTS
+from simgen.cameras.disparities import shifts_px
+from simgen.figures.picture_parts import (
+    check_picture_path,
+    draw_depth,
+    draw_objects,
+    hide_frame,
+    new_figure,
+    part_of_interest,
+    save_figure,
+)
+from simgen.figures.thumbnails import Box, count_tiles, joined, radiance_tiles
+
+MOST_BARS = 40
+MARGIN = 0.03
+"""Around the objects, as a share of the picture's longer side."""
+PLACES: dict[str, Any] = {
+    "photons": (slice(0, 2), 0),
+    "depth": (0, 1),
+    "objects": (0, 2),
+    "full light": (1, 1),
+    "histogram": (1, 2),
+}
+RADIANCE_VIEWS, RADIANCE_PX = 3, 256
+"""Full-light views to a side of the sheet, and pixels to the longer side of each."""
+
+
+def write_sheet(path: Path, out: Path) -> None:
+    """Write the contact sheet of a dataset as PNG or JPEG; nothing is rendered.
+
+    Raises `InputError` for a folder that is no finished dataset, or a picture that cannot be written.
+    """
+    check_picture_path(out)
+    dataset = open_dataset(path)
+    counts = dataset.counts if dataset.has(COUNTS) else None
+    figure = new_figure(21.5, 10.6)
+    layout = figure.add_gridspec(2, 3, width_ratios=(2.1, 1, 1.84))
+    axes = {name: figure.add_subplot(layout[place]) for name, place in PLACES.items()}
+    truth_box, view_box = _parts(dataset)
+    _draw_counts(axes["photons"], counts, view_box)
+    _draw_truth(figure, axes["depth"], axes["objects"], dataset, truth_box)
+    _draw_radiance(axes["full light"], dataset, view_box)
+    _draw_histogram(axes["histogram"], counts)
+    title = str(dataset.manifest.get("title") or dataset.name)
+    figure.suptitle("\n".join((title, *facts(dataset, counts))), fontsize=12, parse_math=False)
+    save_figure(figure, out)
+
+
+def _parts(dataset: Dataset) -> tuple[Box, Box]:
+    """Where the objects are in the virtual centre's picture, and in that of any view."""
+    grid, truth = dataset.grid, dataset.truth
+    if truth is None:
+        return (slice(0, grid.height), slice(0, grid.width)), (slice(0, grid.height), slice(0, grid.width))
+    mask = truth.object_id > 0
+    margin = MARGIN * max(mask.shape)
+    near = float(truth.z_mm[mask].min()) if mask.any() else np.inf
+    away = max(np.abs(shift).max() for shift in shifts_px(grid, near)) if mask.any() else 0
+    return part_of_interest(mask, margin), part_of_interest(mask, margin + away)
+
+
+def _draw_truth(figure: Any, depth: Any, objects: Any, dataset: Dataset, box: Box) -> None:
+    truth = dataset.truth
+    if truth is None:
+        _left_out(depth, "truth")
+        _left_out(objects, "truth")
+        return
+    draw_depth(figure, depth, truth.z_mm[box], truth.object_id[box] > 0)
+    draw_objects(objects, truth.object_id[box], truth.names)
+
+
+def _draw_counts(axes: Any, counts: PhotonCounts | None, box: Box) -> None:
+    if counts is None:
+        _left_out(axes, "photon counts")
+        return
+    tiles = count_tiles(counts, box)
+    K, L, h, w = tiles.shape[:4]
+    grid = counts.grid
+    some = "" if (grid.rows, grid.cols) == (K, L) else f"{K} x {L} of "
+    rows, cols = (part.stop - part.start for part in box)
+    axes.set_title(
+        f"photons of {some}{grid.rows} x {grid.cols} views, in bins of {rows / h:.2g} x {cols / w:.2g} pixels"
+    )
+    hide_frame(axes)
+    axes.imshow(joined(tiles), interpolation="nearest")
+
+
+def _draw_radiance(axes: Any, dataset: Dataset, box: Box) -> None:
+    views = dataset.views
+    if views is None:
+        _left_out(axes, "full-light images")
+        return
+    tiles = radiance_tiles(views, RADIANCE_VIEWS, RADIANCE_PX, box)
+    axes.set_title(f"full light, {tiles.shape[0]} x {tiles.shape[1]} of the views")
+    hide_frame(axes)
+    axes.imshow(joined(tiles))
+
+
+def _draw_histogram(axes: Any, counts: PhotonCounts | None) -> None:
+    if counts is None:
+        _left_out(axes, "photon counts")
+        return
+    n = counts.events.n
+    pixels = int(np.prod(counts.grid.shape_KLHW))
+    most = int(n.max()) if n.size else 0
+    width = max(1, -(-(most + 1) // MOST_BARS))
+    bars = np.bincount(n // width, minlength=1).astype(float)
+    bars[0] += pixels - n.size
+    axes.bar(np.arange(bars.size) * width, bars, width=0.85 * width, align="edge" if width > 1 else "center")
+    axes.set_yscale("log")
+    axes.set_ylim(0.5, 3 * pixels)
+    axes.set_box_aspect(0.6)
+    axes.set_title("counts per pixel, all views")
+    axes.set_xlabel("photons in a pixel" + ("" if width == 1 else f", in steps of {width}"))
+    axes.set_ylabel("pixels")
+    if width == 1:
+        axes.set_xticks(np.arange(0, bars.size, max(1, bars.size // 10)))
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def facts(dataset: Dataset, counts: PhotonCounts | None) -> list[str]:
+    """What the sheet says in words: a line on the cameras, and one on the light."""
+    grid, recipe = dataset.grid, dataset.manifest.get("recipe") or {}
+    cameras = [
+        f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels",
+        f"pixel {1000 * grid.pixel_mm:.4g} um",
+        dataset.cfa or "monochrome",
+        f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm",
+        f"focal length {grid.focal_mm:g} mm",
+    ]
+    lines = [", ".join(cameras)]
+    if counts is not None:
+        photons, pixels = recipe.get("photons") or {}, int(np.prod(grid.shape_KLHW))
+        light = [f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view"]
+        if "budget" in photons and photons.get("scope") != "exposure":
+            light.insert(0, f"budget {photons['budget']:g} per {photons.get('scope')}")
+        light.append(f"in {counts.events.n.size / pixels:.2g} of the pixels")
+        lines.append(", ".join(light))
+    return lines
+
+
+def _left_out(axes: Any, product: str) -> None:
+    hide_frame(axes)
+    axes.text(0.5, 0.5, f"this dataset has no {product}", ha="center", transform=axes.transAxes)

@@ -1,0 +1,71 @@
+"""A quick look at a scene: the picture, depth and objects that the virtual centre camera sees."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from simgen.check.scene_probe import coarser
+from simgen.check.targets import load_target
+from simgen.figures.picture_parts import (
+    DOTS_PER_INCH,
+    check_picture_path,
+    draw_depth,
+    draw_objects,
+    frame_part,
+    hide_frame,
+    new_figure,
+    part_of_interest,
+    save_figure,
+)
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.renderer.radiance import render_view
+from simgen.truth.first_hits import first_hits_at_centre
+
+SIDE_PX = 512
+MARGIN = 0.03
+"""Around the objects, as a share of the picture's longer side."""
+PANEL_IN = 4.8
+"""Height of a picture's panel."""
+
+
+def write_preview(
+    name_or_path: str,
+    out: Path,
+    samples_per_pixel: int,
+    *,
+    overrides: Sequence[str] = (),
+    dots_per_inch: int = DOTS_PER_INCH,
+) -> None:
+    """Write the preview of a scene or of a recipe's, a PNG or JPEG.
+
+    Raises `InputError` for a bad scene or recipe, and for a picture that cannot be written there.
+    """
+    if samples_per_pixel < 1:
+        raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
+    check_picture_path(out)
+    target = load_target(name_or_path, overrides)
+    recipe = target.recipe
+    # The recipe's field of view, and one camera: the virtual centre.
+    grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
+    built = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
+    picture = render_view(built, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
+    hits = first_hits_at_centre(built, grid)
+    things = hits.object_id > 0
+    white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
+    box = part_of_interest(things, MARGIN * max(things.shape))
+    aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
+    figure = new_figure(PANEL_IN * (aspect * 3.84 + 0.2) + 0.5, PANEL_IN + 0.7)
+    axes = figure.subplots(1, 3, width_ratios=(1, 1, 1.84))
+    axes[0].imshow(np.clip(picture / max(white, 1e-12), 0, 1) ** (1 / 2.2))
+    axes[0].set_title("virtual centre")
+    hide_frame(axes[0])
+    if things.any() and box[0].stop - box[0].start < grid.height:
+        frame_part(axes[0], box)
+    draw_depth(figure, axes[1], hits.z_mm[box], things[box])
+    draw_objects(axes[2], hits.object_id[box], built.names)
+    figure.suptitle(recipe.title or target.scene.title, parse_math=False)
+    save_figure(figure, out, dots_per_inch)

@@ -1,0 +1,19 @@
+"""Photon counts: by thinning a majorant, or from rendered views, and which of the two.
+
+candidates         Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
+majorant           How bright it can get where: the majorant from which photon candidates are drawn.
+photon_counting    The photon counts of a dataset: which way they are made, what the sensor does to them,
+                   where they go.
+pilot              The pilot: a few paths that find where there is light, and from them the first
+                   majorant.
+rendering_noise    How many samples a dense rendering needs for its noise not to show in the photon
+                   counts.
+samplers           Which way candidates are worked on: all at once where a compiled backend runs, else one
+                   by one.
+scalar_sampler     Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call of
+                   the renderer each.
+thinning           Photons, not pixels: photon-limited images by thinning, in the time that their photons
+                   take.
+wavefront_sampler  Candidates in the renderer's arrays, one lane each, for compiled backends; what leaves
+                   is NumPy.
+"""

@@ -1,0 +1,139 @@
+"""Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
+
+What all backends share. `lanes` works on a whole wavefront at once, `singles` on one ray after the other.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from pcii.core.bayer import channel_count, colour_cells
+from pcii.core.camera_grid import CameraGrid
+from simgen.cameras.rig import Cameras, Rig, as_rig
+from simgen.photons.majorant import Majorant, Samples
+from simgen.renderer.mitsuba_scene import RenderScene
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is looked at, by which cameras, through which filters, along how long paths."""
+
+    built: RenderScene
+    cameras: Cameras
+    cfa: str | None
+    max_depth: int
+
+    @cached_property
+    def rig(self) -> Rig:
+        """The cameras as they really are."""
+        return as_rig(self.cameras)
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras as they ought to be."""
+        return self.rig.grid
+
+    @property
+    def channels(self) -> int:
+        """Colours that the sensor tells apart."""
+        return channel_count(self.cfa)
+
+
+@dataclass(frozen=True)
+class PhotonPaths:
+    """Paths (N,) of photons: camera (k, l), pixel (i, j), film point, first hit's `object_id` and `z_mm`."""
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    row_px: np.ndarray
+    col_px: np.ndarray
+    object_id: np.ndarray
+    z_mm: np.ndarray
+
+
+@dataclass(frozen=True)
+class Accepted(PhotonPaths):
+    """Paths that gave photons, the number of the `candidate` of each, and how many it gave (`multiplicity`).
+
+    `ratio` (F,) is radiance by limit of all paths that were followed beyond their first hit, `over`
+    those that exceeded it.
+    """
+
+    candidate: np.ndarray
+    multiplicity: np.ndarray
+    ratio: np.ndarray
+    over: Samples
+
+
+class CandidateSampler(Protocol):
+    """A majorant as candidates are drawn from it.
+
+    They come of groups of Bayer cells, each candidate of one. `mass` (G,) is the sum of the bounds of the
+    pixels of each group in one view, border tiles counted whole.
+    """
+
+    majorant: Majorant
+    mass: np.ndarray
+
+    @property
+    def paths_each(self) -> int:
+        """Light paths of a candidate that is followed."""
+        ...
+
+    @property
+    def max_dark_candidates(self) -> int:
+        """Where so many candidates find no light there is none."""
+        ...
+
+    def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
+        """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
+
+        `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
+        Where a path exceeds its bound r times, it gives floor(r) photons and one more with the remaining
+        probability, which keeps the mean exact.
+        """
+        ...
+
+    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+        """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
+
+        Those that fall beside the film are left out. How much the others tell depends on the backend.
+        """
+        ...
+
+
+def paths_of(pool: CandidateSampler, candidates: int, followed: int) -> int:
+    """Light paths of so many candidates, of which some are followed beyond their first hit."""
+    return candidates + (pool.paths_each - 1) * followed
+
+
+@dataclass(frozen=True)
+class Chances:
+    """Where the candidates of a group of Bayer cells fall: entry of the majorant and cell (2 a + b).
+
+    `running` (N,) are the sums of the bounds of all pixels up to and with these; the last is their mass.
+    """
+
+    running: np.ndarray
+    entry: np.ndarray
+    cell: np.ndarray
+
+
+def chances(setup: Setup, majorant: Majorant, cells: np.ndarray) -> Chances:
+    """The chances of a group of cells under a majorant."""
+    colours = colour_cells(setup.cfa).ravel()[cells]
+    mass = majorant.bound[:, colours] * (majorant.side_px**2 / 4)[:, None]
+    entries = majorant.layer.size
+    return Chances(np.cumsum(mass.ravel()), np.arange(entries).repeat(cells.size), np.tile(cells, entries))
+
+
+def nothing(channels: int) -> Accepted:
+    """No photons."""
+    whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
+    over = Samples(whole, whole, whole, whole, real, colours, colours)
+    object_id = np.zeros(0, np.int16)
+    return Accepted(whole, whole, whole, whole, real, real, object_id, real, whole, whole, real, over)

@@ -1,0 +1,100 @@
+"""How many samples a dense rendering needs for its noise not to show in the photon counts.
+
+Counts drawn from a rendered view have the view's noise besides their own: a rate that is off by a random
+amount of variance v makes counts whose variance is larger by v. That share of the Poisson variance is
+to stay below `NOISE_SHARE`, so dimmer light needs fewer samples. A budget is divided by a view's light,
+whose own standard error is to stay below `NORMALISER_ERROR`.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pcii.core.camera_grid import CameraGrid
+from simgen.base import random_streams as seeds
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.radiance import render_view
+from simgen.sensor.mosaic import sense
+from simgen.truth.first_hits import first_hits_of_view
+
+NOISE_SHARE = 0.01
+NORMALISER_ERROR = 0.003
+MOST_SAMPLES = 64
+PROBE_PX = 64
+"""The probe renders a film of so few pixels across, twice."""
+PROBE_SAMPLES = 64
+DEPTHS = 64
+"""Depths are told apart in so many equal steps of disparity."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view."""
+
+    mean: float
+    variance: float
+
+    def photon_noise(self, photons_per_radiance: float, samples: int) -> float:
+        """Variance that rendering adds to counts, as a share of their Poisson variance."""
+        if self.mean <= 0:
+            return 0.0
+        return photons_per_radiance * self.variance / (samples * self.mean)
+
+    def light_error(self, paths: int) -> float:
+        """Standard error of the light that so many paths find, as a share of it."""
+        return math.sqrt(self.variance / paths) / self.mean if self.mean > 0 else 0.0
+
+    def samples_for(self, photons_per_radiance: float, pixels: int | None = None) -> int:
+        """Samples per pixel that keep the noise below `NOISE_SHARE`; `MOST_SAMPLES` at most for that.
+
+        With a budget that is counted over so many `pixels`, enough for `NORMALISER_ERROR` too.
+        """
+        noise = min(math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE), MOST_SAMPLES)
+        error = 0.0 if pixels is None else self.light_error(pixels) / NORMALISER_ERROR
+        return max(noise, math.ceil(error**2), 1)
+
+
+def probe(built: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
+    """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
+    small = replace(_coarse(grid), rows=1, cols=1)
+    first, second = (
+        sense(
+            render_view(
+                built,
+                small,
+                0,
+                0,
+                samples_per_pixel=PROBE_SAMPLES,
+                seed=seeds.integer(seed, view=0, stage="probe", part=part),
+            ),
+            cfa,
+        ).astype(np.float64)
+        for part in range(2)
+    )
+    # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
+    variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
+    return Probe(float((first + second).mean() / 2), float(variance))
+
+
+def depths_seen(built: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
+    """Up to `DEPTHS` depths in mm, of what a coarse look from the corner cameras finds; inf for nothing."""
+    small, ends = _coarse(grid), [(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
+    z_mm = np.concatenate([first_hits_of_view(built, small, k, l).z_mm.ravel() for k, l in ends])
+    nearest = float(z_mm.min())
+    if not nearest < math.inf:
+        return (math.inf,)
+    steps = np.unique(np.rint(DEPTHS * nearest / z_mm.astype(np.float64)))
+    return tuple((DEPTHS * nearest / steps[steps > 0]).tolist())
+
+
+def _coarse(grid: CameraGrid) -> CameraGrid:
+    """The same cameras with the same field of view on few pixels."""
+    scale = max(grid.height, grid.width) / PROBE_PX
+    return replace(
+        grid,
+        height=max(2, round(grid.height / scale)),
+        width=max(2, round(grid.width / scale)),
+        pixel_mm=grid.pixel_mm * scale,
+        shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
+    )

@@ -1,0 +1,32 @@
+"""Which way candidates are worked on: all at once where a compiled backend runs, else one by one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from simgen.photons.candidates import CandidateSampler, Setup
+from simgen.photons.majorant import Majorant
+from simgen.photons.scalar_sampler import SinglePool
+from simgen.photons.wavefront_sampler import LanePool
+from simgen.renderer.path_tracing import surrounding_radiance
+from simgen.renderer.wavelengths import light_of
+
+
+def sampler_for(
+    setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
+) -> CandidateSampler:
+    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
+    if _is_scalar(setup):
+        return SinglePool(setup, majorant, groups)
+    return LanePool(setup, majorant, groups, ambient)
+
+
+def surroundings(setup: Setup) -> np.ndarray:
+    """What pixels see of what shines from all around (C,), where candidates are guessed at; else zeros."""
+    if _is_scalar(setup):
+        return np.zeros(setup.channels)
+    return surrounding_radiance(setup.built, light_of(setup.built, setup.cfa))
+
+
+def _is_scalar(setup: Setup) -> bool:
+    return setup.built.mi.variant().startswith("scalar")

@@ -1,0 +1,18 @@
+"""The one room that knows Mitsuba: backends, scenes, light paths, radiance.
+
+backend           The renderer behind everything: the one place that loads Mitsuba and Dr.Jit.
+intersection      Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one
+                  in scalar mode.
+mitsuba_colours   Colours and spectra as Mitsuba's textures, in the variant that is set.
+mitsuba_lights    Lights as Mitsuba's emitters, and how bright they make a plane.
+mitsuba_scene     From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never
+                  names one.
+mitsuba_shapes    Shapes as Mitsuba's: its own sphere and rectangle, and meshes built in memory, never
+                  from a file.
+mitsuba_surfaces  Materials as Mitsuba's surfaces.
+path_tracing      Light paths, one for each of many camera rays at once: what is hit first, and unbiased
+                  radiance.
+radiance          Dense radiance of one view: every pixel, by path tracing.
+wavelengths       How rays carry light, for compiled backends: as three colours, or as four wavelengths
+                  for a pixel's filter.
+"""

@@ -1,0 +1,63 @@
+"""Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one in scalar mode."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from simgen.renderer.backend import load_drjit, shape_numbers
+from simgen.renderer.mitsuba_scene import RenderScene
+
+SHY_OF_TARGET = 1e-4
+"""A ray to a target stops this share of its length before it."""
+PART = 1 << 14
+"""In scalar mode so many rays are Python numbers at once: those take several times the memory of NumPy's."""
+
+
+def first_objects(built: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
+    mi, scene = built.mi, built.scene
+    unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+    if _one_by_one(mi):
+        numbers = zip(scene.shapes(), shape_numbers(scene), strict=True)
+        ids = {shape.id(): built.object_of_shape[number] for shape, number in numbers}
+        found = np.zeros(len(unit), dtype=np.int16)
+        origin = mi.Point3f(*origin_mm)
+        for number, towards in enumerate(_rows(unit)):
+            hit = scene.ray_intersect(mi.RayDifferential3f(origin, mi.Vector3f(towards)))
+            if hit.is_valid():
+                found[number] = ids[hit.shape.id()]
+        return found
+    dr = load_drjit()
+    origins = np.broadcast_to(origin_mm, unit.shape)
+    hit = scene.ray_intersect_preliminary(mi.Ray3f(_column(mi.Point3f, origins), _column(mi.Vector3f, unit)))
+    shape = dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0)
+    return built.object_of_shape[np.array(shape)]
+
+
+def blocked(built: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
+    """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
+    mi, scene = built.mi, built.scene
+    away = target_mm - origin_mm
+    length = np.linalg.norm(away, axis=-1)
+    unit, reach = away / length[:, None], length * (1 - SHY_OF_TARGET)
+    if _one_by_one(mi):
+        rows = _rows(np.column_stack([origin_mm, unit, reach]))
+        rays = (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
+        return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(unit))
+    ray = mi.Ray3f(_column(mi.Point3f, origin_mm), _column(mi.Vector3f, unit))
+    ray.maxt = mi.Float(reach.astype(np.float32))
+    return np.array(scene.ray_test(ray))
+
+
+def _one_by_one(mi: Any) -> bool:
+    return mi.variant().startswith("scalar")
+
+
+def _column(kind: Any, rows: np.ndarray) -> Any:
+    return kind(np.ascontiguousarray(rows.T, dtype=np.float32))
+
+
+def _rows(array: np.ndarray) -> Iterator[list[float]]:
+    for start in range(0, len(array), PART):
+        yield from array[start : start + PART].tolist()

@@ -1,0 +1,150 @@
+"""Lights as Mitsuba's emitters, and how bright they make a plane.
+
+In RGB mode radiance is linear sRGB scaled such that its luminance, 0.2126 R + 0.7152 G + 0.0722 B,
+is in cd/m^2; in spectral mode see `spectra`.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from simgen.base.srgb import LUMINANCE
+from simgen.renderer.mitsuba_colours import radiance_plugin
+from simgen.spec.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight
+from simgen.spectral.spectra import illuminant
+
+NODES = 32
+"""Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
+
+
+def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | None) -> dict[str, Any]:
+    """The Mitsuba emitter of a light that is `gain` times as bright as it says.
+
+    `surroundings` (H, W, 3) are the pixels of an environment light's image.
+    """
+    match light:
+        case UniformLight():
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
+            return {"type": "constant", "radiance": radiance}
+        case PointLight():
+            # In cd = cd/m^2 m^2, with lengths in mm.
+            intensity = radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant)
+            return {"type": "point", "position": list(light.position_mm), "intensity": intensity}
+        case EnvironmentLight():
+            assert surroundings is not None
+            return _environment(mi, light, gain, surroundings)
+        case AreaLight():
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
+            return {
+                "type": "rectangle",
+                "to_world": mi.ScalarTransform4f(_pose(light)),
+                "emitter": {"type": "area", "radiance": radiance},
+                "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
+            }
+
+
+def _pose(light: AreaLight) -> np.ndarray:
+    """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
+    towards = np.subtract(light.target_mm, light.position_mm)
+    towards = towards / np.linalg.norm(towards)
+    up = np.array([0.0, -1.0, 0.0]) if abs(towards[1]) < 0.99 else np.array([0.0, 0.0, 1.0])
+    left = np.cross(up, towards)
+    left /= np.linalg.norm(left)
+    pose = np.eye(4)
+    pose[:3, 0] = left * (light.width_mm / 2)
+    pose[:3, 1] = np.cross(towards, left) * (light.height_mm / 2)
+    pose[:3, 2], pose[:3, 3] = towards, light.position_mm
+    return pose
+
+
+def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarray) -> dict[str, Any]:
+    bitmap = mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))
+    bitmap.set_srgb_gamma(False)
+    T = mi.ScalarTransform4f
+    # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z brings
+    # what is above to -Y and what is right to +X.
+    to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
+    return {
+        "type": "envmap",
+        "bitmap": bitmap,
+        "scale": gain * light.luminance_cd_m2,
+        "to_world": to_world,
+    }
+
+
+def main_spectrum(lights: Sequence[Light]) -> np.ndarray:
+    """The mean spectrum (N,) of the lights, each at luminance 1."""
+    names = [getattr(light, "illuminant", "D65") for light in lights]
+    return np.mean([illuminant(name) for name in names], axis=0)
+
+
+def gain_for(level: Level | None, lights: Sequence[Light], surroundings: np.ndarray | None) -> float:
+    """By how much to make lights brighter for a plane to get its level; `InputError` if it gets no light."""
+    if level is None:
+        return 1.0
+    lux = sum(illuminance_lux(light, level.z_mm, surroundings) for light in lights)
+    if not lux > 0:
+        raise InputError(
+            f"level: none of the lights shines on a surface at z_mm = {level.z_mm:g} that faces the cameras"
+        )
+    return level.illuminance_lux / lux
+
+
+def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) -> float:
+    """Illuminance, in lux, that a light gives a surface at (0, 0, z) that faces the cameras.
+
+    That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at the
+    lamp; nothing stands in the way.
+    """
+    point = np.array([0.0, 0.0, z_mm])
+    match light:
+        case UniformLight():
+            return float(np.pi * light.luminance_cd_m2)
+        case PointLight():
+            towards = np.subtract(light.position_mm, point)
+            distance = np.linalg.norm(towards)
+            return float(light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
+        case EnvironmentLight():
+            assert surroundings is not None
+            return light.luminance_cd_m2 * _from_around(light, surroundings)
+        case AreaLight():
+            pose, (node, weight) = _pose(light), np.polynomial.legendre.leggauss(NODES)
+            x, y = np.meshgrid(node, node)
+            places = pose[:3, :3] @ np.stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + pose[:3, 3:]
+            towards = places - point[:, None]
+            squared = (towards**2).sum(axis=0)
+            at_surface, at_lamp = np.maximum(-towards[2], 0), np.maximum(-pose[:3, 2] @ towards, 0)
+            shares = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
+            return float(light.luminance_cd_m2 * (shares * at_surface * at_lamp / squared**2).sum())
+
+
+def _from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
+    """The integral of the image's luminance times the cosine over the half space behind the cameras.
+
+    Like the renderer, between pixels it is linear: the rows lie at polar angles from 0 to pi.
+    """
+    height, width = pixels.shape[:2]
+    down, right = _midpoints(height), _midpoints(width)
+    longitude = (right - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
+    # Of the area on the sphere, and of the cosine, which is sin(polar) cos(longitude) in size.
+    of_rows = _shared(down * (height - 1), np.sin(down * np.pi) ** 2 * (np.pi / down.size), height)
+    of_columns = _shared(
+        right * width - 0.5, np.maximum(-np.cos(longitude), 0) * (2 * np.pi / right.size), width
+    )
+    return float(of_rows @ (pixels @ LUMINANCE) @ of_columns)
+
+
+def _midpoints(pixels: int) -> np.ndarray:
+    """Of equal parts of the unit interval, 8 a pixel or more."""
+    number = max(8 * pixels, 4096)
+    return (np.arange(number) + 0.5) / number
+
+
+def _shared(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:
+    """Weights at these places, each divided among the two pixels beside it; beyond the last is the first."""
+    before = np.floor(position_px).astype(np.int64)
+    after = position_px - before
+    total = np.bincount(before % pixels, weight * (1 - after), pixels)
+    return total + np.bincount((before + 1) % pixels, weight * after, pixels)

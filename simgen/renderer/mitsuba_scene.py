@@ -1,0 +1,99 @@
+"""From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never names one."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from simgen.assets.asset_files import Assets, read_assets
+from simgen.renderer.backend import shape_numbers
+from simgen.renderer.mitsuba_colours import reflectance_plugin
+from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
+from simgen.renderer.mitsuba_shapes import card_pose, placed_shape, pose_of
+from simgen.renderer.mitsuba_surfaces import matt, surface_plugin, two_sided
+from simgen.spec.lights import EnvironmentLight
+from simgen.spec.scene import Scene, SceneObject
+from simgen.spectral.filters import Filters, filters_for
+
+BACKDROP = "backdrop"
+
+
+@dataclass(frozen=True)
+class RenderScene:
+    """A scene that Mitsuba can render, and which of its shapes is which object."""
+
+    mi: Any
+    scene: Any
+    object_of_shape: np.ndarray
+    """Object id by Mitsuba's shape number, int16; 0 for a miss, the backdrop and lamps."""
+    names: Mapping[int, str]
+    """Names by object id, from 1."""
+    filters: Filters | None
+    """What the camera's pixels see of spectra; None where light is linear sRGB."""
+    gain: float = 1.0
+    """By how much lights are brighter than they say, for the scene's level."""
+
+
+def build(
+    mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarray | None = None
+) -> RenderScene:
+    """Load a scene into Mitsuba, in the variant that is set.
+
+    `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
+    `InputError` for a mesh or texture that cannot be used.
+    """
+    assets = read_assets(scene, folder)
+    names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
+    plugins: dict[str, Any] = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": max_depth},
+    }
+    for number, thing in enumerate(scene.objects, start=1):
+        plugins[f"object{number}"] = _object(mi, thing, assets)
+    if scene.backdrop is not None:
+        wall, half = scene.backdrop, scene.backdrop.half_width_mm
+        facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
+        plugins[BACKDROP] = {
+            "type": "rectangle",
+            "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
+            "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
+        }
+    around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
+    surroundings = None if around is None else assets.environment(around.file)
+    gain = gain_for(scene.level, scene.lights, surroundings)
+    for number, light in enumerate(scene.lights, start=1):
+        plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
+    try:
+        # Without optimisation: it merges shapes, and merged shapes lose their names.
+        loaded = mi.load_dict(plugins, optimize=False)
+    except RuntimeError as fault:
+        raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
+    filters = None if curves is None else filters_for(curves, main_spectrum(scene.lights))
+    return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain)
+
+
+def _object_of_shape(loaded: Any) -> np.ndarray:
+    numbers = shape_numbers(loaded)
+    table = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
+    for number, shape in zip(numbers, loaded.shapes(), strict=True):
+        table[number] = _object_id(shape.id())
+    return table
+
+
+def _object_id(shape_id: str) -> int:
+    return int(shape_id.removeprefix("object")) if shape_id.startswith("object") else 0
+
+
+def _object(mi: Any, thing: SceneObject, assets: Assets) -> Any:
+    try:
+        surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets))
+        return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
+    except InputError as fault:
+        raise InputError(f"object '{thing.name}', {fault}") from None
+
+
+def _last_line(fault: BaseException) -> str:
+    return str(fault).strip().splitlines()[-1].strip()

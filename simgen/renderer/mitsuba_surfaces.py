@@ -1,0 +1,96 @@
+"""Materials as Mitsuba's surfaces."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from pcii.core.errors import InputError
+from simgen.assets.asset_files import Assets
+from simgen.assets.texture_pixels import paint
+from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin
+from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic
+from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
+from simgen.spec.textures import Texture
+
+
+def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
+    """The same from behind, so that a card or an open mesh is no black hole there; glass has two sides."""
+    if surface["type"] in ("dielectric", "thindielectric"):
+        return surface
+    return {"type": "twosided", "bsdf": surface}
+
+
+def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
+    """Scatters light evenly (Lambert)."""
+    return {"type": "diffuse", "reflectance": reflectance}
+
+
+def surface_plugin(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
+    """The surface of an object of this shape, from the front."""
+    match material.finish:
+        case Matt():
+            return matt(_reflectance(mi, material, shape, assets))
+        case Plastic(roughness=alpha):
+            return {
+                "type": "roughplastic",
+                "distribution": "ggx",
+                "alpha": alpha,
+                "diffuse_reflectance": _reflectance(mi, material, shape, assets),
+            }
+        case Metal(name=name, roughness=alpha):
+            return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+        case Glass(refractive_index=index):
+            pane = isinstance(shape, Card)
+            return {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
+
+
+def _reflectance(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
+    if material.texture is None:
+        assert material.reflectance is not None
+        return reflectance_plugin(mi, material.reflectance)
+    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
+        raise InputError(
+            f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates"
+        )
+    return {
+        "type": "bitmap",
+        "bitmap": _bitmap(mi, _pixels(material.texture, shape, assets)),
+        # Linear already, so colours are left as they are, but for being made spectra where these are asked.
+        "raw": not is_spectral(mi),
+        "filter_type": "bilinear",
+        # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
+        "wrap_mode": "repeat" if isinstance(shape, Sphere) else "clamp",
+    }
+
+
+def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
+    bitmap = mi.Bitmap(pixels)
+    bitmap.set_srgb_gamma(False)  # linear; otherwise a spectral variant takes them for sRGB
+    return bitmap
+
+
+def _pixels(texture: str | Texture, shape: Shape, assets: Assets) -> np.ndarray:
+    """Linear reflectance (H, W, 3), float32, in the order that the renderer takes it for this shape."""
+    if isinstance(texture, str):
+        pixels = assets.image(texture)
+    else:
+        pixels = paint(texture, aspect_of(shape))
+    if isinstance(shape, Card):
+        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
+    return pixels
+
+
+def aspect_of(shape: Shape) -> float:
+    """Width over height of what a shape's texture is laid on: a sphere's and a cylinder's go once round."""
+    match shape:
+        case Card():
+            return shape.width_mm / shape.height_mm
+        case Sphere():
+            return 2.0
+        case Cylinder():
+            return 2 * math.pi * shape.radius_mm / shape.length_mm
+        case Box():
+            return shape.width_mm / shape.height_mm
+        case _:
+            return 1.0

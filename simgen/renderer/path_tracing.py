@@ -1,0 +1,216 @@
+"""Light paths, one for each of many camera rays at once: what is hit first, and unbiased radiance.
+
+The estimator is path tracing with next-event estimation (Kajiya 1986) and multiple importance sampling
+by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
+chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
+varies, the fewer candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays
+of one lane a ray. Needs a compiled backend.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from simgen.cameras.rig import Rig
+from simgen.renderer.backend import load_drjit
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.wavelengths import Light
+
+STRATA = 2
+"""At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
+BOUNCES = 2
+"""From the first hit so many directions are followed: a surface nearby that shines on it is rarely met."""
+LEAST_REFLECTANCE = 0.001
+"""A surface is never guessed to be less reflective than this: it may shine."""
+LEAST_RADIANCE = 1e-9
+"""What is guessed of nothing, so that it can be divided by."""
+GOLDEN = (5**0.5 - 1) / 2
+"""Its multiples, less their whole parts, are evenly spread."""
+
+
+@dataclass(frozen=True)
+class FirstHits:
+    """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
+
+    `guess` is the radiance that can be told without a light path: what shines itself, else what the
+    lamps would give if nothing stood in the way, and light from all around.
+    """
+
+    record: Any
+    shape: Any
+    z_mm: Any
+    guess: Any
+
+
+def film_rays(
+    built: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
+) -> Any:
+    """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`."""
+    mi, dr, grid = built.mi, load_drjit(), rig.grid
+    camera = k * grid.cols + l
+
+    def own(values: np.ndarray) -> Any:
+        if (values == values.flat[0]).all():
+            return float(values.flat[0])  # what all cameras share needs no look-up
+        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
+
+    def turned(*vector: Any) -> list[Any]:
+        columns = range(len(vector))
+        return [_dot([own(rig.rotation[..., row, col]) for col in columns], vector) for row in range(3)]
+
+    per_px = grid.pixel_mm / grid.focal_mm
+    x = (col_px - own((grid.width - 1) / 2 + rig.shift_px[..., 0])) * per_px
+    y = (row_px - own((grid.height - 1) / 2 + rig.shift_px[..., 1])) * per_px
+    origin = mi.Point3f(*(own(rig.position_mm[..., axis]) for axis in range(3)))
+    if rig.lens is not None:
+        x, y = x - lens_point.x / rig.lens.focus_mm, y - lens_point.y / rig.lens.focus_mm
+        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
+    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
+    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
+
+
+def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
+    """Sum of products, but for what is multiplied by a plain 0 or 1."""
+    parts = zip(row, vector, strict=True)
+    terms = [part if isinstance(f, float) and f == 1 else f * part for f, part in parts if not _is_zero(f)]
+    return sum(terms[1:], terms[0]) if terms else 0
+
+
+def _is_zero(factor: Any) -> bool:
+    return isinstance(factor, float) and factor == 0
+
+
+def hit_first(built: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
+    """What each active ray hits first; `ambient` is the radiance that is guessed to come from all around."""
+    mi, dr = built.mi, load_drjit()
+    record = built.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
+    found = active & hit.is_valid()
+    shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
+    z_mm = dr.select(found, hit.p.z, dr.inf)
+    guess = hit.emitter(built.scene, active).eval(hit, active)
+    bsdf, context = hit.bsdf(ray), mi.BSDFContext()
+    for lamp in _lamps(built.scene):
+        towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
+        scattered = bsdf.eval(context, hit, hit.to_local(towards.d), found)
+        guess += dr.select(found & (towards.pdf > 0), scattered * weight, 0)
+    reflectance = bsdf.eval_diffuse_reflectance(hit, found)
+    guess += dr.select(found, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
+    return FirstHits(record, shape, z_mm, guess)
+
+
+def surrounding_radiance(built: RenderScene, light: Light) -> np.ndarray:
+    """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
+    mi, dr = built.mi, load_drjit()
+    around = built.scene.environment()
+    number = dr.arange(mi.Float, 256) + 0.5
+    # Evenly spread directions (a Fibonacci lattice).
+    up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
+    across = dr.sqrt(1 - up * up)
+    away = dr.zeros(mi.SurfaceInteraction3f, 256)
+    away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
+    found: Any = 0.0
+    for colour in light.looks(dr.zeros(mi.UInt32, 256)):
+        # The directions are in no order of colour, so that any will do for wavelengths.
+        wavelength_sample = number * GOLDEN - dr.floor(number * GOLDEN)
+        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, 256), colour, wavelength_sample).wavelengths
+        seen = mi.Spectrum(0) if around is None else around.eval(away)
+        found += np.array(light.seen(seen, colour, wavelength_sample)).mean(axis=1, dtype=np.float64)
+    return found
+
+
+def _lamps(scene: Any) -> list[Any]:
+    """Emitters that have a place."""
+    return [light for light in scene.emitters() if not light.is_environment()]
+
+
+def _surroundings(mi: Any, scene: Any) -> list[Any]:
+    """The image of what shines from all around, if there is one: a sun in it is to be aimed at.
+
+    Uniform surroundings are found by following the surface's own scattering, which has no variance but
+    for what stands in the way.
+    """
+    around = scene.environment()
+    varies = around is not None and mi.has_flag(around.flags(), mi.EmitterFlags.SpatiallyVarying)
+    return [around] if varies else []
+
+
+def radiance_along(built: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
+    """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
+
+    The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
+    `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
+    """
+    mi = built.mi
+    tracer = _Tracer(built, sampler)
+    hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
+    radiance = hit.emitter(built.scene).eval(hit)
+    return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
+
+
+class _Tracer:
+    """The two halves of path tracing, which call each other: what leaves a hit, what arrives there."""
+
+    def __init__(self, built: RenderScene, sampler: Any) -> None:
+        self.mi, self.dr, self.scene, self.sampler = built.mi, load_drjit(), built.scene, sampler
+        self.context = self.mi.BSDFContext()
+        around = _surroundings(built.mi, built.scene)
+        self.lamps, self.aims_around = _lamps(built.scene) + around, bool(around)
+
+    def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
+        """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""
+        mi, dr, sampler = self.mi, self.dr, self.sampler
+        radiance = mi.Spectrum(0)
+        if left == 0:
+            return radiance
+        bsdf = hit.bsdf(ray)
+        for lamp in self.lamps:
+            for cell in np.ndindex(side, side):
+                point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / side
+                radiance += self._direct(lamp, hit, bsdf, point, side**2, bounces, active) / side**2
+        for bounce in range(bounces):
+            across = sampler.next_2d(active)
+            across.x = (across.x + bounce) / bounces
+            sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
+            on = active & dr.any(weight != 0)
+            onward = hit.spawn_ray(hit.to_world(sample.wo))
+            arriving = self._arriving(onward, hit, sample, on, left, side, bounces)
+            radiance += dr.select(on, weight * arriving, 0) / bounces
+        return radiance
+
+    def _arriving(
+        self, ray: Any, before: Any, sample: Any, active: Any, left: int, side: int, bounces: int
+    ) -> Any:
+        """Radiance that arrives at `before` along `ray`, whose direction the surface chose."""
+        mi, dr, scene = self.mi, self.dr, self.scene
+        hit = scene.ray_intersect(ray, active)
+        lamp = hit.emitter(scene, active)
+        towards = mi.DirectionSample3f(scene, hit, mi.Interaction3f(before))
+        # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
+        aimed = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        if not self.aims_around:
+            aimed &= hit.is_valid()
+        pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(before), towards, active)
+        share = dr.select(aimed, _share(bounces * sample.pdf, pdf_lamp), 1)
+        radiance = lamp.eval(hit, active) * share
+        return radiance + self.scattered(ray, hit, active & hit.is_valid(), left - 1, 1, 1)
+
+    def _direct(
+        self, lamp: Any, hit: Any, bsdf: Any, point: Any, tries: int, bounces: int, active: Any
+    ) -> Any:
+        """Light that arrives straight from one lamp and is scattered towards where we came from."""
+        mi, dr = self.mi, self.dr
+        able = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        towards, weight = lamp.sample_direction(hit, point, able)
+        able &= towards.pdf != 0
+        blocked = self.scene.ray_test(hit.spawn_ray_to(towards.p), able)
+        value, pdf = bsdf.eval_pdf(self.context, hit, hit.to_local(towards.d), able)
+        share = dr.select(towards.delta, 1, _share(tries * towards.pdf, bounces * pdf))
+        return dr.select(able & ~blocked, value * weight * share, 0)
+
+
+def _share(own: Any, other: Any) -> Any:
+    """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
+    return own * own / (own * own + other * other)

@@ -1,0 +1,150 @@
+"""How rays carry light, for compiled backends: as three colours, or as four wavelengths for a pixel's filter.
+
+Everything here is on the renderer's side: Dr.Jit arrays of one lane a ray.
+"""
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+
+from simgen.base.srgb import LUMINANCE
+from simgen.renderer.backend import load_drjit
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.spectral.filters import CELLS, HEROES, Filters
+from simgen.spectral.spectra import WAVELENGTH_NM
+
+
+class Light(Protocol):
+    """What rays carry, for pixels of a `colour` (its number).
+
+    `wavelength_sample` is what `wavelength_samples` gave the ray.
+    """
+
+    def wavelength_samples(self, sampler: Any, number: int) -> Any:
+        """Random numbers that decide on wavelengths."""
+        ...
+
+    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """The ray with the wavelengths that it is followed at."""
+        ...
+
+    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """Light from all around, of which pixels of each colour see `ambient`, as rays carry it."""
+        ...
+
+    def looks(self, colour: Any) -> Iterator[Any]:
+        """For which colours rays must be followed so that together they tell of all."""
+        ...
+
+    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+        """What pixels of each colour see, as far as these wavelengths tell; 0 of the other colours."""
+        ...
+
+
+class Colours:
+    """Linear sRGB: every ray tells of all colours."""
+
+    def __init__(self, mi: Any, cfa: str | None) -> None:
+        self.mi, self.cfa = mi, cfa
+
+    def wavelength_samples(self, sampler: Any, number: int) -> Any:
+        """None are needed: zeros."""
+        return load_drjit().zeros(self.mi.Float, number)
+
+    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """See `Light`."""
+        return ray
+
+    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """See `Light`."""
+        return self.mi.Color3f(*ambient) if len(ambient) == 3 else self.mi.Color3f(ambient[0])
+
+    def looks(self, colour: Any) -> Iterator[Any]:
+        """See `Light`."""
+        yield colour
+
+    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+        """R, G, B, or luminance for a monochrome sensor."""
+        if self.cfa is not None:
+            return list(radiance)
+        return [sum(float(share) * part for share, part in zip(LUMINANCE, radiance, strict=True))]
+
+
+class Wavelengths:
+    """Four wavelengths for each ray, drawn for its own pixel's filter."""
+
+    def __init__(self, mi: Any, filters: Filters) -> None:
+        self.mi, self.channels = mi, len(filters.sensitivity)
+        self.cell_nm = mi.Float(filters.wavelength_nm.ravel())
+        self.sensitivity = mi.Float(filters.sensitivity.astype(np.float32).ravel())
+        self.light = mi.Float(filters.light.astype(np.float32))
+        self.white = mi.Float(filters.white.astype(np.float32))
+
+    def wavelength_samples(self, sampler: Any, number: int) -> Any:
+        """See `Light`."""
+        return sampler.next_1d()
+
+    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """See `Light`."""
+        ray.wavelengths = self._drawn(colour, wavelength_sample)[0]
+        return ray
+
+    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
+        """See `Light`: of the spectrum of most of the light."""
+        dr = load_drjit()
+        chosen_nm, _ = self._drawn(colour, wavelength_sample)
+        white = dr.gather(self.mi.Float, self.white, colour)
+        own = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
+        return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * own for here_nm in chosen_nm))
+
+    def looks(self, colour: Any) -> Iterator[Any]:
+        """See `Light`."""
+        for own in range(self.channels):
+            yield load_drjit().full(self.mi.UInt32, own, len(colour))
+
+    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+        """See `Light`."""
+        dr = load_drjit()
+        _, weight = self._drawn(colour, wavelength_sample)
+        own = dr.sum(radiance * weight)
+        return [dr.select(colour == other, own, 0) for other in range(self.channels)]
+
+    def _drawn(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
+        """Wavelengths and their weights, as `Filters.draw` has them."""
+        mi, dr = self.mi, load_drjit()
+        chosen_nm, weight = [], []
+        for hero in range(HEROES):
+            place = (wavelength_sample + hero) * (CELLS / HEROES)
+            cell = dr.minimum(mi.UInt32(place), CELLS - 1)
+            first = colour * (CELLS + 1) + cell
+            low, high = dr.gather(mi.Float, self.cell_nm, first), dr.gather(mi.Float, self.cell_nm, first + 1)
+            here_nm = low + (high - low) * (place - mi.Float(cell))
+            curve = self._at(self.sensitivity, here_nm, colour * WAVELENGTH_NM.size)
+            chosen_nm.append(here_nm)
+            weight.append(curve * (high - low) * (CELLS / HEROES))
+        return mi.Spectrum(*chosen_nm), mi.Spectrum(*weight)
+
+    def _at(self, table: Any, wavelength_nm: Any, start: Any) -> Any:
+        """A table's value at a wavelength; its row begins at `start`."""
+        mi, dr = self.mi, load_drjit()
+        place = wavelength_nm - float(WAVELENGTH_NM[0])
+        cell = dr.minimum(mi.UInt32(place), WAVELENGTH_NM.size - 2)
+        low, high = (dr.gather(mi.Float, table, start + cell + side) for side in (0, 1))
+        return dr.lerp(low, high, place - mi.Float(cell))
+
+
+def light_of(built: RenderScene, cfa: str | None) -> Light:
+    """How rays carry light in this scene's variant."""
+    if built.filters is None:
+        return Colours(built.mi, cfa)
+    return Wavelengths(built.mi, built.filters)
+
+
+def of_colour(values: Any, colour: Any) -> Any:
+    """Each lane's value of its own colour."""
+    dr = load_drjit()
+    values = list(values)
+    if len(values) == 1:
+        return values[0]
+    return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))

@@ -1,0 +1,90 @@
+"""Lamps and what shines from all around: where they stand, how bright and of what colour they are."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from simgen.base.asset_names import EnvironmentName
+from simgen.base.strict_models import Length, Position, Positive, Real, Strict, completed_by
+from simgen.spectral.spectra import illuminant_names, known_illuminant
+
+Illuminant = Annotated[
+    str,
+    Field(
+        max_length=40,
+        description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.",
+        json_schema_extra=completed_by("enum", illuminant_names),
+    ),
+    AfterValidator(known_illuminant),
+]
+
+
+class AreaLight(Strict):
+    """A flat rectangular lamp that shines from its position towards a target."""
+
+    type: Literal["area"] = "area"
+    position_mm: Position
+    """Where the middle of the lamp stands."""
+    target_mm: Position
+    """What the lamp faces; behind itself it is dark."""
+    width_mm: Length
+    """Across, level if the lamp can be."""
+    height_mm: Length
+    """Along its other side."""
+    luminance_cd_m2: Positive
+    """How bright its face is; an overcast sky has some 2000, a white sheet at 500 lux 159."""
+    illuminant: Illuminant = "D65"
+
+    @model_validator(mode="after")
+    def _faces_something(self) -> Self:
+        if self.position_mm == self.target_mm:
+            raise ValueError("target_mm: an area light must face something else than its own position_mm")
+        return self
+
+
+class PointLight(Strict):
+    """A lamp without size, which shines evenly in all directions and is seen by no camera."""
+
+    type: Literal["point"] = "point"
+    position_mm: Position
+    """Where it stands."""
+    intensity_cd: Positive
+    """Luminous intensity: lux times square metres."""
+    illuminant: Illuminant = "D65"
+
+
+class UniformLight(Strict):
+    """The same luminance from everywhere, seen by the cameras where nothing is hit."""
+
+    type: Literal["uniform"] = "uniform"
+    luminance_cd_m2: Positive
+    """Its luminance; a surface that sees nothing else gets pi times as many lux."""
+    illuminant: Illuminant = "D65"
+
+
+class EnvironmentLight(Strict):
+    """An image of all that shines from far away, seen by the cameras where nothing is hit; in daylight D65.
+
+    Longitude by latitude: the middle of the image lies straight ahead (+Z), its first row straight above,
+    its last straight below, its right half to the right.
+    """
+
+    type: Literal["environment"] = "environment"
+    file: EnvironmentName
+    """An OpenEXR image inside the scene's folder, twice as wide as high, linear sRGB."""
+    luminance_cd_m2: Positive
+    """Luminance of white, pixels of (1, 1, 1)."""
+    turn_deg: Real = 0.0
+    """By how much the surroundings are turned to the right about the vertical axis."""
+
+
+Light = Annotated[AreaLight | PointLight | UniformLight | EnvironmentLight, Field(discriminator="type")]
+
+
+class Level(Strict):
+    """How bright it is: all lights are made brighter or dimmer together until a plane gets so many lux."""
+
+    illuminance_lux: Positive
+    """Direct light, with nothing in the way, on a surface at (0, 0, z_mm) that faces the cameras."""
+    z_mm: Length
+    """Where that surface stands."""

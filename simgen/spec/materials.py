@@ -1,0 +1,133 @@
+"""What surfaces do with light: a colour, by a reflectance or a texture, and a finish."""
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from simgen.base.asset_names import ImageName
+from simgen.base.strict_models import Colour, Positive, Real, Share, Strict, completed_by
+from simgen.spec.textures import Texture
+from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
+
+
+class Matt(Strict):
+    """Scatters light evenly (Lambert)."""
+
+    type: Literal["matt"] = "matt"
+
+
+class Plastic(Strict):
+    """A coloured body under a clear coat of refractive index 1.49, which gives highlights.
+
+    Light that a rough coat scatters more than once is lost: a white ball alone in even light looks 0.98,
+    0.91, 0.70 and 0.55 bright at roughness 0.01, 0.1, 0.3 and 0.5.
+    """
+
+    type: Literal["plastic"] = "plastic"
+    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
+    """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
+
+
+class Metal(Strict):
+    """A bare metal by its chemical symbol, with the measured refractive index of that metal."""
+
+    type: Literal["metal"] = "metal"
+    name: Literal["Ag", "Al", "Au", "Cr", "Cu", "W"]
+    """Silver, aluminium, gold, chromium, copper or tungsten."""
+    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
+    """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
+
+
+class Glass(Strict):
+    """Clear and smooth; a card of it is a thin pane. Light passes it in as many segments as it has surfaces,
+    so recipes with glass need a larger `render.max_depth`: 6 for a ball before a lit thing."""
+
+    type: Literal["glass"] = "glass"
+    refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+    """Of the glass against air: 1.5 of windows, 1.33 of water, 1.9 of heavy flint."""
+
+
+Finish = Matt | Plastic | Metal | Glass
+
+
+class Spectrum(Strict):
+    """Reflectance by wavelength, linear in between and the same beyond the ends."""
+
+    wavelength_nm: Annotated[tuple[Positive, ...], Field(min_length=2, max_length=2000)]
+    """Growing wavelengths, in nm; from 380 to 780 nm they matter."""
+    value: tuple[Share, ...]
+    """Reflectance at each of them, from 0 to 1."""
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Self:
+        if len(self.value) != len(self.wavelength_nm):
+            raise ValueError("give as many values as wavelengths")
+        if any(here >= there for here, there in pairwise(self.wavelength_nm)):
+            raise ValueError("wavelength_nm: wavelengths must grow")
+        if self.wavelength_nm[0] >= WAVELENGTH_NM[-1] or self.wavelength_nm[-1] <= WAVELENGTH_NM[0]:
+            raise ValueError("wavelength_nm: light has 380 to 780 nm, and none of these are there")
+        return self
+
+
+def _kind_of_reflectance(value: Any) -> str:
+    if isinstance(value, str):
+        return "patch"
+    return "spectrum" if isinstance(value, dict | Spectrum) else "colour"
+
+
+PatchName = Annotated[
+    str,
+    Field(
+        description="one of the 24 ColorChecker patches, such as 'dark skin'",
+        json_schema_extra=completed_by("enum", patch_names),
+    ),
+    AfterValidator(known_patch),
+]
+Reflectance = Annotated[
+    Annotated[Colour, Tag("colour")]
+    | Annotated[PatchName, Tag("patch")]
+    | Annotated[Spectrum, Tag("spectrum")],
+    Discriminator(_kind_of_reflectance),
+]
+"""As sRGB, as the name of a ColorChecker patch, or as a spectrum."""
+
+
+def _file_or_pattern(given: Any) -> str | None:
+    """Which of the two a texture is, so that an error tells of that one alone."""
+    if isinstance(given, str):
+        return "file"
+    return "pattern" if isinstance(given, dict | Strict) else None
+
+
+FileOrPattern = Annotated[
+    Annotated[ImageName, Tag("file")] | Annotated[Texture, Tag("pattern")],
+    Discriminator(
+        _file_or_pattern,
+        custom_error_type="texture",
+        custom_error_message='give the name of an image file or a table such as { type = "star" }',
+    ),
+]
+
+
+class Material(Strict):
+    """What a surface does with light: its colour, by a reflectance or a texture, and its finish."""
+
+    reflectance: Reflectance | None = None
+    """sRGB, three numbers from 0 to 1; or the name of a ColorChecker patch; or a spectrum, such as
+    { wavelength_nm = [400, 700], value = [0.2, 0.8] }."""
+    texture: FileOrPattern | None = None
+    """An sRGB image file inside the scene's folder, or a pattern such as { type = "star", spokes = 36 };
+    laid out by the shape's texture coordinates."""
+    finish: Finish = Field(default=Matt(), discriminator="type")
+    """Matt unless told otherwise; { type = "plastic", roughness = 0.1 } adds highlights."""
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        coloured = not isinstance(self.finish, Metal | Glass)
+        if coloured and (self.reflectance is None) == (self.texture is None):
+            raise ValueError("give either 'reflectance' or 'texture'")
+        if not coloured and (self.reflectance is not None or self.texture is not None):
+            kind = self.finish.type
+            raise ValueError(f"the colour of {kind} is its own; give no 'reflectance' and no 'texture'")
+        return self

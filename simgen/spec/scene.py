@@ -1,0 +1,149 @@
+"""Scenes: the world in a TOML file, in millimetres; no camera in it.
+
+World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking along +Z.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from pcii.core.errors import InputError
+from simgen.base.asset_names import AssetName, asset, named_files
+from simgen.base.locations import find, scene_roots
+from simgen.base.strict_models import (
+    LARGEST_MM,
+    LONGEST_PART,
+    Length,
+    Position,
+    Real,
+    Strict,
+    Title,
+    Vector,
+    read_toml,
+    shorten,
+    suggestion,
+    validate,
+)
+from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
+from simgen.spec.materials import Material, Reflectance
+from simgen.spec.shapes import Shape
+
+MOST_OBJECTS = 1000
+NAME = "^[A-Za-z][A-Za-z0-9_-]*$"
+MOST_LIGHTS = 100
+
+
+class SceneObject(Strict):
+    """One named thing that truth and scores know."""
+
+    name: Annotated[str, Field(max_length=64, json_schema_extra={"pattern": NAME})]
+    """What truth, scores and pictures call it: a letter, then letters, digits, _ and -."""
+    position_mm: Position
+    """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
+    rotation_deg: Vector = (0.0, 0.0, 0.0)
+    """Turns about the X, Y and Z axes, applied in this order, in degrees."""
+    shape: Shape
+    """A sphere, card, box, cylinder or mesh."""
+    material: Material
+    """Its colour or texture, and its finish."""
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_name(cls, name: str) -> str:
+        if not re.fullmatch(NAME, name):
+            shown = shorten(repr(name), LONGEST_PART)
+            raise ValueError(
+                f"a name is a letter, then letters, digits, _ and -, such as 'left-wheel', not {shown}"
+            )
+        return name
+
+
+class Backdrop(Strict):
+    """A flat wall parallel to the camera plane, endless for the cameras."""
+
+    z_mm: Length
+    """Depth of the wall."""
+    reflectance: Reflectance = (0.0, 0.0, 0.0)
+    """sRGB, the name of a ColorChecker patch, or a spectrum; as of a material."""
+    half_width_mm: Annotated[Real, Field(ge=0, le=LARGEST_MM)] = 5000.0
+    """How far it reaches to each side."""
+
+
+class Scene(Strict):
+    """A world to be looked at: objects, lights, and what stands behind."""
+
+    title: Title
+    """One line."""
+    description: Annotated[str, Field(max_length=10_000)] = ""
+    """What it is for."""
+    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS, fail_fast=True)] = ()
+    """What truth and scores know by name; none makes an empty scene."""
+    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS, fail_fast=True)]
+    """At least one lamp, or light from all around."""
+    level: Level | None = None
+    """Sets how bright it is; the luminances of lights then tell only how they compare."""
+    backdrop: Backdrop | None = None
+    """A wall behind the objects, which is no object itself."""
+
+    @field_validator("lights")
+    @classmethod
+    def _one_from_all_around(cls, lights: tuple[Light, ...]) -> tuple[Light, ...]:
+        if sum(isinstance(light, UniformLight | EnvironmentLight) for light in lights) > 1:
+            raise ValueError("only one light can be 'uniform' or 'environment'")
+        return lights
+
+    @field_validator("objects")
+    @classmethod
+    def _names_differ(cls, objects: tuple[SceneObject, ...]) -> tuple[SceneObject, ...]:
+        times = Counter(thing.name for thing in objects)
+        twice = sorted(name for name, count in times.items() if count > 1)
+        if twice:
+            raise ValueError(f"two objects are named '{twice[0]}'; give each its own name")
+        return objects
+
+
+def load_scene(name_or_path: str, near: Path | None = None) -> tuple[Scene, Path]:
+    """A scene by name or path, and its folder.
+
+    A name is looked up beside the recipe (`near`), in the working directory's `scenes/`, then among
+    the scenes that ship. Raises `InputError` for a scene that is missing or wrong.
+    """
+    file = find_scene(name_or_path, near)
+    scene = validate(Scene, read_toml(file), str(file))
+    for where, name in scene_files(scene):
+        asset(file.parent, name, f"{file}: {where}")
+    return scene, file.parent
+
+
+def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
+    """Every file that a scene names, and the field where: `object 'ball', material.texture`."""
+    for thing in scene.objects:
+        for where, name in named_files(thing):
+            yield f"object '{thing.name}', {where}", name
+    yield from named_files(scene.model_copy(update={"objects": ()}))
+
+
+def find_scene(name_or_path: str, near: Path | None = None) -> Path:
+    """The scene.toml that a name or path means; `InputError` with a suggestion if there is none."""
+    given = Path(name_or_path)
+    beside = [] if near is None else [near / given, near / given / "scene.toml"]
+    try:
+        for candidate in (*beside, given, given / "scene.toml"):
+            if candidate.is_file():
+                return candidate
+        shipped = find(scene_roots, f"{name_or_path}/scene.toml")
+    except OSError:  # a name too long for a file
+        shipped = None
+    if shipped is not None:
+        return shipped
+    told = shorten(repr(name_or_path), LONGEST_PART)
+    raise InputError(f"scene: there is no scene {told}{suggestion(name_or_path, scene_names())}")
+
+
+def scene_names() -> list[str]:
+    """Names of the scenes that ship or stand in the working directory."""
+    return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})

@@ -1,0 +1,76 @@
+"""Shapes that objects of a scene can have, in millimetres about the object's position."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from simgen.base.asset_names import MeshName
+from simgen.base.strict_models import Length, Positive, Strict
+
+
+class Sphere(Strict):
+    """A sphere about the object's position; a picture goes around it like a map around a globe.
+
+    Its middle faces the cameras, its upper border is the pole above, its sides meet behind.
+    """
+
+    type: Literal["sphere"] = "sphere"
+    radius_mm: Length
+    """From the middle to the surface."""
+
+
+class Card(Strict):
+    """A flat rectangle about the object's position; unrotated it faces the cameras, picture upright."""
+
+    type: Literal["card"] = "card"
+    width_mm: Length
+    """Along X."""
+    height_mm: Length
+    """Along Y."""
+
+
+class Box(Strict):
+    """A box about the object's position; each of its six sides bears the whole picture.
+
+    Unrotated its front faces the cameras. From there the front is upright, and so are the other sides
+    for whoever walks around; the top is laid with its lower border in front, the bottom with its upper.
+    """
+
+    type: Literal["box"] = "box"
+    width_mm: Length
+    """Along X."""
+    height_mm: Length
+    """Along Y."""
+    depth_mm: Length
+    """Along Z."""
+
+
+class Cylinder(Strict):
+    """An upright cylinder with closed ends about the object's position, its axis along Y.
+
+    A picture goes once around, upright, its middle in front and its sides meeting behind. Each end
+    bears the picture's largest circle, laid as on the top and bottom of a box.
+    """
+
+    type: Literal["cylinder"] = "cylinder"
+    radius_mm: Length
+    """From the axis to the side."""
+    length_mm: Length
+    """Along Y, from end to end."""
+
+
+class Mesh(Strict):
+    """A PLY or OBJ mesh in the scene's folder; its axes are the world's, about the object's position.
+
+    It is laid out by its own texture coordinates (in PLY named s, t or u, v), which begin at the
+    picture's lower left, as modelling programs write them. Without normals its faces are flat.
+    """
+
+    type: Literal["mesh"] = "mesh"
+    file: MeshName
+    """Name of a .ply or .obj file inside the scene's folder."""
+    scale: Positive = 1.0
+    """Millimetres for one unit of the file."""
+
+
+Shape = Annotated[Sphere | Card | Box | Cylinder | Mesh, Field(discriminator="type")]

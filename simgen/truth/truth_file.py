@@ -1,0 +1,84 @@
+"""The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.core.console import Report
+from pcii.io.dataset_layout import TRUTH, TRUTH_LABELS
+from pcii.io.zarr_groups import new_array, new_group_safely
+from simgen.cameras.rig import Rig, centre_camera, rig_of
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.spec.recipe import Recipe, ViewPass
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
+from simgen.truth.pixel_coverage import coverage
+from simgen.truth.visibility import visible_views
+
+RAYS = "visibility_rays"
+
+
+def write_truth(recipe: Recipe, built: RenderScene, out: Path, report: Report) -> None:
+    """Write what the recipe asks for, unless it is there already; one view in memory at a time."""
+    if (out / TRUTH).is_dir():
+        return
+    rig, products, planes = rig_of(recipe), recipe.products, recipe.analysis.z_mm
+    grid = rig.grid
+    with new_group_safely(out / TRUTH, {}) as group:
+        if products.truth:
+            centre = first_hits_at_centre(built, grid)
+            for name in ("z_mm", "object_id", "normal"):
+                _store(group, name, getattr(centre, name))
+            _store(group, "coverage", coverage(built, centre_camera(grid), centre.object_id))
+            if planes:
+                _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
+                group.attrs["in_focus_z_mm"] = list(planes)
+            if recipe.grid.errors is not None:
+                _store(group, "camera_position_mm", rig.position_mm)
+                _store(group, "camera_rotation", rig.rotation)
+            if products.visibility:
+                views, rays = visible_views(built, rig, centre, report)
+                _store(group, "visible_views", views)
+                group.attrs[RAYS] = rays
+        if products.view_truth:
+            _write_views(group, built, rig, products.view_truth, report)
+
+
+def traced_for_visibility(out: Path) -> int | None:
+    """How many rays were traced to count views, None if they were not counted."""
+    import zarr
+
+    if not (out / TRUTH).is_dir():
+        return None
+    rays = zarr.open_group(out / TRUTH, mode="r", zarr_format=3).attrs.get(RAYS)
+    return None if rays is None else int(str(rays))
+
+
+def _write_views(
+    group: Any, built: RenderScene, rig: Rig, passes: tuple[ViewPass, ...], report: Report
+) -> None:
+    grid, arrays = rig.grid, dict[str, Any]()
+    for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
+        for name, image in _view(built, rig, k, l, passes):
+            if name not in arrays:
+                shape = (grid.rows, grid.cols, *image.shape)
+                label = TRUTH_LABELS[f"view_{name}"]
+                arrays[name] = new_array(group, f"view_{name}", shape, image.dtype, label)
+            arrays[name][k, l] = image
+        report("truth of views", done, grid.view_count)
+
+
+def _view(
+    built: RenderScene, rig: Rig, k: int, l: int, passes: tuple[ViewPass, ...]
+) -> Iterator[tuple[ViewPass, np.ndarray]]:
+    hits: FirstHits = first_hits_of_view(built, rig, k, l)
+    for name in passes:
+        if name == "coverage":
+            yield name, coverage(built, rig.pinhole(k, l), hits.object_id)
+        else:
+            yield name, getattr(hits, name)
+
+
+def _store(group: Any, name: str, array: np.ndarray) -> None:
+    new_array(group, name, array.shape, array.dtype, TRUTH_LABELS[name])[...] = array

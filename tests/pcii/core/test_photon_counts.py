@@ -1,0 +1,190 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from twins import unit_grid
+
+from pcii.core.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.reconstruction import reconstruct
+
+
+def events_of(counts: PhotonCounts) -> list[tuple[int, ...]]:
+    e = counts.events
+    columns = (e.k.tolist(), e.l.tolist(), e.i.tolist(), e.j.tolist(), e.n.tolist())
+    return list(zip(*columns, strict=True))
+
+
+def test_events_are_sorted_repeats_added_and_zeros_dropped():
+    rows = [(1, 0, 2, 3, 4), (0, 2, 0, 0, 1), (1, 0, 2, 3, 5), (0, 0, 1, 1, 0)]
+    counts = PhotonCounts.from_events(*np.array(rows).T, unit_grid(2, 3, 4, 6))
+    assert events_of(counts) == [(0, 2, 0, 0, 1), (1, 0, 2, 3, 9)]
+    assert counts.total == 10
+
+
+small_counts = st.builds(
+    lambda seed, shape, rate: np.random.default_rng(seed).poisson(rate, size=shape),
+    st.integers(0, 999),
+    st.tuples(st.integers(1, 3), st.integers(1, 3), st.integers(1, 5), st.integers(1, 5)),
+    st.sampled_from([0.0, 0.2, 3.0]),
+)
+
+
+@given(dense=small_counts, shuffle=st.integers(0, 99))
+@settings(max_examples=100, deadline=None)
+def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
+    grid = unit_grid(*dense.shape)
+    from_dense = PhotonCounts.from_dense(dense, grid, cfa="GRBG")
+    where = np.random.default_rng(shuffle).permutation(np.argwhere(dense))
+    n = dense[tuple(where.T)]
+    # Photons of a pixel told one by one are the same counts.
+    single = np.repeat(where, n, axis=0)
+    for rows, photons in ((where, n), (single, np.ones(len(single), dtype=int))):
+        sparse = PhotonCounts.from_events(*rows.T, photons, grid, cfa="GRBG")
+        assert events_of(sparse) == events_of(from_dense)
+        assert sparse.total == from_dense.total == dense.sum()
+        for k, l in np.ndindex(grid.rows, grid.cols):
+            np.testing.assert_array_equal(sparse.view(k, l), dense[k, l])
+            np.testing.assert_array_equal(from_dense.view(k, l), dense[k, l])
+
+
+def test_no_events_is_a_valid_dark_exposure():
+    counts = PhotonCounts.from_events(*np.zeros((5, 0), dtype=int), unit_grid(2, 2, 3, 3))
+    assert counts.total == 0
+    assert counts.is_sparse
+    assert events_of(counts) == []
+    np.testing.assert_array_equal(counts.view(1, 1), np.zeros((3, 3)))
+
+
+@pytest.mark.parametrize("column", range(4))
+def test_an_index_outside_the_grid_is_refused_by_name(column):
+    grid = unit_grid(2, 3, 4, 5)
+    for bad in (grid.shape_KLHW[column], -1):
+        row = [0, 0, 0, 0, 1]
+        row[column] = bad
+        with pytest.raises(InputError, match=f"^{'klij'[column]}: "):
+            PhotonCounts.from_events(*np.array([row]).T, grid)
+
+
+@pytest.mark.parametrize("bad", [-1, 0.5, float("nan"), float("inf")])
+def test_a_count_that_is_no_whole_number_is_refused(bad):
+    grid = unit_grid(1, 1, 2, 2)
+    with pytest.raises(InputError, match=r"^n: photon counts must"):
+        PhotonCounts.from_events(*np.zeros((4, 1), dtype=int), np.array([bad]), grid)
+    dense = np.zeros((1, 1, 2, 2))
+    dense[0, 0, 1, 1] = bad
+    with pytest.raises(InputError, match=r"^counts: photon counts must"):
+        PhotonCounts.from_dense(dense, grid)
+
+
+@pytest.mark.parametrize("dtype", [np.complex128, np.str_, object])
+def test_counts_of_another_kind_are_refused(dtype):
+    with pytest.raises(InputError, match=r"^counts: photon counts must be whole numbers"):
+        PhotonCounts.from_dense(np.zeros((1, 1, 2, 2)).astype(dtype), unit_grid(1, 1, 2, 2))
+
+
+@pytest.mark.parametrize("dtype", [bool, np.uint8, np.uint16, np.int32, np.float32, np.float64])
+def test_whole_numbers_of_any_dtype_are_counts(dtype):
+    counts = PhotonCounts.from_dense(np.ones((1, 1, 2, 2), dtype=dtype), unit_grid(1, 1, 2, 2))
+    assert counts.total == 4
+    assert counts.events.n.dtype == np.int64
+
+
+def test_counts_of_the_other_byte_order_are_counts():
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 7, dtype=">u2"), grid)
+    assert reconstruct(counts, 1e9).counts[0, 0, 0, 0] == 28
+
+
+def test_a_narrow_dtype_does_not_wrap_in_the_total():
+    dense = np.full((3, 3, 4, 4), 255, dtype=np.uint8)
+    assert PhotonCounts.from_dense(dense, unit_grid(3, 3, 4, 4)).total == 255 * 144
+
+
+def test_a_dense_stack_of_another_shape_is_refused():
+    with pytest.raises(InputError, match=r"^counts: expected shape \(1, 1, 2, 2\)"):
+        PhotonCounts.from_dense(np.zeros((1, 1, 2, 3), dtype=int), unit_grid(1, 1, 2, 2))
+
+
+def test_event_lists_of_different_lengths_are_refused():
+    column = np.zeros(2, dtype=int)
+    with pytest.raises(InputError, match=r"same length"):
+        PhotonCounts.from_events(column, column, column, column, np.ones(1, dtype=int), unit_grid(1, 1, 1, 1))
+
+
+@pytest.mark.parametrize("bad", ["grbg", "XXXX"])
+def test_counts_with_a_bad_pattern_are_refused(bad):
+    with pytest.raises(InputError, match=r"^cfa: "):
+        PhotonCounts.from_dense(np.zeros((1, 1, 2, 2), dtype=int), unit_grid(1, 1, 2, 2), cfa=bad)
+
+
+def test_no_array_of_counts_can_be_written_to():
+    grid = unit_grid(1, 2, 2, 2)
+    dense = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    sparse = PhotonCounts.from_events(*np.ones((5, 1), dtype=int) * 0, grid)
+    columns = [getattr(c.events, name) for c in (dense, sparse) for name in "klijn"]
+    assert not any(a.flags.writeable for a in (dense.view(0, 0), *columns))
+
+
+def test_the_callers_array_stays_writable():
+    dense = np.zeros((1, 1, 2, 2), dtype=int)
+    PhotonCounts.from_dense(dense, unit_grid(1, 1, 2, 2))
+    dense[:] = 1
+    assert dense.flags.writeable
+
+
+@pytest.mark.parametrize("where", [(2, 0), (0, 3), (-1, 0)])
+def test_a_camera_that_is_not_there_has_no_view(where):
+    grid = unit_grid(2, 3, 4, 4)
+    dense = PhotonCounts.from_dense(np.ones((2, 3, 4, 4), dtype=np.int64), grid, cfa=None)
+    events = dense.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=None)
+    for counts in (dense, sparse):
+        with pytest.raises(InputError, match="no camera"):
+            counts.view(*where)
+
+
+def test_photons_are_drawn_fairly_and_always_alike() -> None:
+    grid, rng = unit_grid(7, 7, 32, 32), np.random.default_rng(6)
+    many = rng.poisson(rng.uniform(0, 4, 49)[:, None], (49, 1024)).reshape(grid.shape_KLHW)
+    counts = PhotonCounts.from_dense(many, grid, cfa="GRBG")
+    most = counts.total / 5
+    few = counts.subsample(most, np.random.default_rng(0))
+    assert (few.grid, few.cfa) == (grid, "GRBG")
+    assert abs(few.total - most) < 5 * np.sqrt(most)
+    kept = np.stack([few.view(k, l) for k in range(7) for l in range(7)]).reshape(many.shape)
+    assert (kept <= many).all()
+    # Views keep their shares: chi square of 48 degrees of freedom, 5 deviations of its mean of 48.
+    by_view, expected = kept.sum(axis=(2, 3)), many.sum(axis=(2, 3)) / 5
+    chi2 = ((by_view - expected) ** 2 / (0.8 * expected)).sum()
+    assert 48 - 5 * np.sqrt(96) < chi2 < 48 + 5 * np.sqrt(96)
+    again = PhotonCounts.from_events(*(getattr(few.events, name) for name in "klijn"), grid, cfa="GRBG")
+    for name in "klijn":
+        np.testing.assert_array_equal(getattr(few.events, name), getattr(again.events, name))
+        np.testing.assert_array_equal(
+            getattr(few.events, name), getattr(counts.subsample(most, np.random.default_rng(0)).events, name)
+        )
+    assert counts.subsample(counts.total, np.random.default_rng(0)) is counts
+
+
+# Totals
+
+
+MANY = 1 << 23
+MOST = np.int64(1 << 40)  # in one pixel; 2^23 of them are 2^63, one more than int64 holds
+
+
+def test_events_that_add_up_to_more_than_int64_holds_are_refused_by_name() -> None:
+    grid = unit_grid(1, 1, 1, 1)
+    zeros = np.zeros(MANY, dtype=np.uint8)
+    with pytest.raises(InputError, match=r"^n: 9223372036854775808 photons in all"):
+        PhotonCounts.from_events(zeros, zeros, zeros, zeros, np.full(MANY, MOST), grid)
+    just = np.full(MANY, MOST)
+    just[0] -= 1
+    assert PhotonCounts.from_events(zeros, zeros, zeros, zeros, just, grid).total == (1 << 63) - 1
+
+
+def test_a_dense_stack_of_more_than_int64_holds_is_refused_by_name() -> None:
+    grid = unit_grid(1, 1, 2048, 4096)
+    with pytest.raises(InputError, match=r"^counts: 9223372036854775808 photons in all"):
+        PhotonCounts.from_dense(np.full(grid.shape_KLHW, MOST), grid)

@@ -1,0 +1,220 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from twins import bayer_photons, blocky_texture, unit_grid
+
+import pcii.depth.depth_map
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap
+from pcii.core.geometry import total_disparity_px
+from pcii.core.photon_counts import PhotonCounts
+from pcii.depth.depth_map import estimate_depth
+from pcii.evidence.half_agreement import FALSE_RATE
+
+RANGE_MM = (1 / 9, 1 / 1)
+
+
+@pytest.fixture(scope="module")
+def depth(two_squares) -> DepthMap:
+    return estimate_depth(two_squares.counts, RANGE_MM)
+
+
+def spread_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
+    """Errors in px of total disparity over one square; infinite where the method abstains."""
+    z = depth.z_mm[scene.masks[plane]]
+    errors = np.abs(total_disparity_px(scene.grid, z) - total_disparity_px(scene.grid, scene.z_mm[plane]))
+    return np.where(np.isnan(errors), np.inf, errors)
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+def test_depths_of_the_squares_are_right(depth, two_squares, plane):
+    errors = spread_errors_px(depth, two_squares, plane)
+    # Planes are 2 px of spread apart, and the parabola between them finds a quarter of that; nine tenths
+    # are at the nearest plane or the next, the rest of the outline may be mixed with the dark.
+    assert np.median(errors) < 0.5
+    assert (errors < 2.0).mean() > 0.9
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+@pytest.mark.parametrize("beyond", [0.7, 1.0])
+def test_depths_between_planes_are_told_apart(two_squares, plane, beyond):
+    # Planes at 6.7, 8.7, ... px of spread, or 7, 9, ...: 0.7 or 1 px from the truth, 18 and 42 px.
+    shifted = (6 / (54 + beyond), 6 / (6 + beyond))
+    errors = spread_errors_px(estimate_depth(two_squares.counts, shifted), two_squares, plane)
+    # Shifts are whole pixels, so that planes up to 1 px from the truth may be the same section; their
+    # neighbours tell. Without the parabola it would be 0.7 or 1, with its sign reversed more.
+    assert np.median(errors) < 0.5
+
+
+@pytest.mark.parametrize("plane", [0, 1])
+def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
+    flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
+    errors = spread_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
+    assert np.median(errors) > 0.5
+
+
+def test_the_dark_has_no_depth(depth, two_squares):
+    # No photon of a plane in the range comes within the reach of the window (4 x 14 px) of this corner.
+    corner = (slice(0, 24), slice(-24, None))
+    assert np.isnan(depth.z_mm[corner]).all()
+    # Elsewhere a window that reaches a square may answer.
+    dark = ~(two_squares.masks[0] | two_squares.masks[1])
+    assert np.isnan(depth.z_mm[dark]).mean() > 0.8
+
+
+def test_confidence_is_zero_exactly_where_the_method_abstains(depth):
+    np.testing.assert_array_equal(np.isnan(depth.z_mm), depth.confidence == 0)
+    assert depth.confidence.min() == 0
+    # A share of a sum: one rounding above 1 at most.
+    assert 0.5 <= depth.confidence[depth.confidence > 0].min() <= depth.confidence.max() <= 1 + 1e-12
+
+
+def test_what_is_less_certain_than_asked_for_is_not_answered(monkeypatch):
+    grid = unit_grid(7, 7, 96, 96)
+    sparse = np.random.default_rng(0).poisson(0.004, size=grid.shape_KLHW)  # few photons, no texture
+    counts = PhotonCounts.from_dense(sparse, grid, cfa="GRBG")
+    monkeypatch.setattr(pcii.depth.depth_map, "SIGNIFICANT_NATS", -np.inf)  # either would refuse all of it
+    monkeypatch.setattr(pcii.depth.depth_map, "least_agreement", lambda planes: -np.inf)
+    answered = []
+    for least in (pcii.depth.depth_map.LEAST_CONFIDENCE, 0.95):
+        monkeypatch.setattr(pcii.depth.depth_map, "LEAST_CONFIDENCE", least)
+        confidence = estimate_depth(counts, RANGE_MM).confidence
+        assert confidence[confidence > 0].min() >= least >= 0.5
+        answered.append((confidence > 0).sum())
+    assert answered[1] < answered[0]
+
+
+def flat_share(rate: float, films: int) -> float:
+    """Share of flat films for which a depth is answered."""
+    grid = unit_grid(7, 7, 96, 96)
+    answered = []
+    for seed in range(films):
+        flat = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
+        depth = estimate_depth(PhotonCounts.from_dense(flat, grid, cfa="GRBG"), RANGE_MM)
+        answered.append(np.isfinite(depth.z_mm).mean())
+    return float(np.mean(answered))
+
+
+# From 0.2 to 50 photons in each pixel of a section.
+@pytest.mark.parametrize("rate", [0.004, 0.02, 0.1, 1.0])
+def test_a_flat_film_has_no_depth(rate):
+    assert flat_share(rate, films=4) <= FALSE_RATE
+
+
+def test_a_flat_film_is_refused_for_want_of_evidence(monkeypatch):
+    # The fault: noise taken for texture.
+    monkeypatch.setattr(pcii.depth.depth_map, "SIGNIFICANT_NATS", -np.inf)
+    monkeypatch.setattr(pcii.depth.depth_map, "least_agreement", lambda planes: -np.inf)
+    assert flat_share(0.1, films=1) > 1 / 2
+
+
+def slanted_card(grid: CameraGrid, near: float, far: float, seed: int) -> PhotonCounts:
+    """A textured card over the whole frame, of the disparity `far` at its left and `near` at its right."""
+    rng = np.random.default_rng(seed)
+    texture = blocky_texture(rng, 2 * grid.height, 2 * grid.width)
+    K, L, H, W = grid.shape_KLHW
+    slope = (near - far) / (W - 1)
+    rates = np.zeros((*grid.shape_KLHW, 3))
+    for k in range(K):
+        for l in range(L):
+            down, right = k - (K - 1) / 2, l - (L - 1) / 2
+            # Column x of the virtual centre, of the disparity far + slope x, is seen at x - right disparity.
+            x = (np.arange(W) + right * far) / (1 - right * slope)
+            y = np.arange(H)[:, None] + down * (far + slope * x)
+            i = np.round(y + H / 2).astype(int)
+            j = np.broadcast_to(np.round(x + W / 2).astype(int), i.shape)
+            rates[k, l] = texture[i, j]
+    return PhotonCounts.from_dense(bayer_photons(0.1 * rates, "GRBG", seed), grid, cfa="GRBG")
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_depth_of_a_slanted_card_is_monotone(turned):
+    grid = unit_grid(7, 7, 128, 160)
+    counts = slanted_card(grid, near=6.0, far=3.0, seed=0)
+    if turned:  # nearer at its left: views mirrored, cameras in the other order
+        counts = PhotonCounts.from_dense(counts.dense[:, ::-1, :, ::-1], grid, cfa="RGGB")
+    z = estimate_depth(counts, (1 / 8, 1 / 2)).z_mm[20:-20]
+    if turned:
+        z = z[:, ::-1]
+    middle = np.arange(24, 136, 16)
+    found = np.array([np.nanmedian(6 / z[:, x - 8 : x + 8]) for x in middle])
+    true = 6 * (3.0 + 3.0 * middle / 159)
+    assert np.all(np.diff(found) > 0)
+    # Bands of 16 px span 1.8 px of spread, planes 2: half of that.
+    np.testing.assert_allclose(found, true, atol=1.0)
+    assert np.isfinite(z[:, 16:-16]).mean() > 0.9
+
+
+def test_depths_stay_in_the_range(depth):
+    answered = depth.z_mm[~np.isnan(depth.z_mm)]
+    assert RANGE_MM[0] <= answered.min() <= answered.max() <= RANGE_MM[1]
+
+
+def test_a_range_without_the_object_still_answers_inside_the_range(two_squares):
+    near, far = 1 / 9, 1 / 5  # the first square is at 1 / 3
+    z = estimate_depth(two_squares.counts, (near, far)).z_mm
+    assert near <= np.nanmin(z) <= np.nanmax(z) <= far
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (33, 18)])
+def test_no_photons_have_no_depth(cfa, size):
+    grid = unit_grid(2, 3, *size)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
+    depth = estimate_depth(dark, (0.2, 1.0))
+    assert depth.z_mm.shape == size
+    assert np.isnan(depth.z_mm).all()
+    assert not depth.confidence.any()
+
+
+@pytest.mark.parametrize("event", [(1, 1, 30, 30), (0, 2, 30, 30), (0, 0, 0, 0)])
+def test_one_photon_has_no_depth(event):
+    grid = unit_grid(3, 3, 64, 64)
+    one = PhotonCounts.from_events(*np.array([[*event, 1]]).T, grid, cfa="GRBG")
+    assert np.isnan(estimate_depth(one, (0.2, 1.0)).z_mm).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 2), (16, 17)])
+def test_saturated_counts_have_an_answer(size):
+    grid = unit_grid(3, 2, *size)
+    bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 10**9), grid, cfa="GRBG")
+    depth = estimate_depth(bright, (0.2, 1.0))
+    assert np.isfinite(depth.confidence).all()
+
+
+BAD_RANGES: list[Any] = [
+    (0, 1),
+    (-1, 1),
+    (2.0, 1.0),
+    (1.0, 1.0),
+    (float("nan"), 1),
+    (1, float("inf")),
+    (1.0,),
+    (1.0, 2.0, 3.0),
+    (),
+    ("near", "far"),
+]
+
+
+@pytest.mark.parametrize("bad", BAD_RANGES)
+def test_a_range_that_is_not_near_to_far_is_refused(bad):
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    with pytest.raises(InputError, match=r"^z_(range_)?mm: ") as caught:
+        estimate_depth(counts, bad)
+    assert "\n" not in str(caught.value)
+
+
+def test_one_view_is_refused():
+    grid = unit_grid(1, 1, 8, 8)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    with pytest.raises(InputError, match=r"^counts: one view has no depth"):
+        estimate_depth(counts, (1.0, 2.0))
+
+
+def test_a_range_without_end_is_refused():
+    counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
+    with pytest.raises(InputError, match="choose a farther near end"):
+        estimate_depth(counts, (1e-6, 1.0))

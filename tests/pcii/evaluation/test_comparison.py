@@ -1,0 +1,397 @@
+"""Evaluations of made-up methods, every figure by hand; killed, shared, and refused."""
+
+import json
+import re
+import shutil
+import time
+from importlib import import_module
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numba as nb
+import numpy as np
+import pytest
+from tiny_datasets import NESTED, OWN, as_told, two_rows, write_dataset
+
+from pcii.app import commands as cli
+from pcii.core import console
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap
+from pcii.evaluation.comparison import evaluate, find_datasets
+from pcii.evaluation.rows import ROWS, all_rows, append_row, claim_rows
+from pcii.evaluation.summary import summarise
+from pcii.evaluation.tables import markdown, overview, told
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
+from pcii.removal.methods import METHODS
+
+HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
+FAKES = ("as told", "two rows")
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Makes the fake methods known; every call of one is noted."""
+    noted: list[str] = []
+    for method in (as_told, two_rows):
+        name = method.__name__.replace("_", " ")
+
+        def noting(counts: Any, z_mm: Any, name: str = name, method: Any = method) -> Any:
+            noted.append(name)
+            return method(counts, z_mm)
+
+        monkeypatch.setitem(METHODS, name, noting)
+    return noted
+
+
+@pytest.fixture
+def series(tmp_path: Path) -> Path:
+    for seed, (own, nested) in HITS.items():
+        write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {NESTED: nested, OWN: own})
+    return tmp_path / "data"
+
+
+def result_of(evaluation: dict[str, Any], budget: float, method: str) -> dict[str, Any]:
+    rows = evaluation["groups"][0]["results"]
+    return next(row for row in rows if (row["budget"], row["method"]) == (budget, method))
+
+
+def rows_of(out: Path) -> list[dict[str, Any]]:
+    with all_rows(out) as rows:
+        return rows
+
+
+def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    evaluation = evaluate([series], tmp_path / "out", methods=FAKES)
+    assert evaluation["missing"] == 0
+    (group,) = evaluation["groups"]
+    assert (group["title"], group["scene"], group["datasets"]) == ("by hand", "by hand", 3)
+    assert json.loads((tmp_path / "out" / "evaluation.json").read_text()) == evaluation
+    told = result_of(evaluation, OWN, "as told")
+    near, far = told["planes"]
+    # 0.6, 0.8, 0.7 of the near object: mean 0.7, half width 4.302653 * 0.1 / sqrt(3) = 0.248414.
+    assert near["z_mm"] == 1.0
+    assert near["object"]["iou"]["n"] == told["seeds"] == 3
+    assert near["object"]["iou"]["mean"] == pytest.approx(0.7)
+    assert near["object"]["iou"]["interval"] == pytest.approx([0.451586, 0.948414], abs=1e-6)
+    assert near["object"]["precision"] == {"n": 3, "mean": 1.0, "interval": [1.0, 1.0]}
+    assert near["object"]["photon_recall"] is None  # these photons have no known origin
+    assert far["object"]["iou"]["mean"] == 1.0
+    # Over both planes 0.8, 0.9, 0.85; the points of each object are in focus at its plane alone.
+    assert told["object"]["iou"]["mean"] == pytest.approx(0.85)
+    assert told["object"]["iou"]["interval"] == pytest.approx([0.725793, 0.974207], abs=1e-6)
+    assert told["pixel"]["iou"] == told["object"]["iou"]
+    # Of 24 pixels the near object is 10, the far one 0, in every dataset.
+    rows = result_of(evaluation, OWN, "two rows")
+    assert rows["object"]["iou"]["mean"] == pytest.approx(10 / 24 / 2)
+    assert rows["planes"][1]["object"]["iou"]["mean"] == 0.0
+    assert rows["object"]["claimed_share"] == {"n": 3, "mean": 0.25, "interval": [0.25, 0.25]}
+    # Each object is flat and at its plane, so who knows the depths makes no mistake.
+    assert rows["pixel"]["iou_oracle"]["mean"] == 1.0
+    # 96 photons in the last view and 20 + 6, 8, 7 in the first, of four views.
+    assert told["photons_per_view"] == pytest.approx((96 + 20 + 7) / 4)
+
+
+def test_methods_are_compared_on_the_same_datasets(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    (group,) = evaluate([series], tmp_path / "out", methods=FAKES)["groups"]
+    nested, own = group["paired"]
+    assert (nested["budget"], own["budget"]) == (NESTED, OWN)
+    assert own["methods"] == ["as told", "two rows"]
+    assert own["difference"]["mean"] == pytest.approx(0.85 - 10 / 48)
+    assert own["p"] == 2 / 8
+    assert own["exact"]
+    # Three equal differences have an interval without width.
+    assert nested["difference"]["interval"] == pytest.approx([1 - 10 / 48] * 2)
+
+
+def test_more_photons_that_make_it_worse_are_told(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    (group,) = evaluate([series], tmp_path / "out", methods=FAKES)["groups"]
+    # From 1 to 0.8, 0.9, 0.85: -0.15, half width 4.302653 * 0.05 / sqrt(3) = 0.124207. "two rows" stays.
+    (fall,) = group["monotonic"]
+    assert (fall["method"], fall["from"], fall["to"]) == ("as told", NESTED, OWN)
+    assert fall["difference"]["mean"] == pytest.approx(-0.15)
+    assert fall["difference"]["interval"] == pytest.approx([-0.274207, -0.025793], abs=1e-6)
+
+
+def test_a_fall_that_the_interval_explains_is_not_told(tmp_path: Path, calls: list[str]) -> None:
+    for seed, hits in ((1, 5), (2, 9)):  # -0.25 and -0.05: half width 12.7 * 0.1
+        write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {NESTED: 10, OWN: hits})
+    (group,) = evaluate([tmp_path / "data"], tmp_path / "out", methods=FAKES)["groups"]
+    assert group["monotonic"] == []
+
+
+def test_one_dataset_has_no_intervals(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    evaluation = evaluate([series / "seed_3"], tmp_path / "out", methods=FAKES, budgets=[OWN])
+    row = result_of(evaluation, OWN, "as told")
+    assert row["object"]["iou"] == {"n": 1, "mean": pytest.approx(0.8), "interval": None}
+    assert row["seconds"]["interval"] is None
+    assert evaluation["groups"][0]["paired"][0]["p"] == 1.0
+    assert "0.800 |" in (tmp_path / "out" / "evaluation.md").read_text()
+
+
+def test_scenes_stay_apart(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
+    groups = evaluate([series, other], tmp_path / "out", methods=FAKES)["groups"]
+    assert [(group["title"], group["datasets"]) for group in groups] == [("another", 1), ("by hand", 3)]
+
+
+def change_recipe(dataset: Path, **settings: Any) -> None:
+    manifest = read_manifest(dataset)
+    manifest["recipe"] |= settings
+    manifest["identity"] += str(settings)
+    write_manifest(dataset, manifest)
+
+
+def test_groups_of_one_title_are_told_by_what_differs(tmp_path: Path, calls: list[str]) -> None:
+    data = [write_dataset(tmp_path / f"data {number}", 1, {OWN: 2 + number}) for number in range(4)]
+    change_recipe(data[1], scene="another", grid={"rows": 4}, exposure=None)
+    change_recipe(data[2], scene="another", grid={"rows": 6}, exposure={"time_s": 1.0})
+    change_recipe(data[3], title="of its own")  # which `title` of the manifest does not tell
+    other = write_dataset(tmp_path / "other", 1, {OWN: 9}, title="other")
+    evaluation = evaluate([*data, other], tmp_path / "out", methods=["as told"])
+    table = overview(evaluation["groups"])
+    cells = {row[0]: row[2] for row in table.rows}
+    assert len(table.rows) == len(cells) == 5
+    assert cells["by hand (scene=another, grid.rows=6)"] == "0.700"
+    assert cells["by hand (scene=another, grid.rows=4)"] == "0.650"
+    assert cells["other"] == "0.950"
+    # These two have the same settings, and are told by their recipes' hashes.
+    left = {row["label"]: row["recipe"][:8] for row in evaluation["groups"] if row["scene"] == "by hand"}
+    assert list(left) == [f"by hand (scene=by hand, recipe {recipe})" for recipe in left.values()]
+    page = (tmp_path / "out" / "evaluation.html").read_text()
+    assert "<h2>by hand (scene=another, grid.rows=6)</h2>" in page
+    assert "## by hand (scene=another, grid.rows=6)\n" in (tmp_path / "out" / "evaluation.md").read_text()
+
+
+def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop = nb.njit(lambda n: n + 1)
+    seconds: list[float] = []
+
+    def late(counts: Any, z_mm: Any) -> Any:
+        start = time.perf_counter()
+        if counts.total != first_total:  # of the first dataset: the others take another path
+            loop(counts.total)
+        found = as_told(counts, z_mm)
+        seconds.append(time.perf_counter() - start)
+        return found
+
+    monkeypatch.setitem(METHODS, "late", late)
+    first_total = open_dataset(series / "seed_3").counts.total
+    evaluation = evaluate([series], tmp_path / "out", methods=["late"], budgets=[OWN])
+    assert len(seconds) == 5  # three, the warm-up and the one that compiled
+    assert max(row["seconds"] for row in rows_of(tmp_path / "out")) < max(seconds) / 2
+    interval = result_of(evaluation, OWN, "late")["seconds"]["interval"]
+    assert interval[0] > 0
+
+
+def entropies(seed: int, ball: tuple[float, float], bird: tuple[float, float]) -> dict[str, Any]:
+    planes = [{"z_mm": z, "object": name, "truth": "object", "iou": 0.5} for z, name in OWNERS.items()]
+    objects = [
+        {"name": name, "entropy": dict(zip(("540", "620"), bits, strict=True))}
+        for name, bits in (("ball", ball), ("bird", bird))
+    ]
+    head = {"dataset": f"seed_{seed}", "identity": str(seed), "recipe": "r", "title": "t", "scene": "s"}
+    return head | {
+        "seed": seed,
+        "budget": 1000.0,
+        "method": "three-step",
+        "photons_per_view": 1.0,
+        "seconds": 1.0,
+        "planes": planes,
+        "objects": objects,
+    }
+
+
+OWNERS = {540.0: "ball", 620.0: "bird"}
+
+
+def test_table_1_is_counted_over_seeds() -> None:
+    rows = [
+        entropies(1, (1.0, 1.5), (1.25, 1.0)),
+        entropies(2, (1.0, 1.25), (1.0, 1.25)),
+        entropies(3, (1.0, 1.75), (1.5, 1.0)),
+    ]
+    ball, bird = summarise(rows)["groups"][0]["table1"]
+    assert ball == {
+        "budget": 1000.0,
+        "object": "ball",
+        "own_z_mm": 540.0,
+        "seeds": 3,
+        "lowest_at_own": 3,
+        "smallest_gap_bits": 0.25,
+        "mean_gap_bits": 0.5,
+    }
+    assert (bird["own_z_mm"], bird["lowest_at_own"], bird["smallest_gap_bits"]) == (620.0, 2, -0.25)
+    assert bird["mean_gap_bits"] == pytest.approx(0.5 / 3)
+
+
+def test_a_depth_map_without_answers_is_told_as_such(
+    series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = DepthMap(np.full((8, 12), np.nan), np.zeros((8, 12)))
+    monkeypatch.setattr(import_module("pcii.evaluation.comparison"), "estimate_depth", lambda *_: nothing)
+    evaluation = evaluate([series], tmp_path / "out", methods=["depth"])
+    row = result_of(evaluation, OWN, "depth")
+    assert row["depth"]["coverage"] == {"n": 3, "mean": 0.0, "interval": [0.0, 0.0]}
+    assert row["depth"]["mae_mm"] is None
+    assert row["depth"]["bad_1px"]["mean"] == 1.0
+    assert "### Depth" in (tmp_path / "out" / "evaluation.md").read_text()
+
+
+def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    evaluate([series], tmp_path / "out", methods=["as told"])
+    assert len(calls) == 3 * 2 + 2  # a row for each dataset and budget, and one call that warms up by budget
+    first = rows_of(tmp_path / "out")
+    evaluate([series, series / "seed_3"], tmp_path / "out", methods=["as told"])
+    assert len(calls) == 8
+    evaluate([series], tmp_path / "out", methods=FAKES)
+    assert set(calls[8:]) == {"two rows"}
+    assert rows_of(tmp_path / "out")[:6] == first
+
+
+@pytest.mark.parametrize("left", [1, 30, -1])
+def test_a_killed_evaluation_goes_on_where_it_was(
+    series: Path, tmp_path: Path, calls: list[str], left: int
+) -> None:
+    whole = evaluate([series], tmp_path / "whole", methods=FAKES)
+    out = tmp_path / "killed"
+    shutil.copytree(tmp_path / "whole", out)
+    *lines, last, _ = (out / ROWS).read_bytes().split(b"\n")
+    (out / ROWS).write_bytes(b"\n".join(lines) + b"\n" + last[:left])  # killed in the middle of a line
+    calls.clear()
+    again = evaluate([series], out, methods=FAKES)
+    assert len(calls) == 2  # the torn row, and its warm-up
+    assert without_seconds(again) == without_seconds(whole)
+    assert len((out / ROWS).read_bytes().splitlines()) == len(lines) + 1
+
+
+def without_seconds(evaluation: dict[str, Any]) -> dict[str, Any]:
+    copy = json.loads(json.dumps(evaluation))
+    for group in copy["groups"]:
+        for row in group["results"]:
+            del row["seconds"]
+    return copy
+
+
+def test_parts_share_the_work(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    out = tmp_path / "out"
+    first = evaluate([series], out, methods=["as told"], part=(1, 2))
+    assert {row["seed"] for row in rows_of(out)} == {3, 5}
+    assert first["missing"] == 2
+    assert "2 rows are still to be measured" in (out / "evaluation.md").read_text()
+    second = evaluate([series], out, methods=["as told"], part=(2, 2))
+    assert len(rows_of(out)) == 6
+    assert without_seconds(second) == without_seconds(
+        evaluate([series], tmp_path / "one", methods=["as told"])
+    )
+
+
+def test_many_writers_leave_whole_lines(tmp_path: Path) -> None:
+    claim_rows(tmp_path / "out")
+
+    def write(writer: int) -> None:
+        for number in range(40):
+            append_row(
+                tmp_path / "out", {"identity": f"{writer}-{number}" * 50, "budget": 1.0, "method": "m"}
+            )
+
+    threads = [Thread(target=write, args=(writer,)) for writer in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(rows_of(tmp_path / "out")) == 160
+
+
+def test_a_damaged_line_is_named(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    evaluate([series], tmp_path / "out", methods=FAKES)
+    rows = tmp_path / "out" / ROWS
+    lines = rows.read_text().splitlines()
+    lines[4] = lines[4][:20]
+    rows.write_text("\n".join(lines) + "\n")
+    with pytest.raises(InputError, match="line 5 is damaged"):
+        evaluate([series], tmp_path / "out", methods=FAKES)
+
+
+def test_datasets_are_found_in_the_order_of_their_seeds(tmp_path: Path) -> None:
+    for seed in (2, 10, 9):
+        write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {OWN: 5})
+    (tmp_path / "data" / "notes").mkdir()
+    assert [path.name for path in find_datasets([tmp_path / "data"])] == ["seed_2", "seed_9", "seed_10"]
+
+
+def test_an_unfinished_dataset_is_not_passed_over(series: Path, tmp_path: Path) -> None:
+    (series / "seed_4" / MANIFEST).unlink()
+    with pytest.raises(InputError, match=r"seed_4: not a finished dataset"):
+        evaluate([series], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_cannot_be_evaluated_is_refused_before_any_work(
+    series: Path, tmp_path: Path, calls: list[str]
+) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match="no method named 'guess'"):
+        evaluate([series], out, methods=["guess"])
+    with pytest.raises(InputError, match="no photons of budget 7"):
+        evaluate([series], out, methods=FAKES, budgets=[7])
+    for part in ((0, 2), (3, 2), (1, 0)):
+        with pytest.raises(InputError, match="part: expected"):
+            evaluate([series], out, part=part)
+    with pytest.raises(InputError, match="no such dataset folder"):
+        evaluate([tmp_path / "nowhere"], out)
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="neither a finished dataset nor"):
+        evaluate([tmp_path / "empty"], out)
+    with pytest.raises(InputError, match="at least one"):
+        evaluate([], out)
+    with pytest.raises(InputError, match="holds something else"):
+        evaluate([series], series, methods=FAKES)
+    manifest = read_manifest(series / "seed_3")
+    manifest["files"] = {name: e for name, e in manifest["files"].items() if not name.startswith(TRUTH)}
+    write_manifest(series / "seed_3", manifest)
+    with pytest.raises(InputError, match="has no truth"):
+        evaluate([series], out, methods=FAKES)
+    assert calls == []
+    assert not out.exists()
+
+
+def test_the_command_and_its_page(
+    series: Path, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    command = ["evaluate", str(series), "-o", str(out), "--method", "as told", "--method", "two rows"]
+    assert console.run(cli.app, command) == 0
+    assert "evaluation.html" in capsys.readouterr().out
+    page = (out / "evaluation.html").read_text()
+    assert page.count("data:image/png;base64,") == 1
+    assert "<script" not in page
+    assert "://" not in page
+    assert str(tmp_path) not in page
+    assert "0.850 (0.726 to 0.974)" in page
+    assert "IoU of as told is worse with 50 photons than with 20" in page
+    assert len(rows_of(out)) == 12
+    other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
+    assert console.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
+    assert len(rows_of(out)) == 14
+    assert console.run(cli.app, [*command, "--part", "1:2"]) == 2
+    assert "expected i/n such as 1/2" in capsys.readouterr().err
+
+
+def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    piped = write_dataset(tmp_path / "piped", 1, {OWN: 5}, title="ball | bird")
+    evaluation = evaluate([series, piped], tmp_path / "out", methods=FAKES)
+    lines = markdown(overview(evaluation["groups"])).splitlines()
+    assert len({len(re.findall(r"(?<!\\)\|", line)) for line in lines}) == 1
+    assert lines[0] == "| scene | method | 20 | 50 |"
+    # The scene with one dataset and one budget.
+    assert r"| ball \| bird | as told | – | 0.750 |" in lines
+
+
+def test_means_are_told_with_their_interval() -> None:
+    assert told(None) == "–"
+    assert told({"mean": 0.5, "interval": None}) == "0.500"
+    assert told({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"

@@ -1,0 +1,202 @@
+"""Names of strangers in pages and tables: shown as text, never carried out."""
+
+import html
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hostile_names import DO, NAMES, RAN
+from jinja2 import UndefinedError
+from tiny_datasets import NESTED, OWN, two_rows, write_dataset
+
+from pcii.app.pipeline import Outcome, analyse
+from pcii.app.report import write_report
+from pcii.core.estimates import Segmented
+from pcii.core.plain_text import in_markdown, visible
+from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.evaluation_pages import write_evaluation
+from pcii.evaluation.pages import page
+from pcii.evaluation.plots import accuracy_plots
+from pcii.evaluation.summary import summarise
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import read_manifest, write_manifest
+from pcii.removal.methods import METHODS
+
+FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
+ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}
+ELEMENTS |= {"div", "table", "tr", "th", "td", "figure", "img", "figcaption"}
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+
+
+class Read(HTMLParser):
+    """Elements with their attributes, and the text between tags, of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.texts: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.texts.append(data)
+
+
+def named(name: str) -> Any:
+    """`two_rows` under another name."""
+
+    def method(counts: Any, z_mm: Any) -> Segmented:
+        found = two_rows(counts, z_mm)
+        return Segmented(found.z_mm, found.in_focus, name, found.sections)
+
+    return method
+
+
+@pytest.fixture(scope="module")
+def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+    """Results of a dataset whose objects, title and folder have such names, by such methods."""
+    root = write_dataset(tmp_path_factory.mktemp("data") / FOLDER, 1, {OWN: 5}, title=NAMES[0])
+    manifest = read_manifest(root)
+    manifest["objects"] = {str(number): name for number, name in enumerate(NAMES, start=1)}
+    write_manifest(root, manifest)
+    dataset = open_dataset(root)
+    with pytest.MonkeyPatch.context() as patch:
+        for name in NAMES:
+            patch.setitem(METHODS, name, named(name))
+        return analyse(dataset, None, methods=NAMES)
+
+
+@pytest.fixture(scope="module")
+def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The report, and the evaluation of groups, objects, methods and datasets of such names."""
+    out = tmp_path_factory.mktemp("pages")
+    write_report(out / "report.html", outcome)
+    evaluation = summarise([row for name in NAMES for row in rows_of(name)])
+    drawn = accuracy_plots(evaluation["groups"][0], NAMES[-2:])  # for all: a plot takes half a second
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("pcii.evaluation.evaluation_pages.accuracy_plots", lambda *_: drawn)
+        write_evaluation(out, evaluation)
+    files = ("report.html", "evaluation.html", "evaluation.md")
+    return {name: (out / name).read_bytes().decode() for name in files}
+
+
+def rows_of(name: str) -> list[dict[str, Any]]:
+    """Two groups that share this title; more photons are worse."""
+    head = {"dataset": name, "title": name, "photons_per_view": 1.0, "seconds": 1.0}
+    entropy = [{"name": name, "entropy": {"1": 0.5, "2": 1.0}}]
+    return [
+        head
+        | {"recipe": f"{scene}{name}", "scene": scene, "settings": {"scene": scene, "x": 1}}
+        | {"identity": f"{scene}{seed}{name}", "seed": seed, "budget": budget, "method": method}
+        | {"planes": [{"z_mm": 1.0, "object": name, "truth": "object", "iou": iou}], "objects": entropy}
+        for scene in (name, "other")
+        for seed in (1, 2)
+        for method in (name, "three-step")
+        for budget, iou in ((NESTED, 0.9), (OWN, 0.5))
+    ]
+
+
+@pytest.mark.parametrize("which", ["report.html", "evaluation.html"])
+def test_a_page_has_nothing_but_its_own_elements(pages: dict[str, str], which: str) -> None:
+    read = Read(pages[which])
+    assert {tag for tag, _ in read.elements} <= ELEMENTS
+    for tag, attributes in read.elements:
+        for name, value in attributes.items():
+            assert not name.startswith("on"), tag
+            assert name not in ("href", "srcdoc", "action"), tag
+            if name == "src":
+                assert (tag, str(value)[:22]) == ("img", "data:image/png;base64,")
+    sent = [attributes for tag, attributes in read.elements if tag == "meta" and "http-equiv" in attributes]
+    assert sent == [{"http-equiv": "Content-Security-Policy", "content": POLICY}]
+    assert pages[which].index("Content-Security-Policy") < pages[which].index("<title>")
+
+
+def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Outcome) -> None:
+    texts = Read(pages["report.html"]).texts
+    assert texts.count(visible(NAMES[0])) > 4  # title, heading, object and method
+    for name in NAMES:
+        assert visible(name) in texts  # its object's row, and its method's rows
+    assert any(text.startswith(visible(FOLDER)) for text in texts)
+    assert outcome.dataset.name == FOLDER
+
+
+def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None:
+    texts = Read(pages["evaluation.html"]).texts
+    for name in NAMES:
+        told = visible(name)
+        assert told in texts  # method, object
+        for scene in (told, "other"):
+            assert texts.count(f"{told} (scene={scene})") == 1 + 2  # heading, and by method in the overview
+        assert f"IoU of {told} is worse with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_a_title_of_each_kind_stays_in_its_place(name: str) -> None:
+    group = {"label": name, "datasets": 1, "recipe": name, "plot": "", "tables": [], "falls": [name]}
+    overview = {"rows": [], "title": ""}
+    content = {"version": name, "notes": [name], "overview": overview, "groups": [group]}
+    read = Read(page("evaluation.html.j2", content).decode())
+    assert {tag for tag, _ in read.elements} <= ELEMENTS
+    assert read.texts.count(visible(name)) == 4  # the note, the heading, the recipe and the sentence
+
+
+def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) -> None:
+    text = pages["evaluation.md"]
+    assert "<" not in text
+    assert ">" not in text
+    assert not re.search(r"(?<!\\)\]\(", text)
+    assert not re.search(r"(?<!\\)`", text)
+    widths = [len(re.findall(r"(?<!\\)(?:\\\\)*\|", line)) for line in text.splitlines()]
+    for line, above, width in zip(text.splitlines()[1:], widths, widths[1:], strict=False):
+        if width and above:
+            assert width == above, line
+    for name in NAMES:
+        assert in_markdown(name) in text
+        # As Markdown reads it: a backslash before punctuation goes, and entities are what they stand for.
+        read = html.unescape(re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", in_markdown(name)))
+        assert read == visible(name)
+    lines = [line for line in text.splitlines() if line]
+    assert all(re.match(r"\||#+ |IoU of |Figures |p: ", line) for line in lines)
+
+
+def test_what_a_page_lacks_is_no_empty_place() -> None:
+    with pytest.raises(UndefinedError, match="notes"):
+        page("evaluation.html.j2", {})
+
+
+def test_names_of_files_that_are_no_characters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(METHODS, "two rows", two_rows)
+    data = write_dataset(tmp_path / "data \udcff", 1, {OWN: 5}, title="half \ud800")
+    (group,) = evaluate([data], tmp_path / "out", methods=["two rows"])["groups"]
+    assert (group["datasets"], group["title"]) == (1, "half \ud800")
+    assert evaluate([data], tmp_path / "out", methods=["two rows"])["groups"] == [group]
+
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def root_element(file: Path) -> str:
+    """The root of the page's document after a browser has opened it, for two seconds of its own time."""
+    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=2000"]
+    command += [f"--user-data-dir={file.parent / 'profile'}", "--dump-dom", file.as_uri()]
+    found = subprocess.run(command, capture_output=True, timeout=120, check=False).stdout
+    return re.search(rb"<html[^>]*>", found)[0].decode() if found else ""  # type: ignore[index]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+def test_a_browser_carries_nothing_out(pages: dict[str, str], tmp_path: Path) -> None:
+    torn = "<!doctype html><html><body>{}</body></html>"
+    (tmp_path / "torn.html").write_text(torn.format("".join(NAMES[5:7])))
+    if RAN not in root_element(tmp_path / "torn.html"):
+        pytest.skip("this browser does not open pages here")
+    for which in ("report.html", "evaluation.html"):
+        for policy in (POLICY, ""):  # escaping must do without the policy, which older readers ignore
+            (tmp_path / which).write_text(pages[which].replace(POLICY, policy))
+            assert root_element(tmp_path / which) == '<html lang="en">'

@@ -1,0 +1,123 @@
+import numpy as np
+import pytest
+from twins import bayer_photons, blocky_texture, patch_views, unit_grid
+
+from pcii.core.bayer import colour_cells
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.geometry import total_disparity_px
+from pcii.core.photon_counts import PhotonCounts
+from pcii.evidence.cells import CELL_PX
+from pcii.evidence.half_agreement import BLOCKS_CELLS, FALSE_RATE, Halves, halves_of, least_agreement
+
+DISPARITIES_PX = (1, 2, 3, 4, 5, 6)
+
+
+def at(halves: Halves, plane: int, shape: tuple[int, int]) -> np.ndarray:
+    return halves.agreement(np.full(shape, plane), np.ones(shape, dtype=bool))
+
+
+def spreads_of(grid: CameraGrid) -> np.ndarray:
+    return np.array([float(total_disparity_px(grid, 1 / d)) for d in DISPARITIES_PX])
+
+
+def test_a_surface_is_agreed_on_where_it_is():
+    grid, rng = unit_grid(5, 7, 128, 160), np.random.default_rng(0)
+    rates = patch_views(0.05 * blocky_texture(rng, 64, 64), 32, 48, 3, grid)
+    counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=0), grid, cfa="GRBG")
+    halves = halves_of(counts, spreads_of(grid))
+    least = least_agreement(halves.planes)
+    own = at(halves, DISPARITIES_PX.index(3), (32, 40))
+    assert own[10:22, 14:26].min() > least
+    assert halves.agreement_over(slice(8, 24), slice(12, 28), np.ones((16, 16), dtype=bool)) > least
+
+
+def test_what_one_camera_alone_shows_is_not_agreed_on():
+    # A texture in full light in one view and noise in the others.
+    grid, rng = unit_grid(3, 3, 96, 96), np.random.default_rng(1)
+    film = rng.poisson(0.5, grid.shape_KLHW)
+    film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+    least = least_agreement(len(DISPARITIES_PX))
+    assert max(at(halves, plane, (24, 24)).max() for plane in range(6)) < least
+    assert halves.agreement_over(slice(0, 24), slice(0, 24), np.ones((24, 24), dtype=bool)) < least
+
+
+@pytest.mark.parametrize("rate", [0.003, 0.1, 1.0, 1e4])
+@pytest.mark.parametrize("views", [(2, 1), (3, 4)])
+def test_noise_agrees_as_seldom_as_is_said(rate, views):
+    grid = unit_grid(*views, 64, 80)
+    above = []
+    for seed in range(20):
+        film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
+        halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+        largest = np.max([at(halves, plane, (16, 20)) for plane in range(6)], axis=0)
+        above.append((largest > least_agreement(6)).mean())
+    assert np.mean(above) <= FALSE_RATE
+
+
+def test_halves_that_are_the_same_agree_on_noise():
+    # The planted fault: of each camera of one half there is a copy in the other.
+    grid = unit_grid(2, 1, 64, 80)
+    film = np.repeat(np.random.default_rng(0).poisson(1.0, (1, 1, 64, 80)), 2, axis=0)
+    film[1, 0, :-1] = film[1, 0, 1:]  # at the disparity 1
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+    assert (at(halves, 0, (16, 20)) > least_agreement(6)).mean() > 0.9
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_products_are_those_of_the_formula(cfa):
+    grid, rng = unit_grid(3, 2, 23, 38), np.random.default_rng(2)
+    film = rng.poisson(2.0, grid.shape_KLHW)
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=cfa), np.array([4.0]))
+    h, w = 6, 10
+    for side, products in zip(BLOCKS_CELLS, halves.products, strict=True):
+        expected = np.ones((-(-h // side), -(-w // side)))
+        for half in (0, 1):
+            light, seen = np.zeros((2, *expected.shape))
+            for k, l, i, j in np.ndindex(*grid.shape_KLHW):
+                # Disparity 2: shifts of whole blocks of 2 px down, of half a block across.
+                row, col = i + 2 * (k - 1), j + (2 * l - 1)
+                rows, cols = row - row % 2 + np.arange(2), col - col % 2 + np.arange(2)
+                whole = all(0 <= at < 23 and 0 <= at - 2 * (k - 1) < 23 for at in rows)
+                whole &= all(0 <= at < 38 and 0 <= at - (2 * l - 1) < 38 for at in cols)
+                if whole and (k + l) % 2 == half:
+                    block = row // CELL_PX // side, col // CELL_PX // side
+                    light[block] += film[k, l, i, j]
+                    seen[block] += 1
+            smooth = np.zeros_like(light)
+            for a, b in np.ndindex(*light.shape):
+                near = np.s_[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2]
+                around, views = light[near].sum() - light[a, b], seen[near].sum() - seen[a, b]
+                smooth[a, b] = seen[a, b] * around / views if views * seen[a, b] > 0 else 0.0
+                light[a, b] = light[a, b] if views * seen[a, b] > 0 else 0.0
+            scale = smooth + smooth.mean() + (smooth.mean() == 0)
+            expected *= (light - smooth) / scale
+        np.testing.assert_allclose(products[0], expected, rtol=1e-9, atol=1e-12)
+
+
+def test_agreement_over_a_box_is_that_of_the_formula():
+    p = np.random.default_rng(3).normal(size=(2, 8, 8))
+    nothing = [np.zeros((2, 8 // side, 8 // side)) for side in BLOCKS_CELLS]
+    halves = Halves([p, *nothing[1:]], [0 * p, *nothing[1:]])
+    where = np.array([[True, False], [True, True]])
+    own = p[:, 2:4, 3:5][:, where]
+    t = max((one.sum() / np.sqrt((one**2).sum()) for one in own), default=0.0)
+    assert halves.agreement_over(slice(2, 4), slice(3, 5), where) == pytest.approx(max(t, 0.0))
+
+
+@pytest.mark.parametrize("count", [1, 3, 2**40])
+@pytest.mark.parametrize("size", [(1, 1), (4, 9), (64, 64)])
+def test_even_light_is_no_light_to_agree_on(count, size):
+    grid = unit_grid(2, 3, *size)
+    counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa="GRBG")
+    shape = -(-size[0] // CELL_PX), -(-size[1] // CELL_PX)
+    assert not at(halves_of(counts, np.array([2.0, 4.0])), 1, shape).any()
+
+
+def test_bayer_colours_do_not_pass_for_light():
+    grid = unit_grid(3, 3, 64, 64)
+    colours = np.tile(colour_cells("GRBG"), (32, 32))
+    rates = np.array([0.2, 5.0, 40.0])[colours] * np.ones(grid.shape_KLHW)
+    film = np.random.default_rng(4).poisson(rates)
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), spreads_of(grid))
+    assert max(at(halves, plane, (16, 16)).max() for plane in range(6)) < least_agreement(6)

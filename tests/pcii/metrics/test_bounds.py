@@ -1,0 +1,177 @@
+"""What a method that knows the depth would score, and the bound on depth against a numerical one."""
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.images import Sections, Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import PhotonTruth, Truth
+from pcii.metrics.bounds import (
+    camera_information,
+    depth_bound_px,
+    log_gradient_squared,
+    object_bounds,
+    oracle,
+    plane_bounds,
+)
+from pcii.sections.reconstruction import reconstruct
+
+GRID = unit_grid(5, 5, 1, 8)  # total spread 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
+Z = np.array([4 / 40, 4 / 30])
+
+
+def sections(grid: CameraGrid = GRID, z_mm: np.ndarray = Z) -> Sections:
+    return reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid), z_mm)
+
+
+def truth() -> Truth:
+    """Eight pixels in a row by spread: two of object 1, four of object 2, backdrop in focus, nothing."""
+    spread = np.array([[40.0, 36.0, 34.0, 30.0, 28.0, 20.0, 31.0, np.nan]])
+    z = np.where(np.isnan(spread), np.inf, 4 / np.nan_to_num(spread, nan=1.0))
+    return Truth(z, np.array([[1, 1, 2, 2, 2, 2, 0, 0]]), {1: "near", 2: "far"})
+
+
+def test_by_pixel_the_oracle_claims_what_is_within_one_pixel_of_blur() -> None:
+    claimed = oracle(sections(), truth()).in_focus[:, 0]
+    # Blur of half the difference: 40 is in focus at 40; 30, 28 (1 px) and 31 at 30; 36 and 34 nowhere.
+    assert claimed.astype(int).tolist() == [[1, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 0, 1, 0]]
+
+
+def test_by_object_the_oracle_claims_every_pixel_of_an_object_at_its_nearest_plane() -> None:
+    claimed = oracle(sections(), truth(), kind="object").in_focus[:, 0]
+    assert claimed.astype(int).tolist() == [[1, 1, 0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 1, 1, 0, 0]]
+    assert oracle(sections(), truth(), kind="object").method == "oracle"
+
+
+def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
+    z = np.array([[4 / 40, 4 / 39, 4 / 38, 4 / 31, np.inf, np.inf, np.inf, np.inf]])
+    true = Truth(z, np.array([[1, 1, 1, 1, 0, 0, 0, 0]]), {1: "long"})
+    rows = plane_bounds(oracle(sections(), true), true)
+    iou = {(row["z_mm"], row["truth"]): row["iou_oracle"] for row in rows}
+    # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
+    assert iou == {(0.1, "object"): 3 / 4, (0.1, "pixel"): 1.0, (Z[1], "object"): 0.0, (Z[1], "pixel"): 1.0}
+
+
+def test_oracle_refuses_what_it_cannot_compare() -> None:
+    with pytest.raises(InputError, match=r"^kind: use 'object' or 'pixel', not 'photon'"):
+        oracle(sections(), truth(), kind="photon")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"^truth: its maps are \(1, 8\), the sections \(1, 9\)"):
+        oracle(sections(unit_grid(5, 5, 1, 9)), truth())
+
+
+def test_ten_cameras_inform_as_much_as_the_mean_square_of_their_places() -> None:
+    # Places from -1/2 to 1/2 in ninths: 2 (0.5^2 + 1.5^2 + 2.5^2 + 3.5^2 + 4.5^2) / 81 / 10 = 82.5 / 810.
+    assert camera_information(unit_grid(10, 10, 4, 4)) == pytest.approx((82.5 / 810, 82.5 / 810), rel=1e-12)
+    assert round(82.5 / 810, 3) == 0.102
+    assert camera_information(unit_grid(1, 1, 4, 4)) == (0.0, 0.0)
+    # Two columns stand at -1/2 and 1/2; three rows of half the pitch span as much: -1/2, 0, 1/2.
+    two = unit_grid(3, 2, 4, 4, pitch_mm=(2.0, 1.0))
+    assert camera_information(two) == pytest.approx((1 / 4, 1 / 6), rel=1e-12)
+    # One row: no vertical disparity. Four columns of the longer axis: (4 + 1) / (12 x 3).
+    assert camera_information(unit_grid(1, 4, 4, 4)) == pytest.approx((5 / 36, 0.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("grid", [unit_grid(10, 10, 64, 64), unit_grid(4, 6, 64, 64, pitch_mm=(1.0, 2.5))])
+def test_the_bound_is_one_over_the_root_of_a_numerical_fisher_information(grid: CameraGrid) -> None:
+    """Rates of every view as formulas, differentiated by the spread; one axis has more texture."""
+    y, x = np.mgrid[:64, :64] * (2 * np.pi / 64)
+
+    def rate(dx: float, dy: float) -> np.ndarray:
+        return 0.02 * np.exp(0.8 * np.sin(3 * (x - dx)) + 0.4 * np.sin(2 * (y - dy) + 1))
+
+    longer = max((grid.cols - 1) * grid.pitch_mm[0], (grid.rows - 1) * grid.pitch_mm[1])
+    information, photons, step_px = 0.0, 0.0, 1e-3
+    unit = 2 * np.pi / 64
+    for k, l in np.ndindex(grid.rows, grid.cols):
+        a = (l - (grid.cols - 1) / 2) * grid.pitch_mm[0] / longer
+        b = (k - (grid.rows - 1) / 2) * grid.pitch_mm[1] / longer
+        ahead, behind = (rate(u * a * unit, u * b * unit) for u in (step_px, -step_px))
+        information += (((ahead - behind) / (2 * step_px)) ** 2 / rate(0, 0)).sum()
+        photons += rate(0, 0).sum()
+    g_x = 0.8 * 3 * np.cos(3 * x) * unit
+    g_y = 0.4 * 2 * np.cos(2 * y + 1) * unit
+    weight = rate(0, 0) / rate(0, 0).sum()
+    squares = float((weight * g_x**2).sum()), float((weight * g_y**2).sum())
+    # Central differences of 1e-3 px are exact to their square.
+    assert depth_bound_px(grid, photons, squares) == pytest.approx(information**-0.5, rel=1e-5)
+
+
+def test_the_best_estimate_from_poisson_counts_reaches_the_bound_and_no_more() -> None:
+    grid, side, trials = unit_grid(1, 10, 16, 16), 16, 4000
+    places = (np.arange(10) - 4.5) / 9
+    x = np.arange(side) * (2 * np.pi / side)
+
+    def rates(u: float) -> np.ndarray:  # (views x columns); all 16 rows are alike and added up
+        moved = x - u * places[:, None] * (2 * np.pi / side)
+        return 16 * np.exp(0.9 * np.sin(2 * moved)).ravel()
+
+    slope = 0.9 * 2 * np.cos(2 * x) * (2 * np.pi / side)
+    weight = np.exp(0.9 * np.sin(2 * x))
+    squared = float((weight * slope**2).sum() / weight.sum())
+    bound = depth_bound_px(grid, rates(0).sum(), (squared, 0.0))
+    assert bound is not None
+    u = np.linspace(-6 * bound, 6 * bound, 61)
+    counts = np.random.default_rng(11).poisson(rates(0), (trials, 10 * side))
+    likelihood = counts @ np.log([rates(one) for one in u]).T  # the sums of the rates do not depend on u
+    best = likelihood.argmax(axis=1).clip(1, u.size - 2)
+    before, at, after = (likelihood[np.arange(trials), best + step] for step in (-1, 0, 1))
+    estimate = u[best] + (before - after) / (2 * (before - 2 * at + after)) * (u[1] - u[0])
+    # A standard deviation from n trials is known to 1 / sqrt(2 n); four of these. 1/12 for c is 10 % off.
+    assert estimate.std() == pytest.approx(bound, rel=4 / np.sqrt(2 * trials))
+
+
+def test_nothing_to_tell_depth_by_has_no_bound() -> None:
+    grid = unit_grid(3, 3, 4, 4)
+    assert depth_bound_px(grid, 0, (0.1, 0.1)) is None
+    assert depth_bound_px(grid, 100, (0.0, 0.0)) is None
+    assert depth_bound_px(unit_grid(1, 1, 4, 4), 100, (0.1, 0.1)) is None
+    dark = np.zeros((4, 4, 3))
+    assert log_gradient_squared(dark, dark + 1, np.ones((4, 4), dtype=bool)) is None
+
+
+def test_gradients_are_those_of_an_exponential_slope_whatever_the_coverage() -> None:
+    i, j = np.mgrid[:60, :60]
+    inside = np.zeros((60, 60), dtype=bool)
+    inside[10:50, 10:50] = True
+    rate = np.stack([np.exp(0.1 * j), np.exp(0.2 * i), np.ones((60, 60))], axis=-1)
+    coverage = np.ones((60, 60, 3)) * [2, 1, 4]
+    found = log_gradient_squared(rate * coverage, coverage, inside)
+    # Colours by hand: photons share out as coverage x rate, and a central difference is sinh.
+    light = (coverage * rate)[inside].sum(axis=0)
+    smooth = np.exp(np.array([0.1, 0.2, 0.0]) ** 2 / 8)  # a Gaussian of 1/2 px scales an exponential
+    light = light * smooth
+    expected = light[:2] * np.sinh([0.1, 0.2]) ** 2 / light.sum()
+    assert found == pytest.approx(tuple(expected), rel=1e-3)  # the filter ends at 4 sigma
+
+
+def test_objects_have_bounds_where_light_texture_and_photons_are_known() -> None:
+    grid = unit_grid(5, 5, 60, 80)
+    ids = np.zeros((60, 80), dtype=int)
+    ids[:, :40], ids[:, 45:] = 1, 2
+    z = np.where(ids == 1, 0.5, np.where(ids == 2, 1.0, np.inf))
+    n = 400
+    zero = np.zeros(n, dtype=int)
+    photons = PhotonTruth(zero, zero, zero, zero, np.repeat([1, 0], n // 2), np.full(n, 0.5))
+    true = Truth(z, ids, {1: "sloped", 2: "flat", 3: "unseen"}, photons)
+    light = np.ones((*grid.shape_KLHW, 1))
+    columns = np.arange(80)
+    for l in range(5):  # at z = 0.5 the disparity is 2 px: column j of the centre is j - 2 (l - 2) here
+        light[:, l, :, :, 0] = np.exp(0.05 * np.minimum(columns + 2 * (l - 2), 39))
+    full = reconstruct(Views(light, grid), [0.5, 1.0])
+    rows = object_bounds(true, full, None)
+    assert [(row["name"], row["photons"]) for row in rows] == [("sloped", 200), ("flat", 0), ("unseen", 0)]
+    assert rows[0]["log_gradient_per_px"] == pytest.approx(0.05, rel=1e-2)
+    c_x = (5 + 1) / (12 * (5 - 1))
+    assert rows[0]["depth_sigma_px"] == pytest.approx(1 / np.sqrt(c_x * 200 * 0.05**2), rel=1e-2)
+    assert rows[1]["depth_sigma_px"] is rows[2]["depth_sigma_px"] is None
+    assert {row["depth_sigma_px"] for row in object_bounds(true, None, None)} == {None}
+
+
+def test_without_provenance_photons_are_those_of_the_objects_pixels() -> None:
+    rows = object_bounds(truth(), None, sections())
+    # One photon a pixel. At disparity 10 and 7.5 the other views move out of a picture of 1 x 8, but for
+    # single columns at its ends, so the two and the four pixels of the objects get one photon each.
+    assert [row["photons"] for row in rows] == [2, 4]

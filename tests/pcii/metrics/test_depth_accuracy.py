@@ -1,0 +1,127 @@
+"""Depth errors on maps small enough to count by hand."""
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.estimates import DepthMap
+from pcii.core.truth import Truth
+from pcii.metrics.depth_accuracy import depth_errors, fine_structures, hci_errors, near_edges
+
+GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total spread 2 / z px
+
+
+def errors(true: np.ndarray, estimate: np.ndarray, grid: CameraGrid = GRID) -> dict[str, float | None]:
+    """The metrics of two maps of disparity; NaN in an estimate is no answer, 0 in the truth is nothing."""
+    with np.errstate(divide="ignore"):
+        z = 1 / true
+    truth = Truth(z, np.zeros(z.shape, dtype=int), {})
+    return hci_errors(grid, DepthMap(1 / estimate, np.ones(z.shape)), truth, np.isfinite(z))
+
+
+def test_bad_pixels_mean_square_and_quartile_are_counted_by_hand() -> None:
+    true = np.full((40, 50), 2.0)
+    estimate = true.copy()
+    # Inside the border of 15 px are 10 x 20 = 200 pixels; 20 of them are off by 0.02, 40 by 0.05, 60 by 0.1.
+    inner = estimate[15:25, 15:35]
+    inner[0], inner[1:3], inner[3:6] = 2.02, 1.95, 2.1
+    estimate[:15] = 9.0  # in the border, which does not count
+    found = errors(true, estimate)
+    assert [found[key] for key in ("badpix_001", "badpix_003", "badpix_007")] == [0.6, 0.5, 0.3]
+    square = (20 * 0.02**2 + 40 * 0.05**2 + 60 * 0.1**2) / 200
+    assert found["mse_x100"] == pytest.approx(100 * square)
+    assert found["q25_x100"] == pytest.approx(0.0, abs=1e-12)
+    assert found["answered"] == 1.0
+    assert found["discontinuities"] is found["fine_fattening"] is found["fine_thinning"] is None
+
+
+def test_a_missing_answer_is_bad_and_left_out_of_means() -> None:
+    true = np.full((40, 50), 2.0)
+    estimate = true + 0.02
+    estimate[15:20] = np.nan
+    found = errors(true, estimate)
+    assert found["badpix_007"] == found["badpix_003"] == 0.5
+    assert found["badpix_001"] == 1.0
+    assert found["answered"] == 0.5
+    assert found["mse_x100"] == pytest.approx(0.04)
+    assert found["q25_x100"] == pytest.approx(2.0)
+    nothing = errors(true, np.full((40, 50), np.nan))
+    assert nothing["badpix_001"] == nothing["badpix_007"] == 1.0
+    assert nothing["mse_x100"] is nothing["q25_x100"] is None
+    assert nothing["answered"] == 0.0
+    # So far away that no depth at all would be a good guess.
+    far = errors(np.full((40, 50), 0.005), np.full((40, 50), np.nan))
+    assert far["badpix_001"] == far["badpix_003"] == far["badpix_007"] == 1.0
+
+
+def test_only_pixels_where_something_is_hit_are_judged() -> None:
+    true = np.full((40, 50), 2.0)
+    true[:, 30:] = 0.0
+    estimate = np.where(true > 0, true, 5.0)
+    assert errors(true, estimate)["badpix_001"] == 0.0
+    assert set(errors(np.zeros((40, 50)), estimate).values()) == {None}
+    assert set(errors(true[:30], estimate[:30], unit_grid(3, 3, 30, 50)).values()) == {None}  # all border
+
+
+def test_in_a_grid_of_one_column_disparity_is_vertical() -> None:
+    grid = unit_grid(3, 1, 40, 50, pitch_mm=(7.0, 2.0))
+    true = np.full((40, 50), 2.0)
+    found = errors(true, true + 0.02, grid)  # disparities are twice 1 / z now, so 0.04 off
+    assert (found["badpix_003"], found["badpix_007"]) == (1.0, 0.0)
+
+
+def test_discontinuities_are_judged_within_five_pixels_of_an_edge() -> None:
+    true = np.full((40, 50), 2.0)
+    true[:, 25:] = 2.2
+    true[30:, :25] = 2.1  # a step of 0.1 is no edge, and beyond the border anyway
+    near = near_edges(true)
+    assert np.flatnonzero(near[20]).tolist() == list(range(19, 31))  # the pixels 24 and 25 and five beyond
+    estimate = true.copy()
+    estimate[15:25, 25:28] += 0.08  # 3 of the 12 columns
+    assert errors(true, estimate)["discontinuities"] == 0.25
+
+
+def test_a_thin_rod_is_fine_and_a_wide_one_is_not() -> None:
+    flat = np.full((40, 50), 2.0)
+    for width, fine in ((10, True), (11, False)):
+        rod = flat.copy()
+        rod[:, 20 : 20 + width] = 2.5
+        assert bool(fine_structures(rod)[20, 24]) is fine
+        assert fine_structures(rod).sum() == (40 * width if fine else 0)
+    gap = flat.copy()
+    gap[:, 20:24] = 1.5  # what stands behind its surroundings is a gap
+    assert not fine_structures(gap).any()
+
+
+def test_fattening_is_around_a_rod_and_thinning_is_on_it() -> None:
+    true = np.full((40, 50), 2.0)
+    true[:, 24:26] = 2.5  # 2 columns on it; 5 on either side are around it
+    fat, thin, gone = true.copy(), true.copy(), true.copy()
+    fat[:, 26:29] = 2.5  # e = 2.0 - 2.5 in 3 of the 10 columns around
+    thin[:, 24] = 2.0  # e = 2.5 - 2.0 in 1 of the 2 columns on it
+    gone[:, 24:29] = np.nan
+    for estimate, around, on in ((fat, 0.3, 0.0), (thin, 0.0, 0.5), (gone, 0.3, 1.0), (true, 0.0, 0.0)):
+        found = errors(true, estimate)
+        assert (found["fine_fattening"], found["fine_thinning"]) == (around, on)
+
+
+def test_all_pixels_and_those_of_objects_are_told_apart() -> None:
+    z = np.full((40, 50), 0.5)
+    ids = np.zeros((40, 50), dtype=int)
+    ids[20:] = 1  # of the 10 rows inside the border the lower 5
+    estimate = np.where(ids > 0, 0.5, np.nan)
+    found = depth_errors(GRID, DepthMap(estimate, np.ones(z.shape)), Truth(z, ids, {1: "slab"}))
+    assert found["hci"]["badpix_007"] == found["hci"]["answered"] == 0.5
+    assert found["hci_objects"]["badpix_007"] == 0.0
+    assert found["coverage"] == 1.0
+
+
+def test_depths_that_cannot_be_are_no_answers() -> None:
+    z = np.full((40, 50), 0.5)
+    for nonsense in (0.0, -1.0, np.inf, np.nan):
+        depth = DepthMap(np.full(z.shape, nonsense), np.ones(z.shape))
+        found = depth_errors(GRID, depth, Truth(z, np.ones(z.shape, dtype=int), {1: "wall"}))
+        assert found["coverage"] == found["hci"]["answered"] == 0.0
+        assert found["bad_3px"] == found["hci"]["badpix_007"] == 1.0
+        assert found["mae_mm"] is found["median_px"] is None

@@ -1,0 +1,210 @@
+"""The score on masks and depths small enough to count by hand."""
+
+import numpy as np
+import pytest
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.estimates import DepthMap, Segmented
+from pcii.core.geometry import blur_half_extent_px
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import PhotonTruth, Truth
+from pcii.metrics.scoring import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
+from pcii.sections.reconstruction import reconstruct
+
+GRID = CameraGrid(rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=24, width=32)
+Z = np.array([540.0, 620.0])
+
+
+def truth() -> Truth:
+    """A near object of 6 x 6 at 541 mm, a far one of 8 x 8 at 625 mm, nothing else."""
+    z = np.full((24, 32), np.inf)
+    ids = np.zeros((24, 32), dtype=np.int16)
+    z[4:10, 4:10], ids[4:10, 4:10] = 541.0, 1
+    z[8:16, 18:26], ids[8:16, 18:26] = 625.0, 2
+    return Truth(z, ids, {1: "near", 2: "far"})
+
+
+def segmented(masks: np.ndarray) -> Segmented:
+    counts = PhotonCounts.from_dense(np.ones(GRID.shape_KLHW, dtype=np.int64), GRID)
+    return Segmented(Z, masks, "by hand", reconstruct(counts, Z))
+
+
+def test_agreement_is_counted_by_hand() -> None:
+    true = np.zeros((8, 8), dtype=bool)
+    true[2:6, 2:6] = True  # 16 pixels
+    claimed = np.zeros((8, 8), dtype=bool)
+    claimed[2:6, 4:8] = True  # 16 pixels, 8 of them true
+    agreement = mask_agreement(claimed, true)
+    assert agreement["iou"] == 8 / 24
+    assert agreement["precision"] == agreement["recall"] == agreement["f1"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("claimed", "true", "expected"),
+    [
+        (False, False, {"iou": 1.0, "precision": None, "recall": None, "f1": 1.0, "boundary_f": 1.0}),
+        (True, False, {"iou": 0.0, "precision": 0.0, "recall": None, "f1": 0.0, "boundary_f": 0.0}),
+        (False, True, {"iou": 0.0, "precision": None, "recall": 0.0, "f1": 0.0, "boundary_f": 0.0}),
+    ],
+)
+def test_empty_masks_have_defined_answers(claimed: bool, true: bool, expected: dict) -> None:
+    square = np.zeros((9, 9), dtype=bool)
+    square[3:6, 3:6] = True
+    assert mask_agreement(square & claimed, square & true) == expected
+
+
+def test_outlines_may_be_two_pixels_apart_and_no_more() -> None:
+    true = np.zeros((40, 40), dtype=bool)
+    true[10:30, 10:30] = True
+    for shift, perfect in ((2, True), (3, False)):
+        grown = np.zeros_like(true)
+        grown[10 - shift : 30 + shift, 10 - shift : 30 + shift] = True
+        # The corners of the grown square are sqrt(2) times as far: they are the only ones to fail at 2.
+        value = mask_agreement(grown, true)["boundary_f"]
+        assert value is not None
+        assert (value > 0.9) is perfect
+
+
+def test_objects_belong_to_the_closest_plane() -> None:
+    assert objects_by_plane(GRID, truth(), Z) == {1: 0, 2: 1}
+    masks = object_masks(GRID, truth(), Z)
+    assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
+
+
+def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
+    # 541 mm is 0.11 px from 540 mm, 625 mm is 0.41 px from 620 mm, 650 mm would be 2.4 px.
+    assert blur_half_extent_px(GRID, 541.0, 540.0) == pytest.approx(0.1094, abs=1e-4)
+    masks = pixel_masks(GRID, truth(), Z)
+    assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
+    assert not pixel_masks(GRID, truth(), np.array([650.0])).any()
+
+
+def test_a_perfect_answer_scores_one() -> None:
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(*depth_of(truth())), truth())
+    for row in result.planes:
+        assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
+    assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
+    for key in ("mae_mm", "median_mm", "mae_px", "median_px", "bad_1px", "bad_3px"):
+        assert result.depth[key] == 0.0
+    assert result.depth["coverage"] == 1.0
+    assert [row["iou_oracle"] for row in result.bounds["planes"]] == [1.0] * 4
+
+
+def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
+    z = np.where(np.isfinite(true.z_mm), true.z_mm, np.nan)
+    return z, np.isfinite(z).astype(float)
+
+
+def test_a_missing_answer_is_bad_and_never_good() -> None:
+    z, confidence = depth_of(truth())
+    z[4:10, 4:10] = np.nan  # 36 of 100 object pixels
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    assert result.depth["coverage"] == 0.64
+    assert result.depth["bad_1px"] == result.depth["bad_3px"] == 0.36
+    assert result.depth["mae_mm"] == 0.0
+
+
+def test_depth_errors_are_counted_in_pixels_of_total_spread() -> None:
+    z, confidence = depth_of(truth())
+    # At 541 mm the total spread is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
+    z[4:10, 4:7] += 9.0
+    z[4:10, 7:10] += 20.0
+    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    assert result.depth["bad_1px"] == 0.36
+    assert result.depth["bad_3px"] == 0.18
+    assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
+    # Total spread is 9 x 250 / (0.0352 z) = 63920.45 / z px: less by 1.9334 and by 4.2121 px.
+    assert result.depth["mae_px"] == pytest.approx((18 * 1.9334 + 18 * 4.2121) / 100, abs=1e-4)
+    assert result.depth["median_px"] == 0.0
+
+
+def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
+    depth = DepthMap(*depth_of(truth()))
+    result = score(None, depth, truth(), grid=GRID)
+    assert result.planes == result.objects == ()
+    assert result.depth["coverage"] == 1.0
+    assert [row["name"] for row in result.bounds["objects"]] == ["near", "far"]
+    with pytest.raises(InputError, match=r"^grid: a depth map without masks"):
+        score([], depth, truth())
+
+
+def test_what_is_claimed_of_an_empty_dark_is_told() -> None:
+    masks = np.zeros((2, 24, 32), dtype=bool)
+    masks[1, :6, :8] = True  # 48 of 768 pixels
+    empty = Truth(np.full((24, 32), np.inf), np.zeros((24, 32), dtype=int), {})
+    rows = score(segmented(masks), None, empty).planes
+    assert [(row["z_mm"], row["claimed_share"], row["iou"]) for row in rows] == [
+        *[(540.0, 0.0, 1.0)] * 2,
+        *[(620.0, 1 / 16, 0.0)] * 2,
+    ]
+
+
+def test_without_truth_everything_unknown_is_none() -> None:
+    result = score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, None)
+    assert all(row["iou"] is None and row["entropy_before"] is not None for row in result.planes)
+    assert result.objects == ()
+    assert all(set(v.values() if isinstance(v, dict) else [v]) == {None} for v in result.depth.values())
+    assert result.bounds == {"planes": [], "objects": []}
+
+
+def test_removal_lowers_the_entropy_of_the_section() -> None:
+    rng = np.random.default_rng(2)
+    counts = PhotonCounts.from_dense(rng.poisson(0.5, GRID.shape_KLHW), GRID)
+    masks = object_masks(GRID, truth(), Z)
+    result = score(Segmented(Z, masks, "by hand", reconstruct(counts, Z)), None, truth())
+    for row in result.planes:
+        assert row["entropy_after"] < row["entropy_before"]
+
+
+def test_maps_of_another_size_are_refused() -> None:
+    other = Truth(np.full((5, 5), np.inf), np.zeros((5, 5), dtype=int), {})
+    with pytest.raises(InputError, match=r"truth"):
+        score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, other)
+
+
+def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
+    """Precision and recall of four events of 3, 1, 2 and 1 photons; the third sent one photon of each kind.
+
+    They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
+    that a picture of 200 px is needed to see all of them land.
+    """
+    wide = CameraGrid(**{**vars(GRID), "height": 200, "width": 200})
+    i, j, n = np.array([100, 110, 120, 199]), np.array([100, 100, 100, 30]), np.array([3, 1, 2, 1])
+    zero = np.zeros(4, dtype=int)
+    counts = PhotonCounts.from_events(zero, zero, i, j, n, wide)
+    where = {"k": zero, "l": zero, "i": i, "j": j}
+    # The last photon lands left of the section and counts for nothing.
+    photons = PhotonTruth(
+        **{name: column.repeat(n) for name, column in where.items()},
+        object_id=np.array([1, 1, 1, 2, 1, 2, 1]),
+        z_mm=np.array([541.0, 541, 541, 625, 541, 625, 541]),
+    )
+    z = np.full((200, 200), np.inf)
+    ids = np.zeros((200, 200), dtype=np.int16)
+    z[0], ids[0], z[1], ids[1] = 541.0, 1, 625.0, 2
+    true = Truth(z, ids, {1: "near", 2: "far"}, photons)
+    masks = np.zeros((1, 200, 200), dtype=bool)
+    masks[0, 41, 41] = True  # where the event of three photons lands
+    said = None if kept is None else np.array([kept])
+    focus = Segmented(Z[:1], masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
+    rows = score(focus, None, true).planes
+    assert all(row["iou"] is not None for row in rows)
+    row = next(row for row in rows if row["truth"] == "pixel")
+    return row["photon_precision"], row["photon_recall"]
+
+
+def test_photons_count_once_each_and_by_the_mask_if_nothing_is_said_of_them() -> None:
+    # Of object 1 four photons land inside: three of the first event, one of the third.
+    assert photon_score(None) == (1.0, 3 / 4)
+
+
+def test_what_is_said_of_events_goes_before_the_mask() -> None:
+    assert photon_score([False, True, True, True]) == (1 / 3, 1 / 4)
+    assert photon_score([True, False, True, False]) == (4 / 5, 1.0)
+    assert photon_score([False] * 4) == (None, 0.0)
+
+
+def test_photons_of_other_events_are_refused() -> None:
+    with pytest.raises(InputError, match=r"^photon_in_focus: tells of 3 events, .* of 4$"):
+        photon_score([True] * 3)

@@ -1,0 +1,230 @@
+import math
+
+import numpy as np
+import pytest
+from twins import bayer_photons, intersection_over_union, patch_views, unit_grid
+
+from pcii.core.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.imaging.bright_regions import roberts_magnitude, without_specks
+from pcii.removal.methods import DEFAULT_METHODS, METHODS, segment
+from pcii.sections.probe_planes import with_probes
+
+methods = pytest.mark.parametrize("method", sorted(METHODS))
+able = pytest.mark.parametrize("method", DEFAULT_METHODS)
+
+# The outline is found on windows of 5 px, so allow it to be 3 px off all along a square of 72 px.
+LEAST_IOU = (66 / 72) ** 2
+
+
+@able
+def test_each_object_is_in_focus_at_its_own_depth_alone(two_squares, method):
+    focus = segment(two_squares.counts, two_squares.z_mm, method=method)
+    for plane, here in enumerate(two_squares.masks):
+        there = two_squares.masks[1 - plane]
+        assert intersection_over_union(focus.in_focus[plane], here) > LEAST_IOU
+        # Brightness alone would keep the other object as well.
+        assert (focus.in_focus[plane] & there).sum() < 0.05 * there.sum()
+
+
+@able
+def test_cameras_in_the_wrong_order_do_not_pass(two_squares, method):
+    # The planted fault of the test above: the sign of the shifts reversed, which nothing else shows.
+    flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
+    focus = segment(flipped, two_squares.z_mm, method=method)
+    found = [intersection_over_union(focus.in_focus[p], two_squares.masks[p]) for p in (0, 1)]
+    assert max(found) < LEAST_IOU / 2
+
+
+@able
+def test_nothing_is_in_focus_where_nothing_is(two_squares, method):
+    between = 2 / (1 / two_squares.z_mm[0] + 1 / two_squares.z_mm[1])  # 6 px of blur from either
+    focus = segment(two_squares.counts, [*two_squares.z_mm, between], method=method)
+    assert focus.in_focus[2].sum() < 0.05 * two_squares.masks[0].sum()
+
+
+@methods
+def test_masks_follow_the_order_of_the_depths(two_squares, method):
+    forward = segment(two_squares.counts, two_squares.z_mm, method=method)
+    backward = segment(two_squares.counts, two_squares.z_mm[::-1], method=method)
+    np.testing.assert_array_equal(forward.in_focus, backward.in_focus[::-1])
+
+
+@methods
+def test_sparse_and_dense_counts_give_the_same_masks(two_squares, method):
+    k, l, i, j = np.nonzero(two_squares.dense)
+    n = two_squares.dense[k, l, i, j]
+    sparse = PhotonCounts.from_events(k, l, i, j, n, two_squares.grid, cfa="GRBG")
+    one = segment(sparse, two_squares.z_mm, method=method).in_focus
+    np.testing.assert_array_equal(one, segment(two_squares.counts, two_squares.z_mm, method=method).in_focus)
+
+
+@methods
+def test_the_sections_of_a_result_are_those_of_its_depths(two_squares, method):
+    focus = segment(two_squares.counts, two_squares.z_mm, method=method)
+    np.testing.assert_array_equal(focus.z_mm, two_squares.z_mm)
+    np.testing.assert_array_equal(focus.sections.z_mm, two_squares.z_mm)
+    assert not focus.cleaned[~focus.in_focus].any()
+    assert all(step.shape == focus.in_focus.shape for step in focus.steps.values())
+
+
+@methods
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_no_photons_leave_nothing_in_focus(method, cfa):
+    grid = unit_grid(3, 3, 64, 64)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
+    assert not segment(dark, [0.5, 1.0], method=method).in_focus.any()
+
+
+@methods
+@pytest.mark.parametrize("event", [(1, 1, 30, 30), (0, 2, 30, 30), (0, 0, 0, 0)])
+def test_one_photon_leaves_nothing_in_focus(method, event):
+    grid = unit_grid(3, 3, 64, 64)
+    one = PhotonCounts.from_events(*np.array([[*event, 1]]).T, grid, cfa="GRBG")
+    assert not segment(one, [0.5, 1.0], method=method).in_focus.any()
+
+
+@methods
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (9, 1), (2, 3)])
+def test_tiny_saturated_images_have_an_answer(method, size):
+    grid = unit_grid(2, 3, *size)
+    bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 10**9), grid, cfa="GRBG")
+    assert segment(bright, [0.5, 1.0], method=method).in_focus.shape == (2, *size)
+
+
+@methods
+def test_one_view_is_refused(method):
+    grid = unit_grid(1, 1, 8, 8)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid, cfa="GRBG")
+    with pytest.raises(InputError, match=r"^counts: one view has no depth"):
+        segment(counts, 1.0, method=method)
+
+
+def test_an_unknown_method_is_refused_with_the_known_ones(two_squares):
+    with pytest.raises(InputError, match=r"^method: .*'magic'.*three-step.*likelihood"):
+        segment(two_squares.counts, two_squares.z_mm, method="magic")
+
+
+@methods
+@pytest.mark.parametrize("bad", [0, -1.0, float("nan"), []])
+def test_a_depth_that_cannot_be_is_refused(two_squares, method, bad):
+    with pytest.raises(InputError, match=r"^z_mm: "):
+        segment(two_squares.counts, bad, method=method)
+
+
+RADIUS_PX = 24
+DISC_GRID = unit_grid(9, 9, 168, 168)  # spread 8 / z: discs of the disparities 3 and 5 are 16 px apart
+
+
+def disc_mask(row: int, col: int) -> np.ndarray:
+    i, j = np.mgrid[: DISC_GRID.height, : DISC_GRID.width]
+    return np.hypot(i - row, j - col) <= RADIUS_PX
+
+
+def plain_discs(*discs: tuple[int, int, int], per_view: float, seed: int = 0) -> PhotonCounts:
+    """White discs at (row, column, disparity) before a hundredth of their light."""
+    patch = np.hypot(*(np.mgrid[: 2 * RADIUS_PX + 1, : 2 * RADIUS_PX + 1] - RADIUS_PX)) <= RADIUS_PX
+    white = np.repeat(patch[..., None].astype(float), 3, axis=2)
+    rates = np.full((*DISC_GRID.shape_KLHW, 3), 0.01)
+    for row, col, disparity in discs:
+        rates += patch_views(white, row - RADIUS_PX, col - RADIUS_PX, disparity, DISC_GRID)
+    rates *= 3 * per_view * DISC_GRID.view_count / rates.sum()  # a pixel sees one colour of three
+    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), DISC_GRID, cfa="GRBG")
+
+
+def test_plain_discs_are_found_at_their_depths_and_better_with_more_light():
+    places = ((50, 52, 3), (118, 116, 5))
+    masks = [disc_mask(row, col) for row, col, _ in places]
+    found = []
+    for per_view in (30, 300, 3000):
+        focus = segment(plain_discs(*places, per_view=per_view), [1 / 3, 1 / 5], method="likelihood")
+        found.append([intersection_over_union(focus.in_focus[p], masks[p]) for p in (0, 1)])
+        # At 30 photons a view one lands in every second pixel of the discs; an outline that is 1 px off
+        # all along loses 2 / 24.
+        assert min(found[-1]) > 1 - 2 / RADIUS_PX
+    # Ten pixels more or less are chance: 1 in 15 of those along the outline.
+    assert np.all(np.diff(found, axis=0) > -10 / (math.pi * RADIUS_PX**2))
+
+
+def test_layers_are_fitted_only_where_things_touch_or_light_is_scarce(monkeypatch):
+    fitted = []
+
+    def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: list[np.ndarray]) -> np.ndarray:
+        fitted.append(counts)
+        return starts[0]
+
+    monkeypatch.setattr("pcii.removal.likelihood.likelihood_method.layered", layered)
+    for per_view, needed in ((30, 1), (3000, 1)):  # the second adds none
+        segment(
+            plain_discs((50, 52, 3), (118, 116, 5), per_view=per_view), [1 / 3, 1 / 5], method="likelihood"
+        )
+        assert len(fitted) == needed
+
+
+@pytest.mark.parametrize("per_view", [30, 300])
+@pytest.mark.parametrize("asked", [3, 5])
+def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
+    place = (82, 84, 8 - asked)
+    counts = plain_discs(place, per_view=per_view)
+    focus = segment(counts, [1 / asked, 1 / (8 - asked)], method="likelihood")
+    assert not focus.in_focus[0].any()
+    assert intersection_over_union(focus.in_focus[1], disc_mask(*place[:2])) > 1 - 2 / RADIUS_PX
+    assert not segment(counts, [1 / asked], method="likelihood").in_focus.any()
+
+
+@pytest.mark.parametrize("rate", [0.001, 0.02, 0.3])
+def test_a_flat_film_is_never_claimed(rate):
+    grid = unit_grid(7, 7, 160, 144)
+    for seed in range(2):
+        film = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
+        focus = segment(PhotonCounts.from_dense(film, grid, cfa="GRBG"), [1 / 2, 1 / 5], method="likelihood")
+        assert not focus.in_focus.any()
+
+
+def test_a_depth_that_is_asked_for_twice_is_answered_twice(two_squares):
+    first, second = two_squares.z_mm
+    twice = segment(two_squares.counts, [first, second, first], method="likelihood")
+    once = segment(two_squares.counts, [first, second], method="likelihood")
+    np.testing.assert_array_equal(twice.in_focus[:2], once.in_focus)
+    np.testing.assert_array_equal(twice.in_focus[2], once.in_focus[0])
+
+
+def test_probes_stand_14_and_28_px_of_spread_around_a_plane():
+    grid = unit_grid(5, 5, 8, 8)  # spread 4 / z
+    z = with_probes(grid, np.array([4 / 50]))
+    np.testing.assert_allclose(4 / z, [50, 50 - 28, 50 - 14, 50 + 14, 50 + 28], rtol=1e-14)  # two divisions
+
+
+def test_no_probe_is_near_another_plane_or_beyond_infinity():
+    grid = unit_grid(5, 5, 8, 8)
+    planes = np.array([4 / 20, 4 / 35])
+    spread = 4 / with_probes(grid, planes)
+    np.testing.assert_allclose(spread[:2], [20, 35], rtol=1e-14)  # two divisions
+    assert np.all(spread > 0)
+    gaps = np.abs(spread[2:, None] - spread[:2])
+    assert gaps.min() > 7  # half a probe step
+
+
+def test_a_single_camera_has_no_probes():
+    np.testing.assert_array_equal(with_probes(unit_grid(1, 1, 4, 4), np.array([1.0, 2.0])), [1.0, 2.0])
+
+
+def test_roberts_cross_takes_both_diagonals_and_continues_the_border():
+    image = np.array([[0.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 4.0]])
+    # Down-right and up-right differences at each upper left corner, Eq. 8 by hand.
+    down = [[-3, 0, 0], [0, -1, -4], [0, -4, 0]]
+    up = [[0, -3, 0], [3, 0, -4], [0, 4, 0]]
+    np.testing.assert_array_equal(roberts_magnitude(image), np.hypot(down, up))
+
+
+def test_specks_and_holes_below_the_size_go_and_others_stay():
+    mask = np.zeros((12, 12), dtype=bool)
+    mask[1:8, 1:8] = True
+    mask[3:5, 3:5] = False  # a hole of 4
+    mask[10, 1:4] = True  # a speck of 3
+    mask[10, 6:11] = True  # a piece of 5
+    expected = np.zeros_like(mask)
+    expected[1:8, 1:8] = True
+    expected[10, 6:11] = True
+    np.testing.assert_array_equal(without_specks(mask, 5), expected)
+    np.testing.assert_array_equal(without_specks(mask, 4)[3:5, 3:5], False)

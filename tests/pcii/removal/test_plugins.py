@@ -1,0 +1,115 @@
+"""Methods of other packages, as if installed: a module and its entry points in a folder of the path."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.core.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.removal.methods import METHODS, removal_methods, segment
+
+CODE = """
+from dataclasses import replace
+import numpy as np
+from pcii import InputError, PhotonCounts, Segmented, reconstruct
+
+def good(counts, z_mm):
+    assert isinstance(counts, PhotonCounts) and z_mm.dtype == np.float64
+    sections = reconstruct(counts, z_mm)
+    mask = sections.counts.sum(axis=-1) > 0
+    return Segmented(z_mm, mask, "good", sections)
+
+def text(counts, z_mm):
+    return "in focus"
+
+def other_depths(counts, z_mm):
+    return replace(good(counts, z_mm + 1), method="other-depths")
+
+def fine(counts, z_mm):
+    sections = reconstruct(counts, z_mm, subpixel=2)
+    return Segmented(z_mm, sections.counts[..., 0] > 0, "fine", sections)
+
+def photons(counts, z_mm):
+    kept = np.ones((z_mm.size, 1 + counts.events.n.size), dtype=bool)
+    return replace(good(counts, z_mm), method="photons", photon_in_focus=kept)
+
+def renamed(counts, z_mm):
+    return good(counts, z_mm)
+
+number = 3
+"""
+
+
+def install(folder: Path, monkeypatch: pytest.MonkeyPatch, **points: str) -> None:
+    """Put a package `strange` with these entry points (underscores for hyphens) on the path."""
+    lines = [f"{name.replace('_', '-')} = {value}\n" for name, value in points.items()]
+    about = folder / "strange-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: strange\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[pcii.methods]\n" + "".join(lines))
+    (folder / "strange_code.py").write_text(CODE)
+    monkeypatch.syspath_prepend(str(folder))
+
+
+def counts() -> PhotonCounts:
+    grid = unit_grid(2, 2, 5, 6)
+    return PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.5, grid.shape_KLHW), grid)
+
+
+def test_a_method_of_another_package_is_found_by_name(tmp_path, monkeypatch):
+    assert removal_methods() == tuple(METHODS)
+    install(tmp_path, monkeypatch, good="strange_code:good")
+    assert removal_methods() == (*METHODS, "good")
+    focus = segment(counts(), [1.0, 2.0], method="good")
+    np.testing.assert_array_equal(focus.in_focus, focus.sections.counts[..., 0] > 0)
+
+
+def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, broken="no_such_module:remove")
+    assert "broken" in removal_methods()
+    segment(counts(), 1.0, method="brightness")
+    with pytest.raises(
+        InputError, match=r"^method: 'broken' of the package strange cannot be loaded: .*no_such"
+    ):
+        segment(counts(), 1.0, method="broken")
+
+
+def test_an_unknown_method_is_told_with_those_of_packages(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, good="strange_code:good")
+    with pytest.raises(InputError, match=r"no removal named 'magic'; use three-step, .*, good$"):
+        segment(counts(), 1.0, method="magic")
+
+
+def test_the_name_of_a_built_in_cannot_be_taken(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, likelihood="strange_code:good")
+    with pytest.raises(
+        InputError, match=r"strange_code:good of the package strange takes the name .*'likelihood'"
+    ):
+        removal_methods()
+    assert segment(counts(), 1.0, method="likelihood").method == "likelihood"
+
+
+def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, **{"../good": "strange_code:good"})
+    with pytest.raises(InputError, match=r"is named '\.\./good'; use letters"):
+        removal_methods()
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("text", r"must return a pcii\.Segmented, not str$"),
+        ("other_depths", r"must return masks and sections at the depths it was given, \[1\.0\] mm$"),
+        ("fine", r"must return sections of the counts' own camera grid with whole pixels$"),
+        ("renamed", r"must return its own name as `method`, not 'good'$"),
+        ("photons", r"must return photon_in_focus for the \d+ events of the counts, not for \d+$"),
+        ("number", r"is int, which cannot be called$"),
+    ],
+)
+def test_nonsense_is_told_in_one_sentence(tmp_path, monkeypatch, name, sentence):
+    install(tmp_path, monkeypatch, **{name: f"strange_code:{name}"})
+    told = name.replace("_", "-")
+    with pytest.raises(InputError, match=rf"^method: '{told}' of the package strange {sentence}"):
+        segment(counts(), 1.0, method=told)

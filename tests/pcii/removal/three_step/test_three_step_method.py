@@ -1,0 +1,238 @@
+import itertools
+import math
+
+import numpy as np
+import pytest
+from twins import intersection_over_union, unit_grid, voxel_of
+
+import pcii
+from pcii.core.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges
+from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
+from pcii.removal.three_step.three_step_method import WINDOW_CELLS, ThreeStep, adaptive_threshold
+from pcii.sections.probe_planes import with_probes
+
+NOTHING = ThreeStep(threshold=False, boundary=False, entropy=False)
+
+
+def test_without_any_step_all_that_is_lit_stays(two_squares):
+    focus = pcii.segment(two_squares.counts, two_squares.z_mm, method=NOTHING)
+    for plane, own in enumerate(two_squares.masks):
+        assert focus.in_focus[plane][own].mean() > 0.99  # two photons a voxel, windows of some voxels
+        assert focus.in_focus[plane][two_squares.masks[1 - plane]].mean() > 0.99
+        # Nothing is lit where no view sends light: 12 px of blur and a window beyond both squares.
+        assert not focus.in_focus[plane][:16, -16:].any()
+
+
+def test_without_entropy_the_other_object_stays_and_with_it_goes(two_squares):
+    there = two_squares.masks[1]
+    bright = ThreeStep(threshold=False, entropy=False)
+    assert bright(two_squares.counts, np.array(two_squares.z_mm)).in_focus[0][there].mean() > 0.9
+    all_steps = pcii.segment(two_squares.counts, two_squares.z_mm, method="three-step")
+    assert all_steps.in_focus[0][there].mean() < 0.05
+
+
+def test_the_threshold_alone_keeps_what_is_sharp_and_removes_what_is_not(two_squares):
+    alone = ThreeStep(boundary=False, entropy=False)
+    kept = alone(two_squares.counts, np.array(two_squares.z_mm)).in_focus
+    for plane, own in enumerate(two_squares.masks):
+        there = two_squares.masks[1 - plane]
+        assert kept[plane][own].mean() > 0.97  # 3 sigma
+        assert kept[plane][there].mean() < kept[plane][own].mean() - 0.3
+
+
+def test_the_planted_fault_of_swapped_depths_is_seen_by_the_threshold(two_squares):
+    alone = ThreeStep(boundary=False, entropy=False)
+    kept = alone(two_squares.counts, np.array(two_squares.z_mm[::-1])).in_focus
+    assert kept[0][two_squares.masks[0]].mean() < 0.7
+
+
+def test_entropy_alone_tells_the_planes_of_square_sub_images(two_squares):
+    alone = ThreeStep(threshold=False, boundary=False)
+    focus = alone(two_squares.counts, np.array(two_squares.z_mm))
+    for plane, own in enumerate(two_squares.masks):
+        assert focus.in_focus[plane][own].mean() > 0.8  # tiles at its border see half of it
+        assert focus.in_focus[plane][two_squares.masks[1 - plane]].mean() < 0.2
+
+
+def test_steps_hold_every_map_of_every_step(two_squares):
+    focus = pcii.segment(two_squares.counts, two_squares.z_mm, method="three-step")
+    first = {"mean", "variance", "threshold", "answered", "kept"}
+    assert set(focus.steps) == first | {"edges", "bright", "regions", "entropy", "winner"}
+    steps = focus.steps
+    together = steps["bright"] & steps["kept"] & (steps["winner"] == np.arange(2)[:, None, None])
+    np.testing.assert_array_equal(focus.in_focus, together)
+    assert np.array_equal(steps["regions"] > 0, np.broadcast_to(steps["bright"].any(axis=0), (2, 256, 256)))
+    assert np.array_equal(steps["winner"] >= 0, steps["regions"] > 0)
+    over = steps["answered"] & (steps["variance"] > steps["threshold"])
+    assert np.all(over[~steps["kept"]])
+
+
+def test_finer_voxels_come_back_as_pixels_and_as_voxels(two_squares):
+    focus = pcii.segment(two_squares.counts, two_squares.z_mm, method=ThreeStep(subpixel=2))
+    assert focus.method == "three-step-subpixel-2"
+    fine = focus.steps["fine"]
+    assert fine.shape == (2, 512, 512)
+    for plane, own in enumerate(two_squares.masks):
+        assert intersection_over_union(focus.in_focus[plane], own) > (66 / 72) ** 2  # 3 px off all along
+        halves = fine[plane].reshape(256, 2, 256, 2).sum(axis=(1, 3)) >= 2
+        np.testing.assert_array_equal(focus.in_focus[plane], halves)
+
+
+def test_results_are_named_by_what_is_left_out():
+    assert ThreeStep().name == "three-step"
+    assert ThreeStep(2, threshold=False, entropy=False).name == (
+        "three-step-subpixel-2-without-threshold-without-entropy"
+    )
+
+
+@pytest.mark.parametrize("bad", [0, -1, 1.5, True, "2"])
+def test_a_division_that_cannot_be_is_refused(bad):
+    with pytest.raises(InputError, match=r"^subpixel: expected a whole number of at least 1"):
+        ThreeStep(subpixel=bad)
+
+
+def threshold_twin(dense, grid, disparity, tolerance, row, col):
+    """Eq. 7 at one voxel with cells of one pixel: mean, variance and T by loops."""
+    reach = range(-(WINDOW_CELLS // 2), WINDOW_CELLS - WINDOW_CELLS // 2)
+
+    def samples(r, c):
+        found = []
+        for k, l in itertools.product(range(grid.rows), range(grid.cols)):
+            total = 0
+            for i, j in itertools.product(range(grid.height), range(grid.width)):
+                at = voxel_of(i, k, grid.rows, disparity, 1), voxel_of(j, l, grid.cols, disparity, 1)
+                inside = 0 <= at[0] < grid.height and 0 <= at[1] < grid.width
+                if inside and at[0] - r in reach and at[1] - c in reach:
+                    total += dense[k, l, i, j]
+            if total:
+                found.append(total)
+        return found
+
+    here = samples(row, col)
+    mean = np.mean(here)
+    rate = mean
+    for _ in range(200):  # m = r / (1 - exp(-r)) by fixed point
+        rate = mean * (1 - math.exp(-rate))
+    noise = mean * (1 + rate - mean) * (1 + 3 * math.sqrt(2 / (len(here) - 1)))
+    corner = [np.mean(samples(row + a, col + b)) for a, b in ((0, 0), (1, 1), (0, 1), (1, 0))]
+    slope2 = ((corner[0] - corner[1]) ** 2 + (corner[2] - corner[3]) ** 2) / 2
+    return mean, np.var(here, ddof=1), noise + slope2 * (tolerance**2 / 3 + 1 / 12)
+
+
+def test_the_threshold_is_that_of_a_slow_loop():
+    grid = unit_grid(3, 3, 14, 14)
+    rate = np.linspace(0.2, 0.6, 14)[:, None] * np.ones(14)
+    dense = np.random.default_rng(0).poisson(rate, size=grid.shape_KLHW)
+    maps = adaptive_threshold(PhotonCounts.from_dense(dense, grid), 1.0, 1, 2.0)
+    for row, col in ((6, 6), (7, 5)):
+        mean, variance, limit = threshold_twin(dense, grid, 1.0, 2.0, row, col)
+        # Maps are single precision.
+        assert maps["mean"][row, col] == pytest.approx(mean, rel=1e-6)
+        assert maps["variance"][row, col] == pytest.approx(variance, rel=1e-6)
+        assert maps["threshold"][row, col] == pytest.approx(limit, rel=1e-5)
+
+
+def test_basins_are_parted_by_ridges_and_small_ones_join_over_the_lowest():
+    edges = np.ones((3, 11))
+    edges[:, 4], edges[:, 8] = 9, 5  # basins of 4, 3 and 2 columns
+    bright = np.ones((3, 11), dtype=bool)
+    assert pieces_along_ridges(bright, edges, 1).max() == 3
+    pieces = pieces_along_ridges(bright, edges, 8)  # the last one, of 6 or 9 pixels, joins the middle
+    two = pieces_along_ridges(bright, edges, 10)
+    assert two.max() == 2
+    assert len(set(two[0, :4])) == 1
+    assert len(set(two[0, 5:])) == 1
+    assert pieces.max() in (2, 3)
+
+
+def test_what_is_dark_belongs_to_no_piece():
+    bright = np.zeros((6, 9), dtype=bool)
+    bright[1:5, 1:4] = bright[1:5, 5:8] = True
+    pieces = pieces_along_ridges(bright, np.ones((6, 9)), 100)
+    np.testing.assert_array_equal(pieces > 0, bright)
+    assert pieces.max() == 2  # no neighbour to join, however small
+    assert not pieces_along_ridges(np.zeros((2, 2), dtype=bool), np.ones((2, 2)), 1).any()
+
+
+def chain(heights):
+    """Pieces 1 .. N in a row, 2 px wide and 2 px high, with a border of each height between them."""
+    N = len(heights) + 1
+    pieces = np.repeat(np.arange(1, N + 1), 2)[None].repeat(2, axis=0).astype(np.int32)
+    edges = np.zeros(pieces.shape)
+    for border, height in enumerate(heights):
+        edges[:, 2 * border + 1 : 2 * border + 3] += height
+    return pieces, edges
+
+
+def test_planes_are_the_cheapest_of_all_cuts_of_the_tree():
+    # Merged in the order of the heights: (1 2), (3 4), then both. All cuts of that tree, by hand.
+    pieces, edges = chain([1, 3, 2])
+    leaves = [(1,), (2,), (3,), (4,)]
+    partitions = [
+        [(1, 2, 3, 4)],
+        [(1, 2), (3, 4)],
+        [leaves[0], leaves[1], (3, 4)],
+        [(1, 2), leaves[2], leaves[3]],
+        leaves,
+    ]
+    inner = {0: 0, 1: 1, 2: 2, 3: 2, 4: 3}
+    rng = np.random.default_rng(3)
+    for border_cost in (0.0, 0.3, 1.0):
+        for _ in range(40):
+            cost = rng.uniform(0, 4, size=(5, 3))
+            best = min(
+                (
+                    sum(cost[list(part)].sum(axis=0).min() for part in parts) + 2 * border_cost * inner[n],
+                    n,
+                )
+                for n, parts in enumerate(partitions)
+            )
+            expected = np.full(5, -1)
+            for part in partitions[best[1]]:
+                expected[list(part)] = cost[list(part)].sum(axis=0).argmin()
+            found = cheapest_planes(pieces, edges, cost, border_cost)
+            np.testing.assert_array_equal(found[1:], expected[1:])
+
+
+def test_the_entropy_of_edges_counts_how_many_pixels_share_them():
+    edges = np.zeros((3, 9, 9))
+    edges[0, 4, 4] = 7.0  # all in one pixel: 0 bits
+    edges[1, 4, 3:5] = 2.0  # two equal: 1 bit
+    regions = np.zeros((9, 9), dtype=np.int32)
+    regions[3:6, 3:6] = 1
+    entropies = edge_entropies(edges, regions, 1)
+    # The third plane has none: as disordered as can be, over the 5 x 5 pixels of the grown region.
+    np.testing.assert_allclose(entropies, [[0, 0, 0], [0, 1, np.log2(25)]], atol=1e-12)
+    np.testing.assert_array_equal(planes_of_least_entropy(entropies, regions, None, 3), [-1, 0])
+
+
+def test_probes_of_the_three_steps_stand_clear_of_the_requested_planes():
+    grid = unit_grid(5, 5, 8, 8)
+    planes = np.array([4 / 40, 4 / 58])
+    spread = 4 / with_probes(grid, planes, clear_px=14.0)
+    assert np.abs(spread[2:, None] - spread[:2]).min() > 14 - 1e-9
+    assert {26, 12, 72, 86} <= set(np.round(spread, 6))
+
+
+def touching(photons: float):
+    """Two textured squares side by side at different depths, the nearer one over the border of the other."""
+    from twins import bayer_photons, blocky_texture, patch_views, square_mask
+
+    grid = unit_grid(7, 7, 256, 256)
+    rng = np.random.default_rng(2)
+    near = patch_views(blocky_texture(rng, 80, 80), 90, 50, 7, grid)
+    far = patch_views(blocky_texture(rng, 80, 80), 90, 126, 3, grid)
+    rates = photons * np.where(near.any(axis=-1, keepdims=True), near, far)
+    counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=3), grid, cfa="GRBG")
+    near_mask = square_mask(grid, 90, 50, 80)
+    return counts, (1 / 7, 1 / 3), (near_mask, square_mask(grid, 90, 126, 80) & ~near_mask)
+
+
+def test_objects_that_touch_are_cut_apart():
+    counts, z_mm, masks = touching(0.06)
+    focus = pcii.segment(counts, z_mm, method="three-step")
+    for plane, own in enumerate(masks):
+        # Half of the far square's border is hidden from half of the views, 12 px wide of its 76.
+        assert intersection_over_union(focus.in_focus[plane], own) > 0.7

@@ -1,0 +1,308 @@
+"""Sections of dense views: sums and variances of the samples at each voxel, whatever the shifts."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from twins import colour_of, unit_grid, voxel_of
+
+from pcii.core.bayer import mosaic
+from pcii.core.errors import InputError
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.demosaicing import demosaic
+from pcii.sections.dense_sections import BATCH
+from pcii.sections.reconstruction import reconstruct
+
+patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
+
+
+def samples_twin(images: np.ndarray, grid, cfa: str | None, z_mm: float, subpixel: int = 1) -> dict:
+    """The samples that meet at each (row, column, colour), by loops."""
+    K, L, H, W, C = images.shape
+    meeting: dict[tuple[int, int, int], list[float]] = {}
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, subpixel)
+        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, subpixel)
+        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
+            for channel in range(C):
+                colour = channel if cfa is None else colour_of(i, j, cfa)
+                meeting.setdefault((row, col, colour), []).append(float(images[k, l, i, j, channel]))
+    return meeting
+
+
+class Reader:
+    """Views that are read one by one, as from disk."""
+
+    def __init__(self, images: np.ndarray) -> None:
+        self.images, self.shape, self.dtype = images, images.shape, images.dtype
+
+    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+        return self.images[index]
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    pitch=st.tuples(st.floats(0.3, 3), st.floats(0.3, 3)),
+    z=st.floats(0.3, 8),
+    cfa=patterns,
+    channels=st.sampled_from([1, 3]),
+    double=st.booleans(),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_sums_and_variances_are_those_of_the_samples(
+    cameras, pixels, pitch, z, cfa, channels, double, seed
+) -> None:
+    grid = unit_grid(*cameras, *pixels, pitch)
+    shape = (*grid.shape_KLHW, 1 if cfa else channels)
+    # Whole numbers of a few digits: their sums are exact in single precision too.
+    images = np.random.default_rng(seed).integers(0, 50, shape).astype(np.float64 if double else np.float32)
+    sections = reconstruct(Views(images, grid, cfa), z, variance=True)
+    expected = np.zeros((2, *sections.counts.shape[1:]))
+    for where, values in samples_twin(images, grid, cfa, z).items():
+        expected[0][where] = sum(values)
+        expected[1][where] = np.var(values, ddof=1) if len(values) > 1 else 0
+    assert sections.variance is not None
+    np.testing.assert_array_equal(sections.counts[0], expected[0])
+    np.testing.assert_allclose(sections.variance[0], expected[1], rtol=1e-5, atol=1e-9)
+    read = reconstruct(Views(Reader(images), grid, cfa), z, variance=True)
+    np.testing.assert_array_equal(read.counts, sections.counts)
+    assert read.variance is not None
+    np.testing.assert_allclose(read.variance, sections.variance, rtol=1e-5, atol=1e-9)
+    without = reconstruct(Views(images, grid, cfa), z)
+    np.testing.assert_array_equal(without.counts, sections.counts)
+    assert without.variance is None
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("spread", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_variance_survives_a_mean_of_a_million_deviations(cfa, spread, dtype) -> None:
+    grid = unit_grid(10, 10, 6, 6, (1.0, 1.0))
+    rng = np.random.default_rng(5)
+    images = (7 * (1 + spread * rng.standard_normal((*grid.shape_KLHW, 1)))).astype(dtype)
+    sections = reconstruct(Views(images.astype(np.float64), grid, cfa), 1e6, variance=True)
+    # At this depth nothing moves, so voxel (i, j) holds pixel (i, j) of every view.
+    exact = images[..., 0].astype(np.longdouble).reshape(100, 6, 6).var(axis=0, ddof=1)
+    assert sections.variance is not None
+    found = sections.variance[0].max(axis=-1)
+    np.testing.assert_allclose(found, exact.astype(float), rtol=1e-6)
+    if dtype == np.float32 and spread == 1e-6:  # the fault: mean of squares less square of mean
+        pixels = images[..., 0].reshape(100, 6, 6)
+        one_pass = (pixels**2).mean(axis=0) - pixels.mean(axis=0) ** 2
+        assert not np.allclose(one_pass * 100 / 99, exact.astype(float), rtol=0.5)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", [(0, 0), (2, 3), (5, 5)])
+@pytest.mark.parametrize("z", [0.4, 1.0, 100.0])
+def test_nan_is_found_wherever_it_is(bad, place, z) -> None:
+    grid = unit_grid(3, 3, 6, 6)
+    images = np.ones((*grid.shape_KLHW, 1), dtype=np.float32)
+    images[2, 0][place] = bad
+    for views in (images, Reader(images)):
+        with pytest.raises(InputError, match=r"view \(2, 0\) holds NaN or infinity"):
+            reconstruct(Views(views, grid), z, variance=True)
+
+
+def test_more_views_than_are_held_at_a_time() -> None:
+    grid = unit_grid(BATCH + 3, 2, 4, 5)
+    images = np.random.default_rng(1).random((*grid.shape_KLHW, 3))
+    for z in (1.0, 2.7):
+        held, read = (reconstruct(Views(v, grid), z, variance=True) for v in (images, Reader(images)))
+        np.testing.assert_allclose(read.counts, held.counts, rtol=1e-14)
+        assert held.variance is not None
+        assert read.variance is not None
+        np.testing.assert_allclose(read.variance, held.variance, rtol=1e-12)
+
+
+# Depths whose disparity is exact, so that the twin's order of operations cannot matter.
+exact_depths = st.sampled_from([0.25, 0.5, 1.0, 2.0, 4.0])
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
+    pixels=st.tuples(st.integers(1, 6), st.integers(1, 6)),
+    z=exact_depths,
+    cfa=patterns,
+    subpixel=st.integers(1, 3),
+    most=st.sampled_from([1, 3, 10**6]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_variances_of_counts_and_on_finer_voxels_are_those_of_the_samples(
+    cameras, pixels, z, cfa, subpixel, most, seed
+) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
+    samples = samples_twin(dense[..., None], grid, cfa, z, subpixel)
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    views = Views(dense[..., None].astype(np.float32), grid, cfa)
+    for data in (bright, sparse, views):
+        sections = reconstruct(data, z, subpixel=subpixel, variance=True)
+        expected = np.zeros(sections.counts.shape[1:])
+        for voxel, values in samples.items():
+            expected[voxel] = np.var(values, ddof=1) if len(values) > 1 else 0
+        assert sections.variance is not None
+        np.testing.assert_allclose(sections.variance[0], expected, rtol=1e-6, atol=1e-9 * most)
+        without = reconstruct(data, z, subpixel=subpixel)
+        np.testing.assert_allclose(sections.counts, without.counts, rtol=1e-12)
+
+
+def test_variance_of_counts_survives_a_mean_of_a_million_deviations() -> None:
+    grid = unit_grid(10, 10, 4, 4)
+    dense = np.random.default_rng(6).integers(10**6, 10**6 + 3, grid.shape_KLHW)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid), 1e6, variance=True)
+    assert sections.variance is not None
+    exact = dense.reshape(100, 4, 4).astype(np.longdouble).var(axis=0, ddof=1)
+    np.testing.assert_allclose(sections.variance[0, ..., 0], exact.astype(float), rtol=1e-12)
+    bright = np.random.default_rng(0).poisson(3e6, (10, 10, 8, 8))
+    found = reconstruct(PhotonCounts.from_dense(bright, unit_grid(10, 10, 8, 8)), 1e9, variance=True)
+    assert found.variance is not None
+    assert not found.variance.flags.writeable
+    expected = bright.reshape(100, 8, 8).var(axis=0, ddof=1)
+    np.testing.assert_allclose(found.variance[0, ..., 0], expected, rtol=1e-9)
+    with pytest.raises(InputError, match="variance: the counts are too large"):
+        reconstruct(PhotonCounts.from_dense(dense * 2**18, grid), 1e6, variance=True)
+
+
+# Bilinear shifts
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
+    pixels=st.tuples(st.integers(1, 7), st.integers(1, 7)),
+    pitch=st.tuples(st.sampled_from([0.25, 0.75, 1.5, 3.0]), st.sampled_from([0.25, 1.25, 2.0])),
+    cfa=patterns,
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_bilinear_shifts_share_each_sample_among_four_voxels(cameras, pixels, pitch, cfa, seed) -> None:
+    grid = unit_grid(*cameras, *pixels, pitch)
+    K, L, H, W = grid.shape_KLHW
+    images = np.random.default_rng(seed).integers(0, 50, (K, L, H, W, 1)).astype(np.float32)
+    C = 3 if cfa else 1
+    sums, shares = np.zeros((H + 99, W + 99, C)), np.zeros((H + 99, W + 99, C))
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row, col = i + (k - (K - 1) / 2) * pitch[1], j + (l - (L - 1) / 2) * pitch[0]
+        top, left = int(np.floor(row)), int(np.floor(col))
+        for a, b in np.ndindex(2, 2):
+            share = abs(1 - a - (row - top)) * abs(1 - b - (col - left))
+            voxel = (top + a, left + b, colour_of(i, j, cfa))  # what is beside the section goes to the rest
+            sums[voxel] += share * images[k, l, i, j, 0]
+            shares[voxel] += share
+    for views in (images, Reader(images)):
+        sections = reconstruct(Views(views, grid, cfa), 1.0, shifts="bilinear")
+        np.testing.assert_allclose(sections.counts[0], sums[:H, :W], rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(sections.coverage[0], shares[:H, :W], rtol=1e-12, atol=1e-12)
+    whole = unit_grid(*cameras, *pixels, (2.0, 4.0))  # an even shift, of each camera of an odd or even grid
+    for z in (1.0, 0.5):
+        near, shared = (
+            reconstruct(Views(images, whole, cfa), z, shifts=shifts) for shifts in ("nearest", "bilinear")
+        )
+        np.testing.assert_array_equal(near.counts, shared.counts)
+        np.testing.assert_array_equal(near.coverage, shared.coverage)
+
+
+def test_a_slope_is_exact_with_bilinear_shifts_only() -> None:
+    # The plane's brightness rises evenly: what lies between two pixels is their weighted mean.
+    grid = unit_grid(4, 6, 30, 40, (1.0, 1.3))  # half pixels to the side, which rounding makes whole ones
+    i, j = np.mgrid[:30, :40]
+    views = np.array(
+        [[2.0 * (i + (k - 1.5) * 1.3) + 5.0 * (j + l - 2.5) for l in range(6)] for k in range(4)]
+    )
+    sections = reconstruct(Views(views[..., None], grid), 1.0, shifts="bilinear")
+    inner = (0, slice(5, 25), slice(5, 35), 0)
+    np.testing.assert_allclose(sections.estimate[inner], (2.0 * i + 5.0 * j)[inner[1:3]], rtol=1e-12)
+    nearest = reconstruct(Views(views[..., None], grid), 1.0)
+    assert np.abs(nearest.estimate[inner] - (2.0 * i + 5.0 * j)[inner[1:3]]).max() > 0.1
+
+
+# Even shifts: the paper's order
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    z=st.floats(0.2, 8),
+    cfa=st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG"]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=100, deadline=None)
+def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    K, L, H, W = grid.shape_KLHW
+    dense = np.random.default_rng(seed).poisson(1.0, grid.shape_KLHW)
+    sums, samples = np.zeros((H, W), int), np.zeros((H, W), int)
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row = i + 2 * int(np.floor((k - (K - 1) / 2) / z / 2 + 0.5))
+        col = j + 2 * int(np.floor((l - (L - 1) / 2) / z / 2 + 0.5))
+        if 0 <= row < H and 0 <= col < W:
+            assert colour_of(i, j, cfa) == colour_of(row, col, cfa)
+            sums[row, col] += dense[k, l, i, j]
+            samples[row, col] += 1
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    for data in (bright, sparse, Views(dense[..., None].astype(np.float64), grid, cfa)):
+        sections = reconstruct(data, z, shifts="even")
+        assert sections.cfa == cfa
+        np.testing.assert_array_equal(sections.counts[0, ..., 0], sums)
+        np.testing.assert_array_equal(sections.coverage[0, ..., 0], samples)
+
+
+def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
+    grid = unit_grid(3, 3, 24, 24, (2.0, 2.0))
+    flat = np.broadcast_to([0.8, 0.3, 0.1], (*grid.shape_KLHW, 3))
+    sections = reconstruct(Views(mosaic(flat, "GRBG")[..., None], grid, "GRBG"), 1.0, shifts="even")
+    assert sections.cfa == "GRBG"
+    colours = demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)
+    np.testing.assert_allclose(colours, flat[0, 0], rtol=1e-12)
+
+
+CLASHES = [
+    ({"shifts": "cubic"}, "shifts: use 'nearest', 'bilinear' or 'even'"),
+    ({"shifts": "even", "subpixel": 2}, "shifts: 'even' is for whole pixels"),
+    ({"shifts": "bilinear", "variance": True}, "variance: samples that are shared"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), CLASHES)
+def test_options_that_do_not_go_together_are_refused(options, words) -> None:
+    grid = unit_grid(2, 2, 4, 4)
+    with pytest.raises(InputError, match=words):
+        reconstruct(Views(np.ones((2, 2, 4, 4, 1)), grid, "GRBG"), 1.0, **options)
+
+
+def test_neither_counts_are_interpolated_nor_colourless_data_demosaiced() -> None:
+    grid = unit_grid(2, 2, 4, 4)
+    counts = PhotonCounts.from_dense(np.ones((2, 2, 4, 4), dtype=np.int64), grid)
+    with pytest.raises(InputError, match="photon counts are never interpolated"):
+        reconstruct(counts, 1.0, shifts="bilinear")
+    with pytest.raises(InputError, match="'even' is for Bayer mosaics"):
+        reconstruct(counts, 1.0, shifts="even")
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 5), st.integers(1, 5)),
+    pixels=st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    z=st.floats(0.3, 8),
+    cfa=patterns,
+    most=st.sampled_from([1, 255, 65_535, 10**9]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=150, deadline=None)
+def test_bright_counts_are_the_same_as_images_and_as_photons(cameras, pixels, z, cfa, most, seed) -> None:
+    grid = unit_grid(*cameras, *pixels)
+    kind = {1: np.uint8, 255: np.uint8, 65_535: np.uint16, 10**9: np.int64}[most]
+    dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True).astype(kind)
+    bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
+    events = bright.events
+    sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
+    as_images, as_photons = reconstruct(bright, z), reconstruct(sparse, z)
+    np.testing.assert_array_equal(as_images.counts, as_photons.counts)
+    np.testing.assert_array_equal(as_images.coverage, as_photons.coverage)

@@ -1,0 +1,272 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from twins import unit_grid, voxel_of
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.photon_statistics import (
+    entropy_bits,
+    pooled_estimate,
+    region_entropy_bits,
+    truncated_poisson_variance,
+    view_samples,
+)
+from pcii.sections.reconstruction import reconstruct
+
+PAPER_RATE = 1000 * 3.4e-4
+
+# Entropy, Eq. 9
+
+
+def test_an_empty_region_has_no_entropy():
+    assert entropy_bits(np.array([]), top=1.0) == 0.0
+
+
+@pytest.mark.parametrize("level", [0.0, 0.3, 1.0])
+def test_one_grey_level_has_no_entropy(level):
+    entropy = entropy_bits(np.full(7, level), top=1.0)
+    assert entropy == 0.0
+    assert not np.signbit(entropy)
+
+
+def test_a_dark_picture_has_no_entropy():
+    assert entropy_bits(np.zeros(5), top=0.0) == 0.0
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_equally_many_pixels_of_each_level_have_the_most_entropy(bits):
+    levels = (np.arange(2**bits) + 0.5) / 2**bits
+    # Exact: shares are powers of two, and so are their logarithms whole numbers.
+    assert entropy_bits(np.repeat(levels, 3), top=1.0) == bits
+
+
+def test_entropy_of_one_in_four_by_hand():
+    values = np.array([0.0, 1.0, 1.0, 1.0])
+    expected = 0.25 * 2 + 0.75 * math.log2(4 / 3)
+    assert entropy_bits(values, top=1.0) == pytest.approx(expected, rel=1e-15)  # two additions
+
+
+def test_there_are_256_levels_up_to_the_top():
+    same, apart = np.array([0.5, 1.4]), np.array([0.5, 1.5])
+    assert entropy_bits(same / 256 * 8, top=8.0) == 1.0  # levels 0 and 1
+    assert entropy_bits(apart / 512 * 8, top=8.0) == 0.0  # both level 0
+    assert entropy_bits(np.array([8.0, 255.5 / 256 * 8]), top=8.0) == 0.0  # the top is level 255
+
+
+@given(values=st.lists(st.floats(0, 1), min_size=1, max_size=40), scale=st.sampled_from([0.25, 2.0, 1024.0]))
+@settings(max_examples=100, deadline=None)
+def test_entropy_knows_no_order_and_no_scale_and_stays_in_bounds(values, scale):
+    a = np.array(values)
+    entropy = entropy_bits(a, top=1.0)
+    assert entropy_bits(a[::-1].reshape(1, -1), top=1.0) == entropy
+    assert entropy_bits(a * scale, top=scale) == entropy
+    assert 0 <= entropy <= math.log2(len(values)) + 1e-12  # a sum of at most 40 terms
+
+
+def test_region_entropy_is_the_mean_of_its_colours_inside_the_region():
+    pooled = np.zeros((1, 4, 2))
+    pooled[0, :, 0] = [0.1, 0.9, 0.5, 0.7]
+    region = np.array([[True, True, False, False]])
+    assert region_entropy_bits(pooled, region, np.array([1.0, 1.0])) == (1.0 + 0.0) / 2
+
+
+# Pooling
+
+
+@pytest.mark.parametrize("window", [1, 3, 5])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_a_pooled_voxel_is_photons_over_samples_of_its_window(window, cfa):
+    grid = unit_grid(3, 2, 8, 9, pitch_mm=(2.0, 1.0))
+    dense = np.random.default_rng(3).poisson(0.3, size=grid.shape_KLHW)
+    sections = reconstruct(PhotonCounts.from_dense(dense, grid, cfa=cfa), [1.0, 2.0])
+    pooled = pooled_estimate(sections, window)
+    half = window // 2
+    for z, i, j, c in np.ndindex(*sections.counts.shape):
+        here = (z, slice(max(i - half, 0), i + half + 1), slice(max(j - half, 0), j + half + 1), c)
+        samples = sections.coverage[here].sum()
+        expected = sections.counts[here].sum() / samples if samples else 0.0
+        # Running sums of a few dozen terms below 100: 1e-13 relative, and 1e-10 leaves room.
+        assert pooled[z, i, j, c] == pytest.approx(expected, rel=1e-10, abs=0)
+
+
+def test_pooling_leaves_the_dark_exactly_dark():
+    grid = unit_grid(2, 2, 20, 20)
+    dense = np.zeros(grid.shape_KLHW, dtype=int)
+    # Running sums carry a residue of bright and unequal numbers into the dark beside them.
+    dense[..., :6, :6] = np.random.default_rng(0).integers(1, 10**9, size=(2, 2, 6, 6))
+    pooled = pooled_estimate(reconstruct(PhotonCounts.from_dense(dense, grid), 1.0), 3)
+    assert not pooled[0, 8:, :].any()
+    assert not pooled[0, :, 8:].any()
+    assert pooled[0, :5, :5].all()
+
+
+# Samples of the views, Eq. 7
+
+
+def view_samples_twin(dense: np.ndarray, grid: CameraGrid, cell_px: int, window: int) -> list[np.ndarray]:
+    """Number, mean and variance of the non-zero samples at z = 1 mm, one view and one pixel at a time."""
+    K, L, H, W = grid.shape_KLHW
+    shape = (math.ceil(H / cell_px), math.ceil(W / cell_px))
+    samples: list[list[list[int]]] = [[[] for _ in range(shape[1])] for _ in range(shape[0])]
+    for k in range(K):
+        for l in range(L):
+            cells = np.zeros(shape, dtype=int)
+            for i in range(H):
+                for j in range(W):
+                    row = voxel_of(i, k, K, grid.pitch_mm[1], 1)
+                    col = voxel_of(j, l, L, grid.pitch_mm[0], 1)
+                    if 0 <= row < H and 0 <= col < W:
+                        cells[row // cell_px, col // cell_px] += dense[k, l, i, j]
+            for a in range(shape[0]):
+                for b in range(shape[1]):
+                    # An even window has its spare cell above and to the left.
+                    top, left = a - window // 2, b - window // 2
+                    part = cells[max(top, 0) : top + window, max(left, 0) : left + window]
+                    if part.sum():
+                        samples[a][b].append(int(part.sum()))
+    number, mean, variance = np.zeros(shape, dtype=int), np.zeros(shape), np.zeros(shape)
+    for a in range(shape[0]):
+        for b in range(shape[1]):
+            these = samples[a][b]
+            number[a, b] = len(these)
+            mean[a, b] = np.mean(these) if these else 0
+            variance[a, b] = np.var(these, ddof=1) if len(these) > 1 else 0
+    return [number, mean, variance]
+
+
+@pytest.mark.parametrize(("cell_px", "window"), [(1, 1), (2, 2), (4, 1), (2, 3)])
+@pytest.mark.parametrize("pitch", [(1.0, 2.0), (0.5, 1.5)])
+def test_samples_of_the_views_are_those_of_a_plain_loop(cell_px, window, pitch):
+    grid = unit_grid(3, 4, 9, 10, pitch_mm=pitch)
+    dense = np.random.default_rng(6).poisson(0.2, size=grid.shape_KLHW)
+    got = view_samples(PhotonCounts.from_dense(dense, grid), 1.0, cell_px=cell_px, window_cells=window)
+    number, mean, variance = view_samples_twin(dense, grid, cell_px, window)
+    np.testing.assert_array_equal(got.number, number)
+    np.testing.assert_array_equal(got.mean, mean)
+    np.testing.assert_allclose(got.variance, variance, rtol=1e-13, atol=1e-14)  # the twin rounds
+
+
+def test_views_that_agree_at_the_planted_shift_have_no_variance_there():
+    grid = unit_grid(1, 3, 8, 16, pitch_mm=(2.0, 1.0))
+    dense = np.zeros(grid.shape_KLHW, dtype=int)
+    for l in range(3):
+        dense[0, l, 4, 8 - 2 * (l - 1)] = 5  # further right sees it further left
+    counts = PhotonCounts.from_dense(dense, grid)
+    focused = view_samples(counts, 1.0, cell_px=1, window_cells=1)
+    assert (focused.number[4, 8], focused.mean[4, 8], focused.variance[4, 8]) == (3, 5.0, 0.0)
+    assert focused.number.sum() == 3
+    assert view_samples(counts, 2.0, cell_px=1, window_cells=1).number.max() == 1
+
+
+def test_the_variance_of_huge_counts_does_not_cancel():
+    grid = unit_grid(1, 3, 1, 1)
+    dense = np.array([10**8, 10**8 + 1, 10**8 + 2]).reshape(1, 3, 1, 1)
+    far = 1e9  # no shift
+    samples = view_samples(PhotonCounts.from_dense(dense, grid), far, cell_px=1, window_cells=1)
+    assert (samples.mean[0, 0], samples.variance[0, 0]) == (10**8 + 1, 1.0)
+
+
+def test_no_photons_have_no_samples():
+    grid = unit_grid(2, 2, 5, 5)
+    counts = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid)
+    samples = view_samples(counts, 1.0, cell_px=4, window_cells=4)
+    assert not samples.number.any()
+    assert not samples.mean.any()
+    assert not samples.variance.any()
+
+
+# What Poisson noise alone would give
+
+
+def non_zero_moments(rate: float) -> tuple[float, float, float]:
+    """P(C >= 1), mean and variance of the non-zero samples, by adding up the probabilities."""
+    last = int(rate + 40 * math.sqrt(rate) + 40)
+    p = [math.exp(c * math.log(rate) - rate - math.lgamma(c + 1)) for c in range(1, last)]
+    seen = math.fsum(p)
+    mean = math.fsum(c * q for c, q in enumerate(p, start=1)) / seen
+    variance = math.fsum((c - mean) ** 2 * q for c, q in enumerate(p, start=1)) / seen
+    return seen, mean, variance
+
+
+@pytest.mark.parametrize("rate", [1e-4, 0.01, 0.34, 1.0, 1.59, 2.5, 7.0, 40.0, 300.0])
+def test_the_truncated_variance_is_that_of_the_probabilities(rate):
+    _, mean, variance = non_zero_moments(rate)
+    # m (1 + r - m) loses 1 / r of the 16 digits at small rates, and the mean itself is one rounding off.
+    tolerance = 1e-14 / min(rate, 1.0) ** 2 + 1e-12
+    assert truncated_poisson_variance(np.array(mean)) == pytest.approx(variance, rel=tolerance)
+
+
+def test_the_truncated_variance_is_not_that_of_all_samples():
+    _, mean, _ = non_zero_moments(PAPER_RATE)
+    # With the zeros the variance is the rate, 0.34; without them half of it, to first order.
+    assert truncated_poisson_variance(np.array(mean)) == pytest.approx(PAPER_RATE / 2, rel=PAPER_RATE / 3)
+
+
+def test_a_mean_of_one_is_the_limit_of_no_light():
+    np.testing.assert_array_equal(truncated_poisson_variance(np.array([0.0, 0.5, 1.0])), 0.0)
+
+
+def test_bright_samples_are_never_zero_so_their_variance_is_their_mean():
+    # exp(-50) is below a double's precision; 1e-9 leaves room for Newton's last step.
+    np.testing.assert_allclose(truncated_poisson_variance(np.array([50.0, 1e4])), [50.0, 1e4], rtol=1e-9)
+
+
+@given(st.lists(st.floats(1.001, 1e3), min_size=2, max_size=10))
+@settings(max_examples=100, deadline=None)
+def test_the_truncated_variance_grows_with_the_mean_and_stays_below_it(means):
+    m = np.sort(np.array(means))
+    variance = truncated_poisson_variance(m)
+    assert np.all(np.diff(variance) >= -1e-9 * m[1:])
+    assert np.all(variance <= m * (1 + 1e-9))
+    assert np.all(variance > 0)
+
+
+def test_the_papers_chance_of_two_photons_is_0_0462():
+    seen, mean, _ = non_zero_moments(PAPER_RATE)
+    two_or_more = seen - PAPER_RATE * math.exp(-PAPER_RATE)
+    assert two_or_more == pytest.approx(0.0462, abs=0.5e-4)  # half a unit of the paper's last digit
+    assert mean == pytest.approx(PAPER_RATE / seen, rel=1e-12)  # one division
+
+
+def test_voxels_of_a_section_hold_two_photons_as_often_as_the_paper_says():
+    grid = unit_grid(1, 1, 300, 300)
+    dense = np.random.default_rng(11).poisson(PAPER_RATE, size=grid.shape_KLHW)
+    section = reconstruct(PhotonCounts.from_dense(dense, grid), 1.0).counts
+    error = math.sqrt(0.0462 * (1 - 0.0462) / section.size)
+    assert (section >= 2).mean() == pytest.approx(0.0462, abs=4 * error)
+    # The planted fault: the same light, but every photon counted twice.
+    doubled = np.random.default_rng(11).poisson(PAPER_RATE / 2, size=dense.shape) * 2
+    assert (doubled >= 2).mean() != pytest.approx(0.0462, abs=4 * error)
+
+
+def variance_excess(dense: np.ndarray, grid: CameraGrid) -> tuple[float, float]:
+    """Mean and standard error of variance over its Poisson expectation at rate 0.34, over the cells."""
+    samples = view_samples(PhotonCounts.from_dense(dense, grid), 1e9, cell_px=4, window_cells=1)
+    _, _, expected = non_zero_moments(PAPER_RATE)
+    ratio = samples.variance[samples.number > 1] / expected
+    return float(ratio.mean()), float(ratio.std() / math.sqrt(ratio.size))
+
+
+def test_samples_of_a_flat_scene_have_the_variance_of_poisson_noise():
+    grid = unit_grid(8, 8, 80, 80)
+    rng = np.random.default_rng(5)
+    flat = rng.poisson(PAPER_RATE / 16, size=grid.shape_KLHW)  # 4 x 4 pixels a cell
+    mean, error = variance_excess(flat, grid)
+    assert abs(mean - 1) < 4 * error  # the variance is unbiased for any number of samples; 400 cells
+    # The planted fault: views that see different things, half of them twice as much.
+    brighter = np.where(np.arange(8) % 2, 1.6, 0.4)[:, None, None, None]
+    uneven = rng.poisson(PAPER_RATE / 16 * brighter, size=grid.shape_KLHW)
+    mean, error = variance_excess(uneven, grid)
+    assert mean - 1 > 4 * error
+
+
+def test_events_know_the_colour_of_their_pixel():
+    grid = unit_grid(1, 1, 2, 2)
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid, cfa="GRBG")
+    assert counts.event_colours.tolist() == [1, 0, 2, 1]
+    mono = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    assert mono.event_colours.tolist() == [0, 0, 0, 0]

@@ -1,0 +1,383 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from twins import bayer_photons, blocky_texture, section_twin, unit_grid
+
+from pcii.core.bayer import PATTERNS, mosaic
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.errors import InputError
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.reconstruction import reconstruct, reconstruct_each
+
+patterns = st.sampled_from([*PATTERNS, None])
+# Depths whose disparity is exact, so that the twin's order of operations cannot matter.
+depths = st.lists(st.sampled_from([0.25, 0.5, 1.0, 2.0, 4.0]), min_size=1, max_size=2)
+grids = st.builds(
+    unit_grid,
+    st.integers(1, 4),
+    st.integers(1, 4),
+    st.integers(1, 6),
+    st.integers(1, 6),
+    st.tuples(st.floats(0.01, 4), st.floats(0.01, 4)),
+)
+
+
+def random_counts(grid: CameraGrid, seed: int, rate: float = 2.0) -> np.ndarray:
+    return np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
+
+
+def photons(dense: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> PhotonCounts:
+    return PhotonCounts.from_dense(dense, grid, cfa=cfa)
+
+
+# Against the formula
+
+
+@given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
+@settings(max_examples=150, deadline=None)
+def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
+    dense = random_counts(grid, seed)
+    sections = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
+    total, coverage = section_twin(dense, grid, cfa, z, subpixel)
+    np.testing.assert_array_equal(sections.counts, total)
+    np.testing.assert_array_equal(sections.coverage, coverage)
+    assert sections.counts.dtype.kind == "i"
+    mean = [t / c if c else 0.0 for t, c in zip(total.ravel(), coverage.ravel(), strict=True)]
+    np.testing.assert_array_equal(sections.estimate.ravel(), mean)
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1, 1), (1, 5, 4, 7), (5, 1, 7, 4), (3, 3, 5, 5), (2, 4, 6, 4)])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("subpixel", [1, 2, 3])
+def test_sections_are_eq_3_for_grids_of_every_kind(shape, cfa, subpixel):
+    grid = unit_grid(*shape, pitch_mm=(1.7, 0.6))
+    dense = random_counts(grid, seed=1)
+    sections = reconstruct(photons(dense, grid, cfa), [0.5, 1, 2], subpixel=subpixel)
+    total, coverage = section_twin(dense, grid, cfa, [0.5, 1, 2], subpixel)
+    np.testing.assert_array_equal(sections.counts, total)
+    np.testing.assert_array_equal(sections.coverage, coverage)
+
+
+@given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
+@settings(max_examples=100, deadline=None)
+def test_radiance_is_summed_as_counts_are(grid, cfa, z, subpixel, seed):
+    dense = random_counts(grid, seed)  # whole numbers, whose float64 sums are exact
+    sections = reconstruct(Views(dense[..., None].astype(float), grid, cfa), z, subpixel=subpixel)
+    total, coverage = section_twin(dense, grid, cfa, z, subpixel)
+    np.testing.assert_array_equal(sections.counts, total)
+    np.testing.assert_array_equal(sections.coverage, coverage)
+
+
+def test_the_view_from_the_right_moves_right_by_hand():
+    grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # at z = 1 the shifts are -1 and +1
+    dense = np.array([[[[0, 1, 2, 3]], [[4, 5, 6, 7]]]])
+    sections = reconstruct(photons(dense, grid), 1.0)
+    assert sections.counts[0, 0, :, 0].tolist() == [1, 2 + 4, 3 + 5, 6]
+    assert sections.coverage[0, 0, :, 0].tolist() == [1, 2, 2, 1]
+    assert sections.estimate[0, 0, :, 0].tolist() == [1.0, 3.0, 4.0, 6.0]
+
+
+def test_the_view_from_below_moves_down_by_hand():
+    grid = unit_grid(2, 1, 4, 1, pitch_mm=(1.0, 2.0))
+    dense = np.array([[[[0], [1], [2], [3]]], [[[4], [5], [6], [7]]]])
+    assert reconstruct(photons(dense, grid), 1.0).counts[0, :, 0, 0].tolist() == [1, 2 + 4, 3 + 5, 6]
+
+
+def test_colours_never_mix_by_hand():
+    grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # odd shifts: green lands on red
+    dense = np.array([[[[1, 10, 2, 20]], [[3, 30, 4, 40]]]])  # G R G R
+    red, green, blue = np.moveaxis(reconstruct(photons(dense, grid, "GRBG"), 1.0).counts[0, 0], -1, 0)
+    assert red.tolist() == [10, 0, 20 + 30, 0]
+    assert green.tolist() == [0, 2 + 3, 0, 4]
+    assert blue.tolist() == [0, 0, 0, 0]
+
+
+def test_a_photon_goes_to_its_fine_voxel_by_hand():
+    grid = unit_grid(1, 2, 1, 3, pitch_mm=(0.5, 1.0))  # shifts -1/4 and +1/4
+    dense = np.array([[[[0, 1, 0]], [[0, 1, 0]]]])
+    sections = reconstruct(photons(dense, grid), 1.0, subpixel=2)
+    # Columns: centres at 1.5 -+ 0.25 pixels, floor(2.5) = 2 and floor(3.5) = 3. Row: floor(0.5 x 2) = 1.
+    assert sections.counts[0, :, :, 0].tolist() == [[0, 0, 0, 0, 0, 0], [0, 0, 1, 1, 0, 0]]
+
+
+# Counts stay counts
+
+
+@given(
+    K=st.integers(1, 4),
+    L=st.integers(1, 4),
+    cfa=patterns,
+    z=st.floats(1.0, 50.0),
+    subpixel=st.integers(1, 3),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=100, deadline=None)
+def test_no_photon_is_lost_or_doubled_inside_the_frame(K, L, cfa, z, subpixel, seed):
+    grid = unit_grid(K, L, 16, 17, pitch_mm=(2.0, 3.0))
+    margin = 6  # the largest shift is 3/2 x 3 px at z = 1, and a rounding
+    dense = np.zeros(grid.shape_KLHW, dtype=int)
+    inner = (..., slice(margin, -margin), slice(margin, -margin))
+    dense[inner] = random_counts(grid, seed)[inner]
+    section = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel).counts[0]
+    assert section.sum() == dense.sum()
+    if cfa is not None:
+        for colour, cell in enumerate("RGB"):
+            sites = np.array([[cfa[2 * (i % 2) + j % 2] == cell for j in range(17)] for i in range(16)])
+            assert section[..., colour].sum() == dense[..., sites].sum()
+
+
+@given(
+    pitch=st.tuples(st.integers(1, 64), st.integers(1, 64)),
+    cfa=patterns,
+    subpixel=st.sampled_from([2, 3, 5]),
+    seed=st.integers(0, 999),
+)
+@settings(max_examples=60, deadline=None)
+def test_fine_voxels_of_a_pixel_add_up_to_its_coarse_voxel(pitch, cfa, subpixel, seed):
+    # Shifts in sixteenths of a pixel are exact, so that both floors see the same number.
+    grid = unit_grid(3, 4, 6, 7, pitch_mm=(pitch[0] / 16, pitch[1] / 16))
+    counts = photons(random_counts(grid, seed), grid, cfa)
+    coarse, fine = reconstruct(counts, 1.0), reconstruct(counts, 1.0, subpixel=subpixel)
+    for name in ("counts", "coverage"):
+        blocks = getattr(fine, name)[0].reshape(6, subpixel, 7, subpixel, -1)
+        np.testing.assert_array_equal(blocks.sum(axis=(1, 3)), getattr(coarse, name)[0])
+
+
+@given(grid=grids, cfa=patterns, z=depths, seed=st.integers(0, 999))
+@settings(max_examples=50, deadline=None)
+def test_sections_of_a_sum_are_the_sum_of_sections(grid, cfa, z, seed):
+    a, b = random_counts(grid, seed), random_counts(grid, seed + 1)
+    parts = [reconstruct(photons(dense, grid, cfa), z).counts for dense in (a, b, a + 3 * b)]
+    np.testing.assert_array_equal(parts[0] + 3 * parts[1], parts[2])
+
+
+@given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 2), seed=st.integers(0, 999))
+@settings(max_examples=50, deadline=None)
+def test_events_and_dense_counts_give_the_same_sections(grid, cfa, z, subpixel, seed):
+    dense = random_counts(grid, seed, rate=0.3)
+    k, l, i, j = np.nonzero(dense)
+    sparse = PhotonCounts.from_events(k, l, i, j, dense[k, l, i, j], grid, cfa=cfa)
+    one = reconstruct(sparse, z, subpixel=subpixel)
+    other = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
+    np.testing.assert_array_equal(one.counts, other.counts)
+    np.testing.assert_array_equal(one.coverage, other.coverage)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.uint32, np.int64])
+def test_the_largest_counts_of_a_dtype_add_up_exactly(dtype):
+    grid = unit_grid(4, 4, 5, 5)
+    most = min(int(np.iinfo(dtype).max), 10**9 + 1)  # beyond float32, and 16 of them beyond uint32
+    sections = reconstruct(photons(np.full(grid.shape_KLHW, most, dtype=dtype), grid, "GRBG"), [1.0, 2.0])
+    np.testing.assert_array_equal(sections.counts, sections.coverage.astype(object) * most)
+    assert sections.counts.max() >= 4 * most
+    assert set(np.unique(sections.estimate)) <= {0.0, float(most)}
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_views_normalisation_divides_by_the_number_of_cameras(cfa):
+    grid = unit_grid(2, 3, 6, 6, pitch_mm=(1.0, 1.0))
+    counts = photons(random_counts(grid, seed=2), grid, cfa)
+    paper = reconstruct(counts, 1.0, normalisation="views")
+    np.testing.assert_array_equal(paper.estimate, paper.counts / 6)
+    assert cfa is None or paper.coverage.max() < 6  # no voxel has one colour from all cameras here
+
+
+def test_views_normalisation_darkens_the_border_and_overlap_does_not():
+    grid = unit_grid(2, 3, 6, 6, pitch_mm=(2.0, 2.0))
+    counts = photons(np.full(grid.shape_KLHW, 3), grid)
+    paper, ours = (reconstruct(counts, 1.0, normalisation=name).estimate[0] for name in ("views", "overlap"))
+    assert set(ours.ravel()) == {3.0}
+    assert paper[3, 3, 0] == 3.0
+    assert paper[0, 0, 0] == 3.0 * 2 / 6  # only cameras (0, 0) and (0, 1) reach the corner
+
+
+def test_a_streamed_stack_is_the_stack():
+    grid = unit_grid(3, 3, 8, 8)
+    counts = PhotonCounts.from_dense(random_counts(grid, 4), grid, cfa="GRBG")
+    z = [0.7, 1.0, 3.0]
+    whole, parts = reconstruct(counts, z), list(reconstruct_each(counts, z))
+    assert [float(part.z_mm[0]) for part in parts] == z
+    np.testing.assert_array_equal(np.concatenate([part.counts for part in parts]), whole.counts)
+    np.testing.assert_array_equal(np.concatenate([part.coverage for part in parts]), whole.coverage)
+
+
+def test_planes_do_not_influence_each_other():
+    grid = unit_grid(3, 3, 7, 7)
+    counts = photons(random_counts(grid, 5), grid, "BGGR")
+    together = reconstruct(counts, [2.0, 0.5, 2.0])
+    for plane, z in enumerate([2.0, 0.5, 2.0]):
+        alone = reconstruct(counts, z)
+        np.testing.assert_array_equal(together.counts[plane], alone.counts[0])
+        np.testing.assert_array_equal(together.coverage[plane], alone.coverage[0])
+
+
+# Defined answers at the edges
+
+
+@pytest.mark.parametrize("bad", [0, -540, float("nan"), float("inf"), [], [540, 0], None])
+def test_a_depth_that_cannot_be_is_refused(bad):
+    grid = unit_grid(1, 1, 2, 2)
+    with pytest.raises(InputError, match=r"^z_mm: "):
+        reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), bad)
+
+
+BAD_DIVISIONS: list[Any] = [0, -1, 1.0, True, None, "2"]
+
+
+@pytest.mark.parametrize("bad", BAD_DIVISIONS)
+def test_a_subpixel_division_that_cannot_be_is_refused(bad):
+    grid = unit_grid(1, 1, 2, 2)
+    with pytest.raises(InputError, match=r"^subpixel: "):
+        reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), 1.0, subpixel=bad)
+
+
+def test_a_subpixel_division_may_come_from_an_array():
+    counts = photons(np.ones((1, 1, 2, 2), dtype=int), unit_grid(1, 1, 2, 2))
+    assert reconstruct(counts, 1.0, subpixel=np.arange(3)[2]).counts.shape == (1, 4, 4, 1)
+
+
+def test_an_unknown_normalisation_is_refused():
+    grid, other = unit_grid(1, 1, 2, 2), "sum"
+    unknown: Any = other
+    with pytest.raises(InputError, match=r"^normalisation: use 'overlap' or 'views'"):
+        reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), 1.0, normalisation=unknown)
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_no_photons_give_zeros(cfa):
+    grid = unit_grid(2, 2, 3, 3, pitch_mm=(40.0, 40.0))  # so far apart that no view reaches the frame
+    empty = PhotonCounts.from_events(*np.zeros((5, 0), dtype=int), grid, cfa=cfa)
+    sections = reconstruct(empty, [1.0, 100.0])
+    assert not sections.counts.any()
+    assert not sections.estimate.any()
+    assert not sections.coverage[0].any()
+    assert sections.coverage[1].any()
+
+
+def test_one_photon_gives_one_voxel_of_its_colour():
+    grid = unit_grid(3, 3, 9, 9)
+    one = PhotonCounts.from_events(*np.array([[2], [0], [4], [3], [1]]), grid, cfa="GRBG")
+    sections = reconstruct(one, 1.0)
+    # Camera (2, 0) is lower and further left: it moves by (+1, -1). Pixel (4, 3) is red.
+    assert np.argwhere(sections.counts).tolist() == [[0, 5, 2, 0]]
+    assert sections.counts.sum() == 1
+
+
+# Physics
+
+
+@pytest.mark.parametrize("cfa", [*PATTERNS, None])
+@pytest.mark.parametrize("shape", [(3, 4, 7, 8), (1, 5, 5, 5), (1, 1, 1, 1)])
+def test_a_constant_scene_is_reconstructed_exactly_wherever_it_is_seen(cfa, shape):
+    grid = unit_grid(*shape, pitch_mm=(1.3, 2.1))
+    colour = np.array([0.25, 0.5, 0.75])  # sums and means of these are exact
+    rgb = np.broadcast_to(colour, (*grid.shape_KLHW, 3))
+    views = Views(rgb, grid) if cfa is None else Views(mosaic(rgb, cfa)[..., None], grid, cfa)
+    for subpixel in (1, 2):
+        sections = reconstruct(views, [0.5, 1.0, 3.0], subpixel=subpixel)
+        expected = np.where(sections.coverage > 0, colour, 0.0)
+        np.testing.assert_array_equal(sections.estimate, expected)
+        assert (sections.coverage > 0).any()
+
+
+def views_of_a_plane(
+    grid: CameraGrid, disparity_px: tuple[int, int], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Crops (K, L, H, W, 3) of one large picture, and what the virtual centre sees of it (H, W, 3)."""
+    K, L, H, W = grid.shape_KLHW
+    margin = 32
+    picture = np.random.default_rng(seed).integers(0, 256, size=(H + 2 * margin, W + 2 * margin, 3))
+
+    def crop(k: float, l: float) -> np.ndarray:
+        # A camera further right looks at a part of the picture that lies further right.
+        top = margin + int((k - (K - 1) / 2) * disparity_px[1])
+        left = margin + int((l - (L - 1) / 2) * disparity_px[0])
+        return picture[top : top + H, left : left + W]
+
+    views = np.array([[crop(k, l) for l in range(L)] for k in range(K)])
+    return views.astype(float), crop((K - 1) / 2, (L - 1) / 2)
+
+
+@pytest.mark.parametrize("cfa", [*PATTERNS, None])
+@pytest.mark.parametrize(("shape", "disparity"), [((3, 5, 20, 21), (3, 2)), ((4, 2, 21, 20), (6, 2))])
+def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, disparity):
+    grid = unit_grid(*shape, pitch_mm=(float(disparity[0]), float(disparity[1])))
+    seen, pattern = views_of_a_plane(grid, disparity, seed=3)
+    views = Views(seen, grid) if cfa is None else Views(mosaic(seen, cfa)[..., None], grid, cfa)
+    sections = reconstruct(views, [1.0, 0.5, 2.0])
+    covered = sections.coverage > 0
+    np.testing.assert_array_equal(sections.estimate[0], np.where(covered[0], pattern, 0))
+    assert covered[0].any(axis=-1).mean() > 0.5
+    for other in (1, 2):
+        # The mean of at least two unrelated bytes is rarely the right byte.
+        wrong = (sections.estimate[other] != pattern)[sections.coverage[other] > 1]
+        assert wrong.mean() > 0.9
+
+
+@pytest.mark.parametrize("cfa", ["RGGB", None])
+@pytest.mark.parametrize("shear", [(3.0, 2.0), (1.0, -2.0), (5.0, 7.0)])
+def test_a_plane_is_exact_in_a_sheared_grid(cfa, shear):
+    # At z = 1 the parallax is (3, 2): the first shear makes the plane stand still, the last turns it round.
+    grid = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0), shear_px=shear)
+    seen, pattern = views_of_a_plane(grid, (3 - int(shear[0]), 2 - int(shear[1])), seed=4)
+    views = Views(seen, grid) if cfa is None else Views(mosaic(seen, cfa)[..., None], grid, cfa)
+    sections = reconstruct(views, [1.0, 0.25])
+    covered = sections.coverage > 0
+    np.testing.assert_array_equal(sections.estimate[0], np.where(covered[0], pattern, 0))
+    assert covered[0].any(axis=-1).mean() > 0.5
+    assert (sections.estimate[1] != pattern)[sections.coverage[1] > 1].mean() > 0.9
+    # The fault: the same views taken for those of a grid that is not sheared.
+    straight = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0))
+    fault = reconstruct(Views(views.radiance, straight, cfa), 1.0)
+    assert (fault.estimate[0] != pattern)[fault.coverage[0] > 1].mean() > 0.5
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("cfa", ["GRBG", "BGGR", None])
+@pytest.mark.parametrize("subpixel", [1, 3])
+def test_a_mirrored_scene_gives_mirrored_sections(axis, cfa, subpixel):
+    # An odd size keeps the Bayer pattern under a mirror; 1.3 and 0.7 px put no sample on an edge of a
+    # voxel (an even division would: the middle camera's samples lie between two fine voxels).
+    grid = unit_grid(4, 3, 9, 11, pitch_mm=(1.3, 0.7))
+    dense = random_counts(grid, seed=8)
+    plain = reconstruct(photons(dense, grid, cfa), 1.0, subpixel=subpixel).counts
+    mirrored = np.flip(dense, axis=(axis, axis + 2))
+    other = reconstruct(photons(mirrored, grid, cfa), 1.0, subpixel=subpixel).counts
+    np.testing.assert_array_equal(np.flip(other, axis=axis + 1), plain)
+
+
+def test_the_estimate_is_the_rate_of_the_photons():
+    grid = unit_grid(6, 6, 24, 24, pitch_mm=(1.0, 1.0))
+    rates = np.broadcast_to(np.array([0.2, 0.5, 1.1]), (*grid.shape_KLHW, 3))
+    sections = reconstruct(PhotonCounts.from_dense(bayer_photons(rates, "GRBG", 4), grid, cfa="GRBG"), 1.0)
+    samples = sections.coverage[0].sum(axis=(0, 1))
+    mean = sections.counts[0].sum(axis=(0, 1)) / samples
+    # The sum is Poisson, so its mean has the standard error sqrt(rate / samples); 4 of them.
+    tolerance = 4 * np.sqrt(rates[0, 0, 0, 0] / samples)
+    assert np.all(np.abs(mean - [0.2, 0.5, 1.1]) < tolerance)
+    # The planted fault: with green and red exchanged this would be seen.
+    assert not np.all(np.abs(mean - [0.5, 0.2, 1.1]) < tolerance)
+
+
+def test_views_on_disk_are_read_once_however_many_planes():
+    grid = unit_grid(2, 3, 4, 4)
+    pixels = blocky_texture(np.random.default_rng(0), 4, 4)
+    reads: list[tuple[int, int]] = []
+
+    class Reader:
+        shape = (*grid.shape_KLHW, 3)
+
+        def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+            reads.append(index)
+            return pixels
+
+    sections = reconstruct(Views(Reader(), grid), [1.0, 2.0, 4.0])
+    assert sorted(reads) == [(k, l) for k in range(2) for l in range(3)]
+    everything = np.broadcast_to(pixels, (*grid.shape_KLHW, 3))
+    np.testing.assert_array_equal(
+        sections.counts, reconstruct(Views(everything, grid), [1.0, 2.0, 4.0]).counts
+    )

@@ -1,0 +1,242 @@
+"""Datasets: the same bytes again, resuming, and refusing what is not ours."""
+
+import fcntl
+import hashlib
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+from tiny import TINY_RECIPE
+
+from pcii.core.errors import InputError
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import MANIFEST, RADIANCE, TRUTH
+from pcii.io.verification import verify
+from simgen.cameras.rig import rig_of
+from simgen.dataset import generation as module
+from simgen.dataset.generation import MARKER, generate
+from simgen.spec.recipe import Recipe
+
+pytestmark = pytest.mark.renders
+TINY = TINY_RECIPE | {
+    "seed": 3,
+    "photons": {"budget": 200},
+    "render": {"samples_per_pixel": 2},
+    "products": {"radiance": "mosaic", "view_truth": True},
+}
+
+
+def recipe(**changes: object) -> Recipe:
+    return Recipe.model_validate(TINY | changes)
+
+
+def digest(folder: Path) -> dict[str, str]:
+    """Hash of every file but the manifest, which holds the times that things took."""
+    return {
+        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.rglob("*"))
+        if file.is_file() and file.name != MANIFEST
+    }
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("tiny") / "made"
+    generate(recipe(), Path(), out)
+    return out
+
+
+def test_a_dataset_explains_itself(made: Path) -> None:
+    manifest = json.loads((made / MANIFEST).read_text())
+    assert manifest["objects"] == {"1": "ball", "2": "bird"}
+    assert set(manifest["timings_s"]) >= {"truth", "radiance"}
+    assert manifest["backend"]["variant"]
+    assert set(manifest["files"]) == set(digest(made))
+    assert not (made / MARKER).exists()
+    assert verify(made) == len(manifest["files"])
+
+
+def test_it_opens_as_types_that_agree_with_the_recipe(made: Path) -> None:
+    dataset = open_dataset(made)
+    assert dataset.grid.shape_KLHW == (2, 3, 64, 60)
+    assert dataset.cfa == "GRBG"
+    # Six views of 200 photons: a Poisson total, within 5 standard deviations.
+    assert abs(dataset.counts.total - 1200) < 5 * np.sqrt(1200)
+    assert dataset.truth is not None
+    assert set(np.unique(dataset.truth.object_id)) == {0, 1, 2}
+    assert dataset.views is not None
+    assert dataset.views.view(1, 2).shape == (64, 60, 1)
+
+
+def test_the_same_recipe_gives_the_same_bytes(made: Path, tmp_path: Path) -> None:
+    generate(recipe(), Path(), tmp_path / "again")
+    assert digest(tmp_path / "again") == digest(made)
+
+
+def test_another_seed_gives_other_photons_and_the_same_truth(made: Path, tmp_path: Path) -> None:
+    generate(recipe(seed=4), Path(), tmp_path / "other")
+    ours, theirs = open_dataset(made), open_dataset(tmp_path / "other")
+    assert ours.truth is not None
+    assert theirs.truth is not None
+    np.testing.assert_array_equal(ours.truth.z_mm, theirs.truth.z_mm)
+    assert ours.counts.events.n.shape != theirs.counts.events.n.shape or np.any(
+        ours.counts.events.j != theirs.counts.events.j
+    )
+
+
+def test_a_killed_run_is_resumed_to_the_same_bytes(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, rendered = tmp_path / "killed", []
+    original = module.render_view
+
+    def dies_at_the_fourth(*args: object, **kwargs: object) -> np.ndarray:
+        rendered.append(args[2:4])
+        if len(rendered) == 4:
+            raise KeyboardInterrupt
+        return original(*args, **kwargs)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(module, "render_view", dies_at_the_fourth)
+    with pytest.raises(KeyboardInterrupt):
+        generate(recipe(), Path(), out)
+    assert not (out / MANIFEST).exists()
+    with pytest.raises(InputError, match="unfinished; the same"):
+        open_dataset(out)
+    (out / RADIANCE / ".view_00_00.exr.1.tmp").touch()  # what a kill in mid-write leaves
+    generate(recipe(), Path(), out)
+    assert len(rendered) == 4 + 3
+    assert digest(out) == digest(made)
+
+
+def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module.Prepared, "built", lambda _: pytest.fail("rendered again"))
+    before = (made / MANIFEST).stat().st_mtime_ns
+    generate(recipe(), Path(), made)
+    assert (made / MANIFEST).stat().st_mtime_ns == before
+
+
+def test_a_second_run_that_waited_for_the_first_finds_its_dataset(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "shared"
+    original, locks = fcntl.flock, []
+
+    def first_run_ends_now(file: object, operation: int) -> None:
+        if not locks:  # between the second run's opening of the marker and its locking it
+            shutil.copytree(made, out, dirs_exist_ok=True)
+            (out / MARKER).unlink()
+        locks.append(operation)
+        original(file, operation)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fcntl, "flock", first_run_ends_now)
+    monkeypatch.setattr(module, "render_view", lambda *_: pytest.fail("rendered again"))
+    manifest = generate(recipe(), Path(), out)
+    assert len(locks) == 2
+    assert manifest["timings_s"] == open_dataset(made).manifest["timings_s"]
+    assert not (out / MARKER).exists()
+    assert verify(out) == len(manifest["files"])
+
+
+def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with (tmp_path / "out" / MARKER).open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        with pytest.raises(InputError, match="another run is writing"):
+            generate(recipe(), Path(), tmp_path / "out")
+
+
+@pytest.mark.parametrize("content", ["{", "[]", '{"identity": 1}', '{"identity": "", "backend": 3}'])
+def test_a_damaged_mark_of_an_unfinished_dataset_is_named(tmp_path: Path, content: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / MARKER).write_text(content)
+    with pytest.raises(InputError, match=r"\.unfinished\.json: damaged"):
+        generate(recipe(), Path(), tmp_path / "out")
+
+
+def test_a_folder_with_something_else_is_refused_and_untouched(made: Path, tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(InputError, match="holds something else"):
+        generate(recipe(), Path(), tmp_path)
+    assert [file.name for file in tmp_path.iterdir()] == ["thesis.tex"]
+    with pytest.raises(InputError, match="of another recipe or scene"):
+        generate(recipe(seed=99), Path(), made)
+    with pytest.raises(InputError, match="this is a file"):
+        generate(recipe(), Path(), tmp_path / "thesis.tex")
+
+
+@pytest.mark.parametrize("part", ["counts.zarr/n/c/0", "truth.zarr/z_mm/c/0/0", f"{RADIANCE}/view_00_01.exr"])
+def test_damage_is_found(made: Path, tmp_path: Path, part: str) -> None:
+    broken = tmp_path / "broken"
+    shutil.copytree(made, broken)
+    whole = (broken / part).read_bytes()
+    (broken / part).write_bytes(whole[:-5])
+    with pytest.raises(InputError, match="truncated or changed"):
+        open_dataset(broken)
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 4
+    (broken / part).write_bytes(flipped)
+    with pytest.raises(InputError, match="does not match the manifest"):
+        verify(broken)
+    (broken / part).unlink()  # zarr alone would read a missing chunk as zeros
+    with pytest.raises(InputError, match="missing"):
+        open_dataset(broken)
+
+
+def test_scene_scope_shares_one_budget_among_views(tmp_path: Path) -> None:
+    photons = {"budget": 900, "scope": "scene", "statistics": "multinomial"}
+    generate(recipe(photons=photons, products={"truth": False}), Path(), tmp_path / "scene")
+    dataset = open_dataset(tmp_path / "scene")
+    assert dataset.counts.total == 900
+    assert dataset.truth is None
+    assert not (tmp_path / "scene" / RADIANCE).exists()
+
+
+def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) -> None:
+    generate(recipe(photons={"budget": 6e6}), Path(), tmp_path / "bright")
+    bright, dim = open_dataset(tmp_path / "bright"), open_dataset(made)
+    assert bright.manifest["photons"]["method"] == "dense"
+    assert abs(bright.counts.total - 36e6) < 5 * np.sqrt(36e6)
+    # More samples are needed than are allowed, and it says so.
+    assert bright.manifest["photons"]["rendering_noise"] > 0.01
+    assert bright.truth is not None
+    assert bright.truth.photons is None
+    photons = dim.manifest["photons"]
+    assert photons["method"] == "thinning"
+    assert photons["kept"] == dim.counts.total
+    assert dim.truth is not None
+    assert dim.truth.photons is not None
+    assert dim.truth.photons.z_mm.shape == (dim.counts.total,)
+
+
+def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_path: Path) -> None:
+    errors = {"position_sd_mm": (1.0, 2.0, 0.5), "rotation_sd_deg": (0.2, 0.1, 0.3), "pitch_error": 0.01}
+    wrong = recipe(grid=TINY["grid"] | {"errors": errors})
+    generate(wrong, Path(), tmp_path / "wrong")
+    assert open_dataset(tmp_path / "wrong").grid == open_dataset(made).grid
+    truth, rig = zarr.open_group(tmp_path / "wrong" / TRUTH, mode="r"), rig_of(wrong)
+    np.testing.assert_array_equal(np.asarray(truth["camera_position_mm"]), rig.position_mm)
+    np.testing.assert_array_equal(np.asarray(truth["camera_rotation"]), rig.rotation)
+    own, perfect = digest(tmp_path / "wrong"), digest(made)
+    same = {name for name in perfect if own[name] == perfect[name]}
+    assert any(name.startswith(f"{TRUTH}/z_mm/c/") for name in same)  # the virtual centre has no errors
+    assert not any(name.startswith((f"{TRUTH}/view_z_mm/c/", RADIANCE)) for name in same)
+
+
+def test_errors_of_nothing_change_nothing(made: Path, tmp_path: Path) -> None:
+    generate(recipe(grid=TINY["grid"] | {"errors": {}}), Path(), tmp_path / "none")
+    own, perfect = digest(tmp_path / "none"), digest(made)
+    assert {name: own[name] for name in perfect if name != f"{TRUTH}/zarr.json"} == {
+        name: value for name, value in perfect.items() if name != f"{TRUTH}/zarr.json"
+    }
+    added = {name.split("/")[1] for name in set(own) - set(perfect)}
+    assert added == {"camera_position_mm", "camera_rotation"}
+
+
+def test_a_monochrome_dataset_has_one_channel(tmp_path: Path) -> None:
+    generate(recipe(sensor={"cfa": "none"}), Path(), tmp_path / "mono")
+    dataset = open_dataset(tmp_path / "mono")
+    assert dataset.cfa is None
+    assert dataset.counts.channel_count == 1

@@ -1,0 +1,147 @@
+"""What a recipe takes is estimated before any work; what does not fit is refused by its field."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pcii.core import console
+from pcii.core.errors import InputError
+from simgen.app import commands as cli
+from simgen.dataset import resources
+from simgen.dataset.resources import check_resources, shortage, tile_count
+from simgen.photons.majorant import frame_for, tile_px_for
+from simgen.photons.photon_counting import Plan
+from simgen.spec.recipe import Recipe
+
+ROOM = 8e9
+THINS = Plan(
+    thins=True,
+    samples=1,
+    photons_per_view=1e3,
+    noise=0.0,
+    normaliser_error=0.0,
+    depths_mm=(500.0, 600.0, 3000.0),
+)
+
+
+def recipe(**values: Any) -> Recipe:
+    return Recipe.model_validate({"scene": "two_objects", **values})
+
+
+HOT = {"hot_pixel_share": 0.01}
+TOO_MUCH: list[tuple[dict[str, Any], str, Callable[[float], dict[str, Any]]]] = [
+    ({"sensor": {"dark_counts": 1e6}}, "sensor.dark_counts", lambda n: {"sensor": {"dark_counts": n}}),
+    (
+        {"sensor": HOT | {"hot_pixel_counts": 1e9}},
+        "sensor.hot_pixel_counts",
+        lambda n: {"sensor": HOT | {"hot_pixel_counts": n}},
+    ),
+    (
+        {"sensor": {"hot_pixel_share": 1.0}, "grid": {"rows": 40}},
+        "sensor.hot_pixel_share",
+        lambda n: {"sensor": {"hot_pixel_share": n}, "grid": {"rows": 40}},
+    ),
+    ({"grid": {"rows": 10**8}}, "grid.rows", lambda n: {"grid": {"rows": int(n)}}),
+    ({"grid": {"cols": 10**8}}, "grid.cols", lambda n: {"grid": {"cols": int(n)}}),
+    (
+        {"grid": {"height": 10**6}, "render": {"samples_per_pixel": 1}},
+        "grid.height",
+        lambda n: {"grid": {"height": int(n)}},
+    ),
+    ({"grid": {"pixel_mm": 1e-6}}, "grid.pixel_mm", lambda n: {"grid": {"pixel_mm": n}}),
+    ({"grid": {"pixel_mm": 1e-300}}, "grid.pixel_mm", lambda n: {"grid": {"pixel_mm": n}}),
+    ({"grid": {"focal_mm": 1e8}}, "grid.focal_mm", lambda n: {"grid": {"focal_mm": n}}),
+    ({"grid": {"pitch_mm": [5.0, 1e9]}}, "grid.pitch_mm", lambda n: {"grid": {"pitch_mm": [5.0, n]}}),
+    ({"grid": {"shear_px": [0.0, -1e9]}}, "grid.shear_px", lambda n: {"grid": {"shear_px": [0.0, -n]}}),
+    (
+        {"analysis": {"z_mm": [500.0 + n for n in range(5000)]}},
+        "analysis.z_mm",
+        lambda n: {"analysis": {"z_mm": [500.0 + m for m in range(int(n))]}},
+    ),
+]
+
+
+@pytest.mark.parametrize(("values", "field", "with_value"), TOO_MUCH)
+def test_what_does_not_fit_is_told_by_its_field_and_what_is_told_would_fit(
+    values: dict[str, Any], field: str, with_value: Callable[[float], dict[str, Any]]
+) -> None:
+    plan = None if field in ("grid.rows", "grid.cols") else THINS  # whose photons grow with the views
+    found = shortage(recipe(**values), plan, ROOM)
+    assert found is not None
+    assert found.field == field
+    assert found.bytes > ROOM
+    bound, least, number, *_ = found.right.split()
+    assert bound == "at"
+    assert shortage(recipe(**with_value(float(number.strip(",")))), plan, ROOM) is None
+    beyond = float(number.strip(",")) * (1.5 if least == "most" else 1 / 1.5)
+    if field != "sensor.hot_pixel_share" or beyond <= 1:
+        assert shortage(recipe(**with_value(beyond)), plan, ROOM) is not None
+
+
+def test_ordinary_recipes_fit() -> None:
+    assert shortage(recipe(), THINS, ROOM) is None
+    assert shortage(recipe(sensor=HOT | {"dark_counts": 1e-3}), THINS, ROOM) is None
+
+
+def test_photons_are_told_by_their_budget_or_exposure() -> None:
+    # Thinned one by one; in rendered views no more than there are pixels: 100 x 1024 x 1024 of 200 B.
+    many = Plan(thins=True, samples=1, photons_per_view=1e6, noise=0.0, normaliser_error=0.0)
+    found = shortage(recipe(photons={"budget": 1e6}), many, ROOM)
+    assert found is not None
+    assert (found.bytes, found.field, found.right) == (2e10, "photons.budget", "at most 380000")
+    dense = Plan(thins=False, samples=1, photons_per_view=1e15, noise=0.0, normaliser_error=0.0)
+    exposed = recipe(photons={"scope": "exposure"}, exposure={"time_s": 2.0})
+    found = shortage(exposed, dense, ROOM)
+    assert found is not None
+    assert (found.bytes, found.field, found.right) == (
+        200 * 100 * 1024**2,
+        "exposure.time_s",
+        "at most 7.6e-10",
+    )
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [{}, {"rows": 4, "cols": 7, "pixel_mm": 0.01}, {"shear_px": [9.0, -3.0]}, {"pitch_mm": [2.0, 30.0]}],
+)
+def test_tiles_are_counted_as_the_majorant_has_them(grid: dict[str, Any]) -> None:
+    cameras, z_mm = recipe(grid=grid).grid.camera_grid(), np.array([480.0, 500, 503, 640, 2000, np.inf])
+    made = frame_for(cameras, tile_px_for(cameras), z_mm).tiles
+    assert tile_count(cameras, z_mm) == pytest.approx(made, rel=0.02)  # shifts there are whole and even
+
+
+def test_a_disk_that_is_too_small_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    wanted = recipe(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
+    monkeypatch.setattr(resources, "_free_bytes", lambda _: 6e8)
+    with pytest.raises(InputError, match=r"products\.radiance: rendered views .* 630 MB .* has 600 MB left"):
+        check_resources(wanted, None, tmp_path / "out")
+    check_resources(recipe(), None, tmp_path / "out")
+
+
+def test_what_is_rendered_already_needs_no_more_disk(tmp_path: Path) -> None:
+    before = resources._free_bytes(tmp_path / "new" / "out")
+    (tmp_path / "radiance").mkdir()
+    with (tmp_path / "radiance" / "view_00_00.exr").open("wb") as file:
+        file.truncate(1 << 38)  # takes no place
+    assert resources._free_bytes(tmp_path) > before + (1 << 37)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("setting", ["sensor.dark_counts=1e6", "grid.pixel_mm=1e-6"])
+def test_commands_refuse_before_any_work(
+    setting: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    field = setting.split("=")[0]
+    assert console.run(cli.app, ["check", "paper", "--set", setting]) == 1
+    (told,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("bad   memory"))
+    out = tmp_path / "out"
+    assert console.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
+    said = capsys.readouterr().err
+    for text in (told.removeprefix("bad   memory       "), said.removeprefix("error: ")):
+        assert text.startswith(f"{field}: 1e")
+        assert "of memory, and this machine has" in text
+    assert said.count("\n") == 1
+    assert not out.exists()

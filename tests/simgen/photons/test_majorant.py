@@ -1,0 +1,111 @@
+"""The majorant's book-keeping: every path has one owner, and no place is ever written off as black."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pcii.core.camera_grid import CameraGrid
+from simgen.photons.majorant import Majorant, Samples, fit, frame_for, tile_px_for
+
+GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
+DIM = np.array([0.02, 0.01, 0.03])
+
+
+def pilot(seed: int, number: int = 4000) -> Samples:
+    """Paths that hit three depths: a red surface, a blue one, and a black wall far away."""
+    rng = np.random.default_rng(seed)
+    which = rng.integers(0, 3, number)
+    colour = np.array([[5.0, 0.0, 0.0], [0.0, 0.0, 3.0], [0.0, 0.0, 0.0]])[which]
+    light = colour * rng.uniform(0.5, 1.2, (number, 1))
+    light[number // 2 :] = np.nan
+    return Samples(
+        k=rng.integers(0, 3, number),
+        l=rng.integers(0, 4, number),
+        row=rng.integers(0, 96, number),
+        col=rng.integers(0, 128, number),
+        z_mm=np.array([300.0, 420.0, np.inf])[which],
+        guess=np.maximum(colour, 1e-9),
+        light=light,
+    )
+
+
+@pytest.fixture
+def majorant() -> Majorant:
+    samples = pilot(1)
+    return fit(GRID, frame_for(GRID, tile_px_for(GRID), samples.z_mm), samples, DIM)
+
+
+def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Majorant) -> None:
+    samples = pilot(2)
+    entry = majorant.owner_of(samples)
+    side = majorant.side_px[entry]
+    layer = majorant.layer[entry]
+    frame = majorant.frame
+    down = np.where(layer < 0, 0, frame.row_shift[layer, samples.k])
+    right = np.where(layer < 0, 0, frame.col_shift[layer, samples.l])
+    np.testing.assert_array_equal((samples.row + down) // side, majorant.row[entry])
+    np.testing.assert_array_equal((samples.col + right) // side, majorant.col[entry])
+    assert (layer[np.isfinite(samples.z_mm)] >= 0).mean() > 0.9
+
+
+def test_bounds_hold_what_was_found_and_are_never_black(majorant: Majorant) -> None:
+    samples = pilot(1)
+    known = samples.take(samples.followed)
+    bound = majorant.bound[majorant.owner_of(known)]
+    assert (known.light <= bound * (1 + 1e-6)).all()  # bounds are found in single precision
+    assert (majorant.bound >= DIM).all()
+    majorant.scale(1e-6)
+    assert (majorant.bound >= DIM).all()
+
+
+def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) -> None:
+    over = pilot(3).take(np.array([0, 1, 2, 3]))
+    over.light[:] = [[0.0, 40.0, 0.0]] * 4
+    over.z_mm[:] = 300.0
+    before = majorant.layer.size
+    majorant.lift(over)
+    entry = majorant.owner_of(over)
+    assert (majorant.bound[entry, 1] > 40).all()
+    assert (majorant.radiance_ratio_bound[entry, 1] * over.guess[:, 1] > 40).all()
+    assert (majorant.bound >= DIM).all()  # green was lifted, and blue is not black for it
+    assert majorant.layer.size >= before
+
+
+@pytest.mark.parametrize("reach", [1, 3])
+def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) -> None:
+    over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
+    over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
+    majorant.lift(over, reach)
+    _, row, col = majorant.frame.split(majorant.frame.tiles_of(over))
+    bright = np.flatnonzero(majorant.bound[:, 1] > 40)
+    apart = np.maximum(abs(majorant.row[bright] - row), abs(majorant.col[bright] - col))
+    assert bright.size == (2 * reach + 1) ** 2
+    assert apart.max() == reach
+
+
+def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) -> None:
+    # A point at 300 mm, seen by all cameras where the contract says.
+    frame = majorant.frame
+    k, l = (index.ravel() for index in np.indices((3, 4)))
+    row = 47.5 + 100 * (10.0 - (k - 1) * 5.0) / 300
+    col = 63.5 + 100 * (-20.0 - (l - 1.5) * 8.0) / 300
+    layer = frame.layer_of(np.array([300.0]))[0]
+    at_row = (row + frame.row_shift[layer, k]) / frame.tile_px
+    at_col = (col + frame.col_shift[layer, l]) / frame.tile_px
+    # Half a tile of blur by the layer's thickness, and shifts are even: half of 2 px more.
+    assert np.ptp(at_row) <= 1 + 2 / frame.tile_px
+    assert np.ptp(at_col) <= 1 + 2 / frame.tile_px
+
+
+def test_tiles_follow_a_sheared_grid_too() -> None:
+    sheared = replace(GRID, shear_px=(9.5, -6.0))
+    frame = frame_for(sheared, tile_px_for(GRID), np.array([300.0, 420.0, np.inf]))
+    assert frame.row_shift.min() == frame.col_shift.min() == 0
+    k, l = (index.ravel() for index in np.indices((3, 4)))
+    layer = frame.layer_of(np.array([420.0]))[0]
+    row = 47.5 - 6.0 * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 420
+    col = 63.5 + 9.5 * (l - 1.5) + 100 * (-20.0 - (l - 1.5) * 8.0) / 420
+    # As without shear: half a tile of blur, and half of 2 px.
+    assert np.ptp((row + frame.row_shift[layer, k]) / frame.tile_px) <= 1 + 2 / frame.tile_px
+    assert np.ptp((col + frame.col_shift[layer, l]) / frame.tile_px) <= 1 + 2 / frame.tile_px

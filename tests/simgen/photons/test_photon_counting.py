@@ -1,0 +1,472 @@
+"""Counts of a dataset: which way they are made, budgets within budgets, and what is written of them."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zarr
+from scipy import stats
+
+from pcii.core.bayer import colour_index
+from pcii.core.console import silent
+from pcii.core.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
+from pcii.io.verification import verify
+from simgen.photons import photon_counting as module
+from simgen.photons.photon_counting import PROBE_SEED, Plan, draw_from_views, plan, thin, write_counts
+from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.sensor.detector import Arrivals, nested_subset
+from simgen.spec.recipe import MOST_PATHS, Recipe
+from simgen.spec.scene import Scene, load_scene
+
+COMPILED = backend.choose().kind != "scalar"
+PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
+BUDGETS = (120, 40, 8)
+HEIGHT, WIDTH = 8, 10
+
+
+def recipe(rows: int = 2, cols: int = 2, **changes: object) -> Recipe:
+    """Few pixels whose films are as large as the scene."""
+    grid = {"rows": rows, "cols": cols, "height": HEIGHT, "width": WIDTH, "pixel_mm": 4.0}
+    return Recipe.model_validate(
+        {"scene": "two_objects", "seed": 1, "grid": grid, "photons": nested()} | changes
+    )
+
+
+def nested(**photons: object) -> dict:
+    return {"budget": BUDGETS[0], "nested": [8, 40], **photons}
+
+
+def mosaic_of(k: int, l: int) -> np.ndarray:
+    """A made-up view: bright and dim pixels, a dark one, each view brighter than the one before."""
+    return (1 + 2 * k + l) * ((7 * np.arange(HEIGHT * WIDTH)) % 23.0).reshape(HEIGHT, WIDTH)
+
+
+def dense(made: Recipe) -> Arrivals:
+    return draw_from_views(made, mosaic_of, PLAN, silent)[0]
+
+
+@pytest.fixture(scope="module")
+def two_objects() -> RenderScene:
+    found, folder = load_scene("two_objects")
+    return build(backend.load(), found, folder, 3)
+
+
+def counted(counts: Arrivals, made: Recipe) -> np.ndarray:
+    """Counts per pixel, (V, H, W)."""
+    found = np.zeros(made.grid.camera_grid().shape_KLHW, dtype=np.int64)
+    np.add.at(found, (counts.k, counts.l, counts.i, counts.j), counts.n)
+    return found.reshape(-1, HEIGHT, WIDTH)
+
+
+def subset(arrivals: Arrivals, made: Recipe, budget: float) -> Arrivals:
+    if budget == made.photons.budget:
+        return arrivals
+    return arrivals.take(nested_subset(arrivals, arrivals, made.photons, budget, made.seed))
+
+
+def by_scope(views: np.ndarray, scope: str) -> np.ndarray:
+    """Totals of every view, of each colour of every view, or of all."""
+    if scope == "view":
+        return views.sum(axis=(1, 2))
+    if scope == "scene":
+        return views.sum()[None]
+    colours = colour_index(HEIGHT, WIDTH, "GRBG")
+    return np.concatenate([views[:, colours == colour].sum(axis=1) for colour in range(3)])
+
+
+def is_poisson(totals: np.ndarray, budget: float) -> bool:
+    """Whether mean and variance are those of as many Poisson numbers, within 4 standard errors."""
+    n = totals.size
+    mean_fits = abs(totals.mean() - budget) < 4 * np.sqrt(budget / n)
+    return bool(mean_fits and abs(totals.var(ddof=1) - budget) < 4 * np.sqrt((budget + 2 * budget**2) / n))
+
+
+@pytest.mark.parametrize(("scope", "draws"), [("view", 150), ("channel", 50), ("scene", 600)])
+def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
+    totals: dict[int, list[np.ndarray]] = {budget: [] for budget in BUDGETS}
+    for seed in range(draws):
+        made = recipe(seed=seed, photons=nested(scope=scope))
+        arrivals = dense(made)
+        for budget, drawn in totals.items():
+            drawn.append(by_scope(counted(subset(arrivals, made, budget), made), scope))
+    found = {budget: np.concatenate(drawn) for budget, drawn in totals.items()}
+    assert found[120].size >= 600
+    for budget in BUDGETS:
+        assert is_poisson(found[budget], budget)
+        assert not is_poisson(2 * found[budget], budget)
+    for budget, larger in ((40, 120), (8, 40)):
+        always_a_part = np.rint(found[larger] * budget / larger)  # the faults: no chance in how many,
+        always_as_many = np.full(found[larger].size, budget)  # or as many each time
+        assert not is_poisson(always_a_part, budget)
+        assert not is_poisson(always_as_many, budget)
+
+
+@pytest.mark.renders
+@pytest.mark.skipif(not COMPILED, reason="takes minutes, and the renderer has no part in it")
+def test_totals_of_thinned_nested_budgets_are_poisson(two_objects: RenderScene) -> None:
+    made = recipe(20, 30)  # 600 views, whose photons know nothing of each other
+    arrivals = thin(made, two_objects, PLAN)[0]
+    found = {budget: by_scope(counted(subset(arrivals, made, budget), made), "view") for budget in BUDGETS}
+    for budget in BUDGETS:
+        assert is_poisson(found[budget], budget)
+        assert not is_poisson(2 * found[budget], budget)
+    for budget, larger in ((40, 120), (8, 40)):
+        assert not is_poisson(np.rint(found[larger] * budget / larger), budget)  # the fault: always a part
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("scope", ["view", "channel", "scene"])
+@pytest.mark.parametrize("thins", [True, False])
+def test_multinomial_totals_of_nested_budgets_are_exact(
+    two_objects: RenderScene, scope: str, thins: bool
+) -> None:
+    made = recipe(photons=nested(scope=scope, statistics="multinomial"))
+    arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
+    for budget in BUDGETS:
+        totals = by_scope(counted(subset(arrivals, made, budget), made), scope)
+        assert totals.tolist() == [budget] * {"view": 4, "channel": 12, "scene": 1}[scope]
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("statistics", ["poisson", "multinomial"])
+@pytest.mark.parametrize("thins", [True, False])
+def test_each_budget_is_a_subset_of_the_next(two_objects: RenderScene, statistics: str, thins: bool) -> None:
+    made = recipe(photons=nested(statistics=statistics))
+    arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
+    belongs = [nested_subset(arrivals, arrivals, made.photons, budget, made.seed) for budget in (8, 40)]
+    assert 0 < belongs[0].sum() < belongs[1].sum() < belongs[1].size
+    assert (belongs[0] <= belongs[1]).all()
+    larger = counted(arrivals.take(belongs[1]), made)
+    # Budgets that are nearly the same: 100 times the smaller one might get more than the larger.
+    side = 4 if thins and not COMPILED else 10
+    near = recipe(side, side, photons={"budget": 120, "nested": [38, 40], "statistics": statistics})
+    many = thin(near, two_objects, PLAN)[0] if thins else dense(near)
+    less, more = (nested_subset(many, many, near.photons, budget, near.seed) for budget in (38, 40))
+    assert (less <= more).all()
+    independent = counted(subset(dense(recipe(seed=2)), made, 8), made)
+    assert (independent > larger).any()  # the fault: a smaller budget that was drawn by itself
+
+
+def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
+    views = np.stack([mosaic_of(k, l) for k, l in np.ndindex(2, 2)])
+    expected, draws = 8 * views / views.sum(axis=(1, 2), keepdims=True), 150
+    found, first_rows = np.zeros(views.shape), np.zeros(views.shape)
+    for seed in range(draws):
+        made = recipe(seed=seed)
+        arrivals = dense(made)
+        found += counted(subset(arrivals, made, 8), made)
+        in_order = np.arange(arrivals.k.size)
+        start = np.searchsorted(arrivals.scope, np.arange(4))
+        first_rows += counted(arrivals.take(in_order - start[arrivals.scope] < 8), made)
+    lit = expected > 0
+    assert (found[~lit] == 0).all()
+
+    def chi_square(pooled: np.ndarray) -> float:
+        return float(((pooled - draws * expected)[lit] ** 2 / (draws * expected[lit])).sum())
+
+    assert stats.chi2.sf(chi_square(found), lit.sum()) > 1e-3
+    # The fault: a scope's first photons by their place on the film, not by chance.
+    assert stats.chi2.sf(chi_square(first_rows), lit.sum()) < 1e-6
+
+
+@pytest.mark.parametrize("statistics", ["poisson", "multinomial"])
+def test_smaller_budgets_do_not_change_the_whole(statistics: str) -> None:
+    alone = recipe(photons={"budget": BUDGETS[0], "statistics": statistics})
+    together = recipe(photons=nested(statistics=statistics))
+    one_by_one = dense(together)
+    assert (one_by_one.n == 1).all()
+    np.testing.assert_array_equal(counted(dense(alone), alone), counted(one_by_one, together))
+
+
+def test_counts_at_low_light_keep_their_mean() -> None:
+    # A thousandth of a photon per pixel in 2500 views of 80 pixels: 200 in all.
+    made = recipe(50, 50, photons={"budget": 1e-3 * HEIGHT * WIDTH})
+    flat = np.full((HEIGHT, WIDTH), 3.0)
+    counts = counted(draw_from_views(made, lambda *_: flat, PLAN, silent)[0], made)
+    assert abs(counts.mean() - 1e-3) < 4 * np.sqrt(1e-3 / counts.size)
+    assert abs(2 * counts.mean() - 1e-3) > 4 * np.sqrt(1e-3 / counts.size)  # the fault: doubled
+
+
+def test_views_without_light_have_no_photons_of_any_budget() -> None:
+    made = recipe(photons=nested(statistics="multinomial"))
+    arrivals, log = draw_from_views(made, lambda k, l: k * mosaic_of(k, l), PLAN, silent)
+    assert log["views_without_light"] == 2
+    for budget in BUDGETS:
+        assert by_scope(counted(subset(arrivals, made, budget), made), "view").tolist() == [0, 0] + 2 * [
+            budget
+        ]
+    black, log = draw_from_views(made, lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
+    assert log["views_without_light"] == 4
+    assert subset(black, made, 8).k.size == 0
+
+
+def test_too_many_photons_to_be_told_apart_are_refused_before_any_view_is_rendered(
+    monkeypatch: pytest.MonkeyPatch, two_objects: RenderScene
+) -> None:
+    monkeypatch.setattr(module, "MOST_SINGLE_PHOTONS", 300)
+    plan(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
+    with pytest.raises(InputError, match=r"photons\.nested: .* photons are too many"):
+        plan(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
+
+
+def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
+    """The counts in a folder, (V, H, W)."""
+    group = zarr.open_group(out / nested_name(COUNTS, budget), mode="r")
+    columns = {name: np.asarray(group[name]) for name in "klijn"}
+    counts = PhotonCounts.from_events(**columns, grid=made.grid.camera_grid(), cfa=made.cfa)
+    return np.stack([counts.view(k, l) for k, l in np.ndindex(made.grid.rows, made.grid.cols)])
+
+
+FAULTY = {
+    "quantum_efficiency": (0.8, 0.9, 0.7),
+    "dark_counts": 0.05,
+    "hot_pixel_share": 0.05,
+    "hot_pixel_counts": 4.0,
+    "dead_pixel_share": 0.05,
+}
+
+
+@pytest.mark.parametrize("sensor", [{}, {"counter_bits": 1}, FAULTY, FAULTY | {"counter_bits": 2}])
+def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
+    made = recipe(sensor=sensor)
+    told = write_counts(made, dense(made), tmp_path)
+    whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
+    assert (small <= middle).all()
+    assert (middle <= whole).all()
+    assert small.sum() < middle.sum() < whole.sum()
+    assert told["total"] == whole.sum()
+    assert told["pixels_with_photons"] == (whole > 0).sum()
+    assert told["nested"] == [
+        {"budget": budget, "total": part.sum(), "pixels_with_photons": (part > 0).sum()}
+        for budget, part in ((8, small), (40, middle))
+    ]
+    assert not (tmp_path / PHOTON_TRUTH).exists()  # rendered views do not know what a photon came from
+
+
+def test_without_faults_what_arrives_is_what_is_written(tmp_path: Path) -> None:
+    made = recipe(photons={"budget": 500})
+    arrivals = dense(made)
+    told = write_counts(made, arrivals, tmp_path)
+    np.testing.assert_array_equal(stored(tmp_path, made), counted(arrivals, made))
+    assert told["arrived"] == told["total"] == arrivals.n.sum()
+
+
+def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
+    lost = recipe(sensor={"quantum_efficiency": (1e-9,) * 3, "dark_counts": 0.5})
+    write_counts(lost, dense(lost), tmp_path)
+    whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
+    np.testing.assert_array_equal(whole, small)
+    assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
+
+
+def from_known_places(made: Recipe) -> Arrivals:
+    """Photons in random order; each of an object and from a depth that tell its pixel."""
+    rng = np.random.default_rng(1)
+    shape = made.grid.camera_grid().shape_KLHW
+    flat = rng.integers(0, np.prod(shape), 900)
+    ones = np.ones(flat.size, dtype=np.int64)
+    k, l, i, j = np.unravel_index(flat, shape)
+    return Arrivals(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
+
+
+@pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"counter_bits": 2}])
+@pytest.mark.parametrize("budget", [None, 40])
+def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
+    made = recipe(sensor=sensor, photons=nested(scope="scene"))
+    write_counts(made, from_known_places(made), tmp_path)
+    origins = zarr.open_group(tmp_path / nested_name(PHOTON_TRUTH, budget), mode="r")
+    object_id, z_mm = np.asarray(origins["object_id"]), np.asarray(origins["z_mm"])
+    counts = stored(tmp_path, made, budget).ravel()
+    pixel = np.arange(counts.size).repeat(counts)
+    assert object_id.shape == z_mm.shape == pixel.shape
+    real = object_id != -1
+    np.testing.assert_array_equal(object_id[real], pixel[real] + 1)
+    np.testing.assert_array_equal(z_mm[real], pixel[real] + 0.5)
+    assert np.isinf(z_mm[~real]).all()
+    assert (~real).any() == bool(sensor)
+    assert (np.roll(object_id, 1)[real] != pixel[real] + 1).any()  # the fault: one's neighbour's origin
+
+
+def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
+    made = recipe()
+    black = draw_from_views(made, lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
+    told = write_counts(made, black, tmp_path)
+    assert told["total"] == 0
+    assert (stored(tmp_path, made, 8) == 0).all()
+
+
+PROBED = {"rows": 2, "cols": 3, "height": 64, "width": 64, "pixel_mm": 0.5}
+
+
+@pytest.mark.renders
+def test_little_light_is_thinned_and_much_is_rendered(two_objects: RenderScene) -> None:
+    little = recipe(grid=PROBED, photons={"budget": 100})
+    much = recipe(grid=PROBED, photons={"budget": 1e8})
+    for kind in ("llvm", "scalar"):
+        assert plan(little, two_objects, kind).thins
+        assert not plan(much, two_objects, kind).thins
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(
+    "scope", [{"photons": {"budget": 3e4}}, {"photons": {"scope": "exposure"}, "exposure": {}}]
+)
+def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: dict[str, Any]) -> None:
+    # Not only near break-even: the samples of dense views are the same too.
+    plans = [plan(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in range(1, 5)]
+    assert plans == plans[:1] * 4
+
+
+@pytest.mark.renders
+def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objects: RenderScene) -> None:
+    # Some hundred photons per pixel, whose rates are not known to 1 % of their own noise.
+    bright = recipe(grid=PROBED, photons={"budget": 3e5})
+    made = plan(bright, two_objects, "scalar")
+    assert made.noise > NOISE_SHARE
+    assert made.thins
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("scope", "pixels"), [("view", 4096), ("channel", 1024), ("scene", 6 * 4096)])
+def test_a_budget_is_divided_by_light_that_is_known_well(
+    two_objects: RenderScene, scope: str, pixels: int
+) -> None:
+    dim = recipe(grid=PROBED, photons={"budget": 0.1, "scope": scope})
+    seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", PROBE_SEED)
+    made = plan(dim, two_objects, "llvm")
+    error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
+    assert made.normaliser_error == pytest.approx(error)
+    assert error <= NORMALISER_ERROR
+    assert error * np.sqrt(made.samples / (made.samples - 1)) > NORMALISER_ERROR  # and no better than that
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("scope", "share"), [("view", 1.0), ("channel", 3.0), ("scene", 1 / 6)])
+def test_a_plan_expects_the_photons_of_its_scope(two_objects: RenderScene, scope: str, share: float) -> None:
+    made = plan(recipe(grid=PROBED, photons={"budget": 600, "scope": scope}), two_objects, "llvm")
+    assert made.photons_per_view == pytest.approx(600 * share, rel=1e-9)
+
+
+def exposed(built: RenderScene, photons_per_view: float, **changes: Any) -> Recipe:
+    """No budget, but an exposure that brings about so many photons."""
+
+    def of(time_s: float) -> Recipe:
+        scope = {"scope": "exposure"}
+        return recipe(grid=PROBED, photons=scope, exposure={"time_s": time_s}, **changes)
+
+    found = plan(of(1e-9), built, "scalar").photons_per_view
+    return of(1e-9 * photons_per_view / found)
+
+
+@pytest.mark.renders
+def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> None:
+    plans = [plan(exposed(two_objects, n), two_objects, "scalar") for n in (0.1, 10, 40, 1e9)]
+    samples = [made.samples for made in plans]
+    assert samples[0] == 1
+    assert samples[0] < samples[1] < samples[2] < samples[3] == MOST_SAMPLES
+    assert all(made.noise <= NOISE_SHARE for made in plans[:3])
+    assert plans[3].noise > NOISE_SHARE  # more than is allowed are needed, and it says so
+    images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
+    with_images = exposed(two_objects, 1, **images)
+    assert plan(with_images, two_objects, "scalar").samples == 33
+
+
+@pytest.mark.renders
+def test_a_plan_asks_for_no_more_paths_than_one_pass_can_count(
+    two_objects: RenderScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("simgen.photons.rendering_noise.MOST_SAMPLES", 1024)
+    large = {"rows": 1, "cols": 1, "height": 2048, "width": 2048, "pixel_mm": 0.0156}
+    made = plan(recipe(grid=large, photons={"budget": 1e12}), two_objects, "scalar")
+    assert 2048 * 2048 * made.samples < MOST_PATHS
+    assert 2048 * 2048 * (made.samples + 1) >= MOST_PATHS  # but for the limit it would be more
+    assert made.noise > NOISE_SHARE
+
+
+@pytest.mark.renders
+def test_darkness_is_planned_too() -> None:
+    light = {"type": "uniform", "luminance_cd_m2": 1.0}
+    wall = {"title": "dark", "lights": [light], "backdrop": {"z_mm": 500.0}}
+    dark = build(backend.load(), Scene.model_validate(wall), Path(), 3)
+    for kind in ("llvm", "scalar"):
+        made = plan(recipe(grid=PROBED), dark, kind)
+        assert (made.thins, made.samples, made.noise, made.normaliser_error) == (False, 1, 0, 0)
+    # What the virtual centre sees says nothing about how large a budget is.
+    with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
+        plan(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
+
+
+def views_of(dataset: Dataset) -> np.ndarray:
+    return np.stack([dataset.counts.view(k, l) for k, l in np.ndindex(2, 3)])
+
+
+@pytest.mark.renders
+def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
+    dataset = open_dataset(nested_dataset)
+    whole, middle, small = (views_of(dataset.at_budget(budget)) for budget in (400, 120, 30))
+    assert (small <= middle).all()
+    assert (middle <= whole).all()
+    for views, budget in ((whole, 400), (middle, 120), (small, 30)):
+        # Six views of so many photons and 38 dark counts: a Poisson total, within 5 standard deviations.
+        expected = 6 * (budget + 0.01 * 64 * 60)
+        assert abs(views.sum() - expected) < 5 * np.sqrt(expected)
+    np.testing.assert_array_equal(whole, views_of(dataset))
+
+
+@pytest.mark.renders
+def test_from_one_budget_another_can_be_reached(nested_dataset: Path) -> None:
+    whole = open_dataset(nested_dataset)
+    small = whole.at_budget(30)
+    assert (whole.budget, small.budget) == (None, 30)
+    assert small.counts.total < whole.counts.total
+    assert small.at_budget(400).counts.total == whole.counts.total
+    assert small.at_budget(30).counts.total == small.counts.total
+
+
+@pytest.mark.renders
+def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None:
+    whole = open_dataset(nested_dataset)
+    for dataset in (whole, whole.at_budget(120), whole.at_budget(30)):
+        assert dataset.truth is not None
+        photons = dataset.truth.photons
+        assert photons is not None
+        assert photons.k.size == dataset.counts.total
+        dark = photons.object_id == -1
+        # 6 views of 38.4 dark counts each.
+        assert abs(dark.sum() - 230.4) < 4 * np.sqrt(230.4)
+        assert np.isinf(photons.z_mm[dark]).all()
+        assert set(np.unique(photons.object_id)) == {-1, 0, 1, 2}
+
+
+@pytest.mark.renders
+def test_every_budget_is_listed_and_hashed(nested_dataset: Path) -> None:
+    manifest = json.loads((nested_dataset / MANIFEST).read_text())
+    parts = {name.split("/")[0] for name in manifest["files"]}
+    assert parts >= {"counts.zarr", "counts-30.zarr", "counts-120.zarr"}
+    assert [entry["budget"] for entry in manifest["photons"]["nested"]] == [30, 120]
+    assert verify(nested_dataset) == len(manifest["files"])
+
+
+@pytest.mark.renders
+def test_a_budget_that_is_not_there_is_refused(nested_dataset: Path) -> None:
+    with pytest.raises(InputError, match=r"no photons of budget 31 here; there are 400, 30, 120"):
+        open_dataset(nested_dataset).at_budget(31)
+
+
+def test_an_exposure_has_no_budgets() -> None:
+    made = recipe(photons={"scope": "exposure"}, exposure={})
+    manifest = {"recipe": made.model_dump(mode="json"), "files": {}}
+    exposed = Dataset(Path("exposed"), manifest, made.grid.camera_grid(), made.cfa)
+    with pytest.raises(InputError, match="exposed: no photons of budget 1000 here; there are none"):
+        exposed.at_budget(made.photons.budget)  # the default, which an exposure does not use
+    elsewhere = replace(exposed, manifest={"files": {}})  # made by other software
+    with pytest.raises(InputError, match="there are none"):
+        elsewhere.at_budget(5)

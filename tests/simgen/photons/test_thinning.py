@@ -1,0 +1,371 @@
+"""Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lit_scenes import DEPTH, EVENLY, LAMP, ball, lit, two_balls
+from scipy import stats
+
+from pcii.core.bayer import colour_index, mosaic
+from pcii.core.camera_grid import CameraGrid
+from simgen.photons.candidates import Setup
+from simgen.photons.thinning import OVERSHOOT_SHARE, PhotonList, draw_photons
+from simgen.renderer import backend
+from simgen.renderer.backend import load_drjit
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.radiance import render_view
+from simgen.spec.recipe import Photons
+from simgen.spec.scene import Scene
+
+pytestmark = pytest.mark.renders
+COMPILED = backend.choose().kind != "scalar"
+# A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
+DRAWS = 200 if COMPILED else 25
+MANY = 1_250_000 if COMPILED else 50_000
+COLOUR_BIAS = 0.01 if COMPILED else 0.05
+GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
+
+
+@pytest.fixture(scope="module")
+def scene() -> RenderScene:
+    return two_balls()
+
+
+@pytest.fixture(scope="module")
+def radiance(scene: RenderScene) -> np.ndarray:
+    """Mosaics (V, H, W) from 4096 samples per pixel: good to about 1 % per pixel, 0.1 % per tile."""
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    return mosaic(np.stack(views).astype(np.float64), "GRBG")
+
+
+def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonList:
+    settings = Photons.model_validate(photons)
+    return draw_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
+
+
+def counted(drawn: PhotonList) -> np.ndarray:
+    """Photons per pixel, (V, H, W)."""
+    counts = np.zeros((4, 32, 32), dtype=np.int64)
+    np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
+    return counts
+
+
+def uniform_if_poisson(counts: np.ndarray, rates: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Randomised probability integral transform: independent uniforms if counts are Poisson(rates)."""
+    below = stats.poisson.cdf(counts - 1, rates)
+    return below + rng.random(counts.shape) * stats.poisson.pmf(counts, rates)
+
+
+def on_tiles(pixels: np.ndarray) -> np.ndarray:
+    """Sums over 4 x 4 pixels, (V, 8, 8)."""
+    return pixels.reshape(-1, 8, 4, 8, 4).sum(axis=(2, 4))
+
+
+def tiles(repeated: np.ndarray) -> np.ndarray:
+    """Sums over 4 x 4 pixels of each draw, (N, V, 8, 8)."""
+    return np.stack([on_tiles(counts) for counts in repeated])
+
+
+def rates_of(radiance: np.ndarray, budget: float) -> np.ndarray:
+    return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
+
+
+@pytest.fixture(scope="module")
+def repeated(scene: RenderScene) -> np.ndarray:
+    """Photons per pixel of independent draws of 1500 photons per view, (`DRAWS`, V, H, W)."""
+    return np.stack([counted(draw(scene, seed, budget=1500)) for seed in range(DRAWS)])
+
+
+def test_counts_fit_the_rendered_rates_pixel_by_pixel_and_tile_by_tile(
+    repeated: np.ndarray, radiance: np.ndarray
+) -> None:
+    rng = np.random.default_rng(1)
+    rates = rates_of(radiance, 1500.0)
+    tilted = rates * np.linspace(0.9, 1.1, 32)  # the fault: brightness off by up to 10 % across the film
+    for counts, expected in ((repeated, rates), (tiles(repeated), on_tiles(rates))):
+        p_values = [
+            stats.kstest(uniform_if_poisson(n, expected, rng).ravel(), "uniform").pvalue for n in counts
+        ]
+        # Each draw's p-value is itself uniform; one suite in a thousand fails by chance.
+        assert stats.kstest(p_values, "uniform").pvalue > 1e-3
+    pooled, n = tiles(repeated).sum(axis=0), len(repeated)
+
+    def chi_square(expected: np.ndarray) -> float:
+        return float(((pooled - n * on_tiles(expected)) ** 2 / (n * on_tiles(expected))).sum())
+
+    assert stats.chi2.sf(chi_square(rates), pooled.size) > 1e-3
+    assert stats.chi2.sf(chi_square(tilted), pooled.size) < 1e-6
+
+
+def test_there_is_no_rendering_noise_in_the_counts(
+    scene: RenderScene, repeated: np.ndarray, radiance: np.ndarray
+) -> None:
+    rates, drawn = on_tiles(rates_of(radiance, 1500.0)), tiles(repeated)
+
+    def dispersion(counts: np.ndarray) -> float:
+        return float(((counts - rates) ** 2 / rates).mean())
+
+    # The mean of n squared standard Poisson deviates is 1 with a spread of sqrt((2 + 1 / rate) / n).
+    spread = np.sqrt((2 + (1 / rates).mean()) / drawn.size)
+    assert abs(dispersion(drawn) - 1) < 4 * spread
+    rng = np.random.default_rng(2)
+    noisy = np.stack([rng.poisson(rates_of(one_sample(scene, seed), 1500.0)) for seed in range(20)])
+    assert dispersion(tiles(noisy)) > 1 + 8 * spread
+
+
+def one_sample(scene: RenderScene, seed: int) -> np.ndarray:
+    """The fault: mosaics of one sample per pixel, whose noise makes counts a Cox process."""
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=1, seed=8 * seed + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    return mosaic(np.stack(views).astype(np.float64), "GRBG")
+
+
+colour_of_pixel = colour_index(32, 32, "GRBG")
+
+
+def photons_by_colour(scene: RenderScene, seed: int) -> np.ndarray:
+    drawn = counted(draw(scene, seed, budget=MANY))
+    return np.array([drawn[:, colour_of_pixel == c].sum() for c in range(3)])
+
+
+def colour_p_value(found: np.ndarray, radiance: np.ndarray, bias: np.ndarray) -> float:
+    """Of a chi-square test with two degrees of freedom of photons (3,) against biased colours."""
+    share = np.array([rates_of(radiance, 1.0)[:, colour_of_pixel == c].sum() for c in range(3)]) * bias
+    expected = found.sum() * share / share.sum()
+    # The reference is good to 0.02 % of a colour, which adds about half to the variance of 5 million.
+    square = ((found - expected) ** 2 / expected).sum() / (1 + 0.5 * MANY / 1_250_000)
+    return float(stats.chi2.sf(square, 2))
+
+
+UNBIASED = np.ones(3)
+
+
+def biased(colour: int) -> np.ndarray:
+    """The fault: one colour is too bright."""
+    return np.where(np.arange(3) == colour, 1 + COLOUR_BIAS, 1.0)
+
+
+def test_colours_are_true_to_a_percent(scene: RenderScene, radiance: np.ndarray) -> None:
+    found = photons_by_colour(scene, 3)
+    assert colour_p_value(found, radiance, UNBIASED) > 1e-3
+    assert colour_p_value(found, radiance, biased(0)) < 1e-3
+
+
+@pytest.mark.slow
+def test_a_colour_off_by_a_percent_is_caught_twenty_times_of_twenty(
+    scene: RenderScene, radiance: np.ndarray
+) -> None:
+    for seed in range(20):
+        assert colour_p_value(photons_by_colour(scene, 50 + seed), radiance, biased(seed % 3)) < 1e-3
+
+
+def test_views_are_independent(scene: RenderScene, radiance: np.ndarray) -> None:
+    counts = counted(draw(scene, 4, budget=3000))
+    excess = ((counts - rates_of(radiance, 3000.0)) / np.sqrt(rates_of(radiance, 3000.0))).reshape(4, -1)
+    correlation = np.asarray(np.corrcoef(excess))
+    assert np.abs(correlation[~np.eye(4, dtype=bool)]).max() < 5 / np.sqrt(32 * 32)
+    leaking = excess[1] + 0.3 * excess[0]  # the fault: a third of one view's noise in another
+    assert np.corrcoef(excess[0], leaking)[0, 1] > 5 / np.sqrt(32 * 32)
+
+
+@pytest.mark.parametrize("scope", ["view", "channel", "scene"])
+def test_totals_are_those_of_the_scope(scene: RenderScene, scope: str) -> None:
+    exact = counted(draw(scene, 5, budget=500, scope=scope, statistics="multinomial"))
+    if scope == "view":
+        assert exact.sum(axis=(1, 2)).tolist() == [500] * 4
+    elif scope == "channel":
+        assert [[int(view[colour_of_pixel == c].sum()) for c in range(3)] for view in exact] == [
+            [500] * 3
+        ] * 4
+    else:
+        assert exact.sum() == 500
+    totals = [counted(draw(scene, seed, budget=500, scope=scope)).sum() for seed in range(12)]
+    expected = {"view": 2000, "channel": 6000, "scene": 500}[scope]
+    assert abs(np.mean(totals) - expected) < 4 * np.sqrt(expected / 12)
+    assert np.std(totals) > 0
+
+
+def test_the_first_photons_of_a_scope_are_a_smaller_draw(scene: RenderScene, radiance: np.ndarray) -> None:
+    drawn = draw(scene, 6, budget=20_000, statistics="multinomial")
+    first = drawn.rank < 2000
+    counts = np.zeros((4, 32, 32))
+    np.add.at(counts, (2 * drawn.k[first] + drawn.l[first], drawn.i[first], drawn.j[first]), 1)
+    assert counts.sum(axis=(1, 2)).tolist() == [2000] * 4
+    expected = on_tiles(rates_of(radiance, 2000.0))
+    chi = ((on_tiles(counts) - expected) ** 2 / expected).sum()
+    assert stats.chi2.sf(chi, 4 * 63) > 1e-3
+
+
+def test_each_photon_knows_what_it_came_from(scene: RenderScene) -> None:
+    drawn = draw(scene, 7, budget=20_000)
+    np.testing.assert_array_less(np.abs(drawn.row_px - drawn.i), 0.5 + 1e-5)
+    np.testing.assert_array_less(np.abs(drawn.col_px - drawn.j), 0.5 + 1e-5)
+    # The same rays again, from the contract's formulas and in double precision up to the ray itself.
+    x_mm, y_mm = (drawn.l - 0.5) * GRID.pitch_mm[0], (drawn.k - 0.5) * GRID.pitch_mm[1]
+    across = (drawn.col_px - 15.5) * GRID.pixel_mm / GRID.focal_mm
+    down = (drawn.row_px - 15.5) * GRID.pixel_mm / GRID.focal_mm
+    direction = np.stack([across, down, np.ones_like(down)]) / np.sqrt(1 + across**2 + down**2)
+    object_id, z_mm = hit_by(scene, np.stack([x_mm, y_mm, np.zeros_like(x_mm)]), direction)
+    # Single precision moves a ray by 1e-5 px, which matters to one in a hundred thousand at an outline.
+    agrees = (object_id == drawn.object_id) & (np.abs(z_mm - drawn.z_mm) < 0.05)
+    assert (~agrees).sum() <= 3
+    # The fault: everyone has their neighbour's origin.
+    assert (np.roll(object_id, 1) != drawn.object_id).sum() > 100
+
+
+def hit_by(scene: RenderScene, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Object id and planar depth (N,) that rays (3, N) hit first."""
+    mi = scene.mi
+    if COMPILED:
+        hit = scene.scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
+        shapes = load_drjit().reinterpret_array(mi.UInt32, hit.shape)
+        return scene.object_of_shape[np.array(shapes)], np.array(hit.p.z)
+    hits = [
+        scene.scene.ray_intersect(mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*along)))
+        for start, along in zip(origin.T.tolist(), direction.T.tolist(), strict=True)
+    ]
+    found = [scene.scene.shapes().index(hit.shape) for hit in hits]
+    return scene.object_of_shape[np.array(found) + 1], np.array([hit.p.z for hit in hits])
+
+
+def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
+    lamp = LAMP | {"width_mm": 20, "height_mm": 20, "luminance_cd_m2": 2e5}
+    plastic, gold = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1)), ball("gold", 150.0, 700.0, (0, 0, 0))
+    plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
+    gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
+    scene = lit([plastic, gold], [lamp, EVENLY])
+    budget = 30_000 if COMPILED else 6000
+    drawn = draw(scene, 1, budget=budget)
+    assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=8192, seed=3 + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
+    assert rates.max() > 0.1 * budget  # a tenth of the light and more is in one pixel's highlight
+    counts = on_tiles(counted(drawn))
+
+    def chi_square(expected: np.ndarray) -> float:
+        return float(((counts - expected) ** 2 / expected).sum())
+
+    assert stats.chi2.sf(chi_square(on_tiles(rates)), counts.size) > 1e-3
+    dulled = np.minimum(rates, 0.7 * rates.max())  # the fault: the brightest highlights are clipped
+    assert stats.chi2.sf(chi_square(on_tiles(dulled)), counts.size) < 1e-3
+
+
+def test_the_same_seed_gives_the_same_photons_and_another_others(scene: RenderScene) -> None:
+    one, again, other = draw(scene, 8, budget=900), draw(scene, 8, budget=900), draw(scene, 9, budget=900)
+    for name in ("k", "l", "i", "j", "object_id", "z_mm", "scope", "rank"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(again, name))
+    assert (counted(one) != counted(other)).any()
+
+
+@pytest.mark.skipif(not COMPILED, reason="scalar mode draws photons on one thread")
+def test_the_number_of_threads_changes_nothing(scene: RenderScene) -> None:
+    dr = load_drjit()
+    threads = dr.thread_count()
+    many = draw(scene, 8, budget=900)
+    try:
+        dr.set_thread_count(1)
+        alone = draw(scene, 8, budget=900)
+    finally:
+        dr.set_thread_count(threads)
+    for name in ("k", "l", "i", "j", "row_px", "col_px", "object_id", "z_mm", "scope", "rank"):
+        np.testing.assert_array_equal(getattr(many, name), getattr(alone, name))
+
+
+def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
+    # Little more than a pixel wide: a tile holds red that has no blue, and blue that has no red.
+    stripes = [
+        {
+            "name": f"stripe{number}",
+            "position_mm": (30.0 * number - 225.0, 0.0, 600.0),
+            "shape": {"type": "card", "width_mm": 30.0, "height_mm": 400.0},
+            "material": {"reflectance": (1.0, 0.0, 0.0) if number % 2 else (0.0, 0.0, 1.0)},
+        }
+        for number in range(16)
+    ]
+    scene = lit(stripes)
+    draws = 3 if COMPILED else 1
+    counts = np.sum([counted(draw(scene, seed, budget=50_000)) for seed in range(draws)], axis=0)
+    views = [
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        for k, l in np.ndindex(2, 2)
+    ]
+    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), draws * 50_000)
+    for colour in range(3):
+        found, own = (
+            counts[:, colour_of_pixel == colour].ravel(),
+            expected[:, colour_of_pixel == colour].ravel(),
+        )
+        assert found[own == 0].sum() == 0
+        found, own = found[own > 1], own[own > 1]  # chi-square wants a photon or two
+        assert stats.chi2.sf(((found - own) ** 2 / own).sum(), own.size) > 1e-3, "RGB"[colour]
+        # The fault: where a colour is dark beside another it gets too little.
+        missing = np.where(own < np.median(own), 0.8 if COMPILED else 0.6, 1.0) * own
+        assert stats.chi2.sf(((found - missing) ** 2 / missing).sum(), own.size) < 1e-3
+
+
+def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
+    # 6 mm of film at 100 000 times the brightness of what is around: most of the light is in few pixels.
+    lamp = {
+        "type": "area",
+        "position_mm": (40, 30, 700),
+        "target_mm": (40, 30, 0),
+        "width_mm": 30,
+        "height_mm": 30,
+        "luminance_cd_m2": 1e6,
+    }
+    scene = lit([ball("grey", -150.0, 600.0, (0.5, 0.5, 0.5))], [lamp])
+    drawn = draw(scene, 10, budget=30_000 if COMPILED else 4000)
+    assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
+    view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=4096, seed=1).astype(float), "GRBG")
+    share = view / view.sum()
+    peak = share > 0.01
+    counts = counted(drawn)[0]
+    n, p = counts.sum(), share[peak].sum()
+    # The lamp's edges cross pixels, whose reference is good to 1 / sqrt(4096) of them.
+    assert abs(counts[peak].sum() / n - p) < 4 * np.sqrt(p * (1 - p) / n) + 0.005
+
+
+def test_a_black_scene_gives_no_photons() -> None:
+    dark = {"type": "uniform", "luminance_cd_m2": 1.0}
+    scene = lit([ball("black", 0.0, 600.0, (0.0, 0.0, 0.0))], [dark])
+    values = {
+        "title": "dark",
+        "lights": [dark],
+        "backdrop": {"z_mm": 500.0, "reflectance": [0, 0, 0]},
+    }
+    scene = build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
+    drawn = draw(scene, 1, budget=100)
+    assert drawn.k.size == 0
+    assert drawn.log["kept"] == 0
+
+
+@pytest.mark.parametrize("light", [{"budget": 300}, {"scope": "exposure"}])
+def test_each_attempt_is_a_stage_that_says_why_it_begins_again(
+    scene: RenderScene, light: dict, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("simgen.photons.thinning.OVERSHOOT_SHARE", -1.0)  # never enough
+    monkeypatch.setattr("simgen.photons.thinning.ATTEMPTS", 3)
+    told: list[tuple[str, int, int]] = []
+    setup, gain = Setup(scene, GRID, "GRBG", DEPTH), 0.01 if "scope" in light else None
+    draw_photons(
+        setup,
+        Photons.model_validate(light),
+        seed=1,
+        photons_per_radiance=gain,
+        report=lambda *stage: told.append(stage),
+    )
+    what = "photons" if gain is None else "parts of the exposure"
+    again = [f"{what}, drawn again with a higher bound (attempt {number})" for number in (2, 3)]
+    assert list(dict.fromkeys(stage for stage, _, _ in told)) == [what, *again]
+    for name in (what, *again):
+        done = [count for stage, count, _ in told if stage == name]
+        assert done == sorted(done)  # a bar never runs backwards

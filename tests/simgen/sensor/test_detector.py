@@ -1,0 +1,383 @@
+"""What a sensor loses, adds and cuts off: exact small cases, and statistics whose planted fault is caught."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from pcii.core.bayer import colour_index, mosaic
+from pcii.core.camera_grid import CameraGrid
+from simgen.sensor.detector import NO_OBJECT, Arrivals, detect, full_light_image, saturate
+from simgen.spec.recipe import FullLight, Sensor
+
+EFFICIENCY = (0.3, 0.6, 0.9)
+COLUMNS = [field.name for field in fields(Arrivals)]
+
+
+def films(rows: int, cols: int, height: int, width: int) -> CameraGrid:
+    return CameraGrid(
+        rows=rows,
+        cols=cols,
+        pitch_mm=(5.0, 5.0),
+        focal_mm=50.0,
+        pixel_mm=0.1,
+        height=height,
+        width=width,
+    )
+
+
+GRID = films(2, 3, 50, 60)
+
+
+def arriving(n: np.ndarray) -> Arrivals:
+    """Photons one by one, n (K, L, H, W) of them; all of object 1, at 600 mm."""
+    where = np.nonzero(n)
+    k, l, i, j = (index.repeat(n[where]) for index in where)
+    ones = np.ones(k.size, dtype=np.int64)
+    return Arrivals(k, l, i, j, ones, 0 * ones, np.arange(k.size), ones, np.full(k.size, 600.0))
+
+
+def poisson(rate: float | np.ndarray, seed: int, grid: CameraGrid = GRID) -> Arrivals:
+    return arriving(np.random.default_rng(seed).poisson(rate, grid.shape_KLHW))
+
+
+DARKNESS = arriving(np.zeros(GRID.shape_KLHW, dtype=np.int64))
+
+
+def counted(counts: Arrivals, grid: CameraGrid = GRID) -> np.ndarray:
+    """Counts per pixel, (K, L, H, W)."""
+    dense = np.zeros(grid.shape_KLHW, dtype=np.int64)
+    np.add.at(dense, (counts.k, counts.l, counts.i, counts.j), counts.n)
+    return dense
+
+
+def has_mean(counts: np.ndarray, rate: float) -> bool:
+    """Whether it is that of as many Poisson numbers, within 4 standard errors."""
+    return bool(abs(counts.mean() - rate) < 4 * np.sqrt(rate / counts.size))
+
+
+def is_poisson(counts: np.ndarray, rate: float) -> bool:
+    """Whether mean and variance are those of as many Poisson numbers, within 4 standard errors."""
+    spread = np.sqrt((rate + 2 * rate**2) / counts.size)
+    return has_mean(counts, rate) and bool(abs(counts.var() - rate) < 4 * spread)
+
+
+FAULTS = {
+    "efficiency": {"quantum_efficiency": (1.0, 0.9, 1.0)},
+    "dark": {"dark_counts": 0.01},
+    "hot": {"hot_pixel_share": 0.01},
+    "dead": {"dead_pixel_share": 0.01},
+}
+
+
+@pytest.mark.parametrize("first_hits", [True, False])
+def test_a_sensor_without_faults_changes_no_bit(first_hits: bool) -> None:
+    arrivals = poisson(0.7, seed=1)
+    if not first_hits:
+        arrivals = replace(arrivals, object_id=None, z_mm=None)
+    counts = detect(arrivals, GRID, "GRBG", Sensor(), seed=1)
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(counts, name), getattr(arrivals, name))
+    for fault in FAULTS.values():
+        faulty = detect(arrivals, GRID, "GRBG", Sensor.model_validate(fault), seed=1)
+        assert (counted(faulty) != counted(arrivals)).any()
+        assert (faulty.object_id is not None) == first_hits
+
+
+def test_the_same_seed_gives_the_same_counts_and_another_others() -> None:
+    sensor = Sensor.model_validate(
+        {name: value for fault in FAULTS.values() for name, value in fault.items()}
+    )
+    arrivals = poisson(0.7, seed=1)
+    one, again, other = (detect(arrivals, GRID, "GRBG", sensor, seed) for seed in (3, 3, 4))
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(one, name), getattr(again, name))
+    assert (counted(one) != counted(other)).any()
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", "BGGR", None])
+def test_each_colour_is_detected_with_its_efficiency_and_stays_poisson(cfa: str | None) -> None:
+    sensor, arrivals = Sensor(quantum_efficiency=EFFICIENCY), poisson(2.0, seed=1)
+    once = detect(arrivals, GRID, cfa, sensor, seed=2)
+    twice = detect(once, GRID, cfa, sensor, seed=3)  # the fault: an efficiency that is applied twice
+    # A monochrome sensor has the efficiency of green, 1.
+    colours = colour_index(50, 60, cfa) if cfa else np.ones((50, 60), np.uint8)
+    rounded = np.rint(np.array(EFFICIENCY)[colours] * counted(arrivals))  # the fault: no chance in it
+    for colour in np.unique(colours):
+        rate, here = 2.0 * EFFICIENCY[colour], colours == colour
+        assert is_poisson(counted(once)[..., here], rate)
+        assert not is_poisson(counted(twice)[..., here], rate)
+        assert not is_poisson(rounded[..., here], rate)
+
+
+def test_photons_that_come_in_numbers_are_detected_one_by_one() -> None:
+    one_by_one = poisson(2.0, seed=4)
+    n = counted(one_by_one)
+    where = np.nonzero(n)
+    nobody = np.full(where[0].size, -1)
+    sensor = Sensor(quantum_efficiency=(0.6, 0.6, 0.6))
+    found = counted(detect(Arrivals(*where, n[where], nobody, nobody), GRID, "GRBG", sensor, seed=5))
+    assert is_poisson(found, 1.2)
+    assert (found <= n).all()
+    whole = n * (np.random.default_rng(5).random(n.shape) < 0.6)  # the fault: all of a pixel's or none
+    assert not is_poisson(whole, 1.2)
+
+
+def test_dark_counts_are_poisson_everywhere_and_come_from_nothing() -> None:
+    dark = detect(DARKNESS, GRID, "GRBG", Sensor(dark_counts=0.5), seed=1)
+    counts = counted(dark)
+    assert is_poisson(counts, 0.5)
+    assert not has_mean(2 * counts, 0.5)
+    for lines in (counts.sum(axis=(0, 1, 2)), counts.sum(axis=(0, 1, 3)), counts.sum(axis=(2, 3)).ravel()):
+        assert stats.chisquare(lines).pvalue > 1e-3
+        tilted = lines * np.linspace(0.8, 1.2, lines.size)  # the fault: more of them towards one side
+        assert stats.chisquare(tilted).pvalue < 1e-3
+    assert dark.object_id is not None
+    assert dark.z_mm is not None
+    assert (dark.object_id == NO_OBJECT).all()
+    assert np.isinf(dark.z_mm).all()
+    assert (dark.rank == -1).all()
+
+
+def test_dark_counts_come_on_top_of_photons() -> None:
+    arrivals = poisson(0.5, seed=2)
+    both = detect(arrivals, GRID, "GRBG", Sensor(dark_counts=0.2), seed=3)
+    assert both.object_id is not None
+    real = both.take(both.object_id != NO_OBJECT)
+    for name in COLUMNS:
+        np.testing.assert_array_equal(getattr(real, name), getattr(arrivals, name))
+    assert is_poisson(counted(both), 0.7)
+    assert not is_poisson(counted(real), 0.7)  # the fault: they take the place of photons
+
+
+def test_hot_pixels_are_the_same_in_every_view() -> None:
+    sensor = Sensor(hot_pixel_share=0.01, hot_pixel_counts=50.0)
+    counts = counted(detect(DARKNESS, GRID, "GRBG", sensor, seed=1))
+    hot = counts > 0  # a Poisson number of mean 50 is 0 once in 1e21
+    assert hot[0, 0].sum() == round(0.01 * 50 * 60)
+    assert (hot == hot[0, 0]).all()
+    assert is_poisson(counts[hot], 50.0)
+    assert (counts[0, 0] != counts[1, 2]).any()  # the pixels are the same, their counts are not
+    another = counted(detect(DARKNESS, GRID, "GRBG", sensor, seed=2)) > 0
+    assert (another != hot[0, 0]).any(axis=(2, 3)).all()  # the fault: every view has its own
+
+
+def test_hot_pixels_count_photons_too() -> None:
+    sensor = Sensor(hot_pixel_share=0.1, hot_pixel_counts=5.0)
+    counts = counted(detect(poisson(2.0, seed=1), GRID, "GRBG", sensor, seed=1))
+    hot = counted(detect(DARKNESS, GRID, "GRBG", sensor, seed=1)).sum(axis=(0, 1)) > 0
+    assert hot.sum() == 300  # six views with a mean of 5 each: none is missed but once in 1e13
+    assert is_poisson(counts[..., hot], 7.0)
+    assert is_poisson(counts[..., ~hot], 2.0)
+
+
+def silent(counts: np.ndarray) -> np.ndarray:
+    """Pixels (H, W) that count nothing in any view."""
+    return counts.sum(axis=(0, 1)) == 0
+
+
+def test_dead_pixels_never_count() -> None:
+    dead = Sensor(dead_pixel_share=0.1, dark_counts=1.0, hot_pixel_share=0.3, hot_pixel_counts=9.0)
+    arrivals = poisson(20.0, seed=1)
+    counts = counted(detect(arrivals, GRID, "GRBG", dead, seed=2))
+    # A pixel that lives stays at 0 once in e^120.
+    assert silent(counts).sum() == 300
+    assert (silent(counts) == (counts[0, 0] == 0)).all()
+    dark = detect(DARKNESS, GRID, "GRBG", Sensor(dark_counts=1.0), seed=3)
+    assert silent(counts + counted(dark)).sum() < 30  # the fault: dark counts in dead pixels
+    another = silent(counted(detect(arrivals, GRID, "GRBG", dead, seed=4)))
+    assert (another != silent(counts)).any()
+
+
+def test_a_pixel_that_is_hot_and_dead_is_dead() -> None:
+    all_hot = Sensor(hot_pixel_share=1.0, hot_pixel_counts=50.0, dead_pixel_share=0.5)
+    counts = counted(detect(DARKNESS, GRID, "GRBG", all_hot, seed=1))
+    assert silent(counts).sum() == 1500
+    assert is_poisson(counts[..., ~silent(counts)], 50.0)
+    none_left = Sensor(dead_pixel_share=1.0, dark_counts=1.0)
+    assert detect(poisson(1.0, seed=1), GRID, "GRBG", none_left, seed=1).k.size == 0
+
+
+LOW = films(2, 3, 400, 400)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "expected"),
+    [
+        (Sensor(), 1e-3),
+        (Sensor(quantum_efficiency=(0.5, 0.5, 0.5)), 5e-4),
+        (Sensor(dark_counts=1e-3), 2e-3),
+        (Sensor(counter_bits=1), 1e-3),
+    ],
+)
+def test_the_mean_is_kept_at_low_light(sensor: Sensor, expected: float) -> None:
+    counts = detect(poisson(1e-3, 1, LOW), LOW, "GRBG", sensor, seed=2)
+    if sensor.counter_bits is not None:  # two in a pixel are too rare to be missed here
+        counts = saturate(counts, LOW, sensor.counter_bits, seed=2)
+    assert has_mean(counted(counts, LOW), expected)
+    assert not has_mean(2 * counted(counts, LOW), expected)  # the fault of a well-known simulator
+
+
+def test_one_bit_tells_whether_there_was_a_photon() -> None:
+    rates = np.array([0.02, 0.1, 0.3, 0.5, 1.0, 3.0]).reshape(2, 3, 1, 1)
+    bits = counted(saturate(poisson(rates, seed=1), GRID, 1, seed=2))
+    assert bits.max() == 1
+    share, p = bits.mean(axis=(2, 3)), 1 - np.exp(-rates[:, :, 0, 0])
+    spread = np.sqrt(p * (1 - p) / (50 * 60))
+    assert (np.abs(share - p) < 4 * spread).all()
+    linear = np.minimum(rates[:, :, 0, 0], 1)  # the fault: the chance of a photon is its mean number
+    assert (np.abs(share - linear) > 4 * spread)[rates[:, :, 0, 0] >= 0.3].all()
+
+
+TEN = films(1, 1, 2, 5)
+UP_TO_NINE = np.arange(10).reshape(1, 1, 2, 5)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 3, 32])
+def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
+    most = 2**bits - 1
+    expected = np.minimum(UP_TO_NINE, most)
+    photons = arriving(UP_TO_NINE)
+    np.testing.assert_array_equal(counted(saturate(photons, TEN, bits, seed=1), TEN), expected)
+    k, l, i, j = (np.tile(index, 2) for index in np.nonzero(UP_TO_NINE))
+    n = UP_TO_NINE[UP_TO_NINE > 0]
+    nobody = np.full(k.size, -1)
+    in_two_lumps = Arrivals(k, l, i, j, np.concatenate([n // 2, n - n // 2]), nobody, nobody)
+    np.testing.assert_array_equal(counted(saturate(in_two_lumps, TEN, bits, seed=1), TEN), expected)
+    one_after_the_other = np.minimum(in_two_lumps.n, most)  # the fault: each lump stops by itself
+    wrong = counted(replace(in_two_lumps, n=one_after_the_other), TEN)
+    assert bits == 32 or (wrong != expected).any()
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4])
+def test_no_total_exceeds_the_counter_and_none_below_changes(bits: int) -> None:
+    arrivals = poisson(4.0, seed=bits)
+    counts = counted(saturate(arrivals, GRID, bits, seed=1))
+    assert counts.max() <= 2**bits - 1
+    np.testing.assert_array_equal(counts, np.minimum(counted(arrivals), 2**bits - 1))
+
+
+def test_a_counter_of_32_bits_stops_at_four_thousand_million() -> None:
+    zero, nobody = np.zeros(1, dtype=np.int64), np.full(1, -1)
+    many = Arrivals(zero, zero, zero, zero, np.array([1 << 33]), nobody, nobody)
+    assert saturate(many, TEN, 32, seed=1).n.tolist() == [2**32 - 1]
+
+
+def test_no_counts_stay_none() -> None:
+    nothing = saturate(detect(DARKNESS, GRID, "GRBG", Sensor(), seed=1), GRID, 1, seed=1)
+    assert nothing.k.size == 0
+
+
+def companions(n: list[int]) -> Arrivals:
+    """In each of 4096 pixels some counts of each object, n[0] of object 1 and so on; in this order."""
+    pixels = films(1, 1, 64, 64)
+    flat, ids = np.arange(4096).repeat(len(n)), np.tile(np.arange(len(n)) + 1, 4096)
+    k, l, i, j = np.unravel_index(flat, pixels.shape_KLHW)
+    nobody = np.full(flat.size, -1)
+    return Arrivals(k, l, i, j, np.tile(n, 4096), nobody, nobody, ids, np.full(flat.size, 600.0))
+
+
+@pytest.mark.parametrize(("n", "bits"), [([1, 1, 1], 1), ([1, 1, 1, 1, 1], 2), ([1, 9], 1), ([2, 8], 2)])
+def test_which_counts_a_counter_keeps_is_left_to_chance(n: list[int], bits: int) -> None:
+    arrivals, pixels = companions(n), films(1, 1, 64, 64)
+    kept = saturate(arrivals, pixels, bits, seed=1)
+    most, total = 2**bits - 1, sum(n)
+    assert (counted(kept, pixels) == most).all()
+    assert kept.object_id is not None
+    for number, own in enumerate(n, start=1):
+        # Of a pixel's counts so many are drawn without putting any back: hypergeometric.
+        mean = 4096 * most * own / total
+        spread = np.sqrt(mean * (1 - own / total) * (total - most) / (total - 1))
+        assert abs(kept.n[kept.object_id == number].sum() - mean) < 4 * spread
+        first_in_the_list = 4096 * min(most, own)  # the fault: first come, first served
+        assert number > 1 or abs(first_in_the_list - mean) > 4 * spread
+    other = saturate(arrivals, pixels, bits, seed=2)
+    assert other.object_id is not None
+    assert kept.object_id.tolist() != other.object_id.tolist()
+
+
+GAIN = 20.0
+SIDE = 200
+
+
+def told(radiance: np.ndarray, light: FullLight, cfa: str | None = None, **sensor: object) -> np.ndarray:
+    settings = Sensor.model_validate({"full_light": light, **sensor})
+    return full_light_image(radiance, cfa, GAIN, settings, np.random.default_rng(1))
+
+
+def even(value: float, channels: int = 1) -> np.ndarray:
+    return np.full((SIDE, SIDE, channels), value, dtype=np.float32)
+
+
+@pytest.mark.parametrize(("cfa", "channels"), [("GRBG", 1), ("GRBG", 3), (None, 1), (None, 3)])
+def test_mid_light_is_told_as_it_is(cfa: str | None, channels: int) -> None:
+    light = np.array([30.0, 50.0, 70.0], dtype=np.float32)
+    radiance = even(50.0) if channels == 1 else even(1.0, 3) * light
+    image = told(radiance, FullLight(), cfa, quantum_efficiency=EFFICIENCY).astype(np.float64)
+    assert image.shape == radiance.shape
+    efficiency = np.array(EFFICIENCY)
+    if channels == 1:
+        flat = np.broadcast_to(efficiency, (SIDE, SIDE, 3))
+        efficiency = mosaic(flat, cfa)[..., None] if cfa else efficiency[1]
+    gain = np.broadcast_to(efficiency * GAIN, image.shape)
+    step_e = 10_000 / 4095
+    electrons = image * gain
+    expected = radiance * gain
+    variance = expected + 2.0**2 + step_e**2 / 12
+    for one in np.unique(expected):
+        here = expected == one
+        spread = np.sqrt(variance[here].mean() / here.sum())
+        assert abs(electrons[here].mean() - one) < 4 * spread
+        assert abs(image[here].mean() - one) > 4 * spread  # the fault: electrons are told, not radiance
+        # Noise shows whose efficiency it was; the standard error of n nearly normal numbers' variance.
+        ratio = electrons[here].var() / variance[here].mean()
+        assert abs(ratio - 1) < 4 * np.sqrt(2 / here.sum())
+    blind = told(radiance, FullLight(), cfa) * efficiency  # the fault: the loss is not made up for
+    assert abs(blind.mean() / radiance.mean() - 1) > 0.05
+
+
+def test_dark_counts_brighten_a_full_light_image() -> None:
+    image = told(even(50.0), FullLight(), dark_counts=100.0)
+    # 1100 electrons and the noise of reading in 40 000 pixels.
+    assert abs(image.mean() * GAIN - 1100) < 4 * np.sqrt((1100 + 4) / SIDE**2)
+
+
+def test_no_pixel_tells_more_than_its_full_well_or_less_than_nothing() -> None:
+    bright = told(even(2000.0), FullLight(read_noise_e=0.0))
+    np.testing.assert_allclose(bright, 10_000 / GAIN, rtol=1e-6)  # single precision
+    noisy = told(even(2000.0), FullLight(read_noise_e=50.0))
+    assert noisy.max() <= 10_000 / GAIN * (1 + 1e-6)
+    # Reading noise comes after the well: half of the full pixels are told as less than full.
+    assert abs((noisy < 10_000 / GAIN - 0.1).mean() - 0.5) < 0.05
+    assert told(even(0.0), FullLight(read_noise_e=50.0)).min() == 0
+    assert (told(even(0.0), FullLight(read_noise_e=0.0)) == 0).all()
+
+
+@pytest.mark.parametrize("read_noise_e", [0.0, 2.0, 40.0])
+def test_variance_is_that_of_photons_reading_and_steps(read_noise_e: float) -> None:
+    electrons = told(even(40.0), FullLight(read_noise_e=read_noise_e)).astype(np.float64) * GAIN
+    step_e = 10_000 / 4095
+    variance = 800 + read_noise_e**2 + step_e**2 / 12
+    # Standard error of the variance of n nearly normal numbers.
+    spread = variance * np.sqrt(2 / SIDE**2)
+    assert abs(electrons.var() - variance) < 4 * spread
+    if read_noise_e > 10:  # the faults: reading adds no noise, or its variance is taken for its deviation
+        assert abs(electrons.var() - 800) > 4 * spread
+        assert abs(electrons.var() - 800 - read_noise_e) > 4 * spread
+
+
+def test_the_converter_tells_the_nearest_of_its_steps() -> None:
+    # A well so deep that the photons' own noise, 1e-4 of it, is far less than a step of a seventh.
+    light = FullLight(full_well_e=1e8, read_noise_e=0.0, adc_bits=3)
+    share = (np.arange(0, 70) + 0.5) / 70  # of the well; all of them between two limits of steps
+    radiance = (share * 1e8 / GAIN).astype(np.float32).reshape(1, 70, 1)
+    steps = told(radiance, light) * GAIN / 1e8 * 7
+    np.testing.assert_allclose(steps.ravel(), np.rint(7 * share), atol=1e-5)  # single precision
+    assert np.unique(np.rint(steps)).tolist() == list(range(8))
+    assert (np.floor(7 * share) != np.rint(7 * share)).any()  # the fault: what lies below is told
+
+
+def test_one_bit_of_a_converter_is_black_or_white() -> None:
+    image = told(even(250.0), FullLight(adc_bits=1))  # half of the full well
+    assert set(np.unique(image)) == {0.0, 500.0}

@@ -1,0 +1,144 @@
+"""Absolute exposure: photons of a uniformly lit sensor are those of the calculation by hand."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pcii.core.bayer import colour_index
+from pcii.core.console import silent
+from simgen.photons.photon_counting import Plan, absolute_gain, draw_from_views, plan, thin
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.radiance import render_view
+from simgen.sensor.detector import Arrivals
+from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
+from simgen.sensor.mosaic import sense
+from simgen.spec.recipe import Exposure, Recipe
+from simgen.spec.scene import Scene
+from simgen.spectral.filters import filters_for
+from simgen.spectral.spectra import illuminant, integral, observer, patch, sensitivity
+
+LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
+BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
+"""Photons per pixel: 16 of 555 nm. The 4.09e15 in a lumen second are rounded to 1 in 1000."""
+Draw = Callable[[Recipe, RenderScene], Arrivals]
+
+
+def recipe(**changes: object) -> Recipe:
+    values = {
+        "scene": "made up",
+        "seed": 1,
+        "grid": {"rows": 1, "cols": 2, "height": 64, "width": 80, "pixel_mm": PIXEL_MM},
+        "photons": {"scope": "exposure"},
+        "exposure": {"f_number": F_NUMBER, "time_s": TIME_S},
+    }
+    return Recipe.model_validate(values | changes)
+
+
+@pytest.fixture(scope="module")
+def lit_evenly() -> RenderScene:
+    light = {"type": "uniform", "luminance_cd_m2": LUMINANCE_CD_M2}
+    scene = Scene.model_validate({"title": "nothing but light", "lights": [light]})
+    return build(backend.load(), scene, Path(), 3)
+
+
+def planned(thins: bool) -> Plan:
+    return Plan(thins=thins, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
+
+
+def thinned(made: Recipe, built: RenderScene) -> Arrivals:
+    return thin(made, built, planned(True))[0]
+
+
+def dense(made: Recipe, built: RenderScene) -> Arrivals:
+    grid = made.grid.camera_grid()
+
+    def mosaic_of(k: int, l: int) -> np.ndarray:
+        image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
+        return sense(image, made.cfa)
+
+    return draw_from_views(made, mosaic_of, planned(False), silent)[0]
+
+
+def counted(arrivals: Arrivals) -> np.ndarray:
+    counts = np.zeros((2, 64, 80), dtype=np.int64)
+    np.add.at(counts, (arrivals.l, arrivals.i, arrivals.j), arrivals.n)
+    return counts
+
+
+def test_a_lux_of_green_is_so_many_photons() -> None:
+    # A handbook's number: 4.09e11 photons of 555 nm a second and square centimetre.
+    assert pytest.approx(4.09e11 * 1e4, rel=1e-3) == PHOTONS_PER_LUMEN_SECOND
+
+
+def test_photons_per_radiance_are_those_by_hand() -> None:
+    found = photons_per_radiance(Exposure(f_number=F_NUMBER, time_s=TIME_S), PIXEL_MM)
+    assert LUMINANCE_CD_M2 * found == pytest.approx(BY_HAND, rel=1e-3)
+
+
+def test_the_guides_example_has_these_photons() -> None:
+    """`docs/light.md`: "neutral 5" in 0.01 lux of D65 at f/8, 10 ms and 35.2 um, in RGB mode and spectral."""
+    gain = photons_per_radiance(Exposure(f_number=8.0, time_s=0.01), 0.0352)
+    assert gain == pytest.approx(622.0, abs=0.05)
+    per_cd = gain * 0.01 / math.pi
+    grey, d65, a = patch("neutral 5"), illuminant("D65"), illuminant("A")
+    seen = per_cd * integral(observer()[1] * d65 * grey) / integral(observer()[1])
+    assert seen == pytest.approx(0.402, abs=5e-4)
+    nikon = sensitivity("Nikon 5100 (NPL)", Path())
+    for lamp, photons in ((d65, (0.193, 0.333, 0.284)), (a, (0.266, 0.251, 0.114))):
+        found = per_cd * integral(filters_for(nikon, lamp).sensitivity * lamp * grey)
+        np.testing.assert_allclose(found, photons, atol=5e-4)
+
+
+def test_photons_grow_with_time_and_with_areas() -> None:
+    one = photons_per_radiance(Exposure(f_number=4.0, time_s=0.01), 0.02)
+    assert photons_per_radiance(Exposure(f_number=4.0, time_s=0.03), 0.02) == pytest.approx(3 * one)
+    assert photons_per_radiance(Exposure(f_number=4.0, time_s=0.01), 0.06) == pytest.approx(9 * one)
+    # Two stops less let a quarter through.
+    assert photons_per_radiance(Exposure(f_number=8.0, time_s=0.01), 0.02) == pytest.approx(one / 4)
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("draw", [thinned, dense])
+@pytest.mark.parametrize("cfa", ["GRBG", "none"])
+def test_an_even_light_gives_the_photons_by_hand(lit_evenly: RenderScene, draw: Draw, cfa: str) -> None:
+    made = recipe(sensor={"cfa": cfa})
+    counts = counted(draw(made, lit_evenly))
+    # 4 standard errors of mean and variance of n Poisson numbers, and what was rounded by hand.
+    n = counts.size
+    allowed = 4 * np.sqrt(BY_HAND / n) + 1e-3 * BY_HAND
+    assert abs(counts.mean() - BY_HAND) < allowed
+    assert abs(counts.var() - BY_HAND) < 4 * np.sqrt((BY_HAND + 2 * BY_HAND**2) / n)
+    # The faults: pi is left out, a pixel's side taken for its area, an f-number off by a per cent.
+    for wrong in (BY_HAND / math.pi, BY_HAND / 20e-6, BY_HAND * 1.01**2):
+        assert abs(counts.mean() - wrong) > allowed
+    colours = colour_index(64, 80, made.cfa)
+    for colour in np.unique(colours):
+        own = counts[:, colours == colour]
+        assert abs(own.mean() - BY_HAND) < 4 * np.sqrt(BY_HAND / own.size) + 1e-3 * BY_HAND
+    for view in counts:
+        assert abs(view.mean() - BY_HAND) < 4 * np.sqrt(BY_HAND / view.size) + 1e-3 * BY_HAND
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("draw", [thinned, dense])
+def test_a_longer_exposure_gives_more_photons(lit_evenly: RenderScene, draw: Draw) -> None:
+    longer = recipe(exposure={"f_number": F_NUMBER, "time_s": 3 * TIME_S})
+    mean = counted(draw(longer, lit_evenly)).mean()
+    assert abs(mean - 3 * BY_HAND) < 4 * np.sqrt(3 * BY_HAND / (2 * 64 * 80)) + 3e-3 * BY_HAND
+
+
+@pytest.mark.renders
+def test_the_plan_expects_the_photons_by_hand(lit_evenly: RenderScene) -> None:
+    made = plan(recipe(), lit_evenly, "llvm")
+    assert made.photons_per_view == pytest.approx(64 * 80 * BY_HAND, rel=1e-3)
+    assert made.noise == pytest.approx(0, abs=1e-6)  # single precision: an even light has no noise
+    assert made.samples == 1
+
+
+def test_a_budget_knows_no_exposure() -> None:
+    assert absolute_gain(recipe(photons={"budget": 10.0})) is None
+    assert absolute_gain(recipe()) == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)

@@ -1,0 +1,220 @@
+"""Spectra of lights, surfaces and cameras, their names in scenes, and the wavelengths that are drawn."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pcii.core.errors import InputError
+from simgen.base.strict_models import validate
+from simgen.spec.scene import Scene
+from simgen.spectral.filters import CELLS, Filters, filters_for
+from simgen.spectral.spectra import (
+    WAVELENGTH_NM,
+    illuminant,
+    integral,
+    linear_srgb,
+    observer,
+    patch,
+    patch_names,
+    sensitivity,
+    tint,
+)
+
+CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
+
+
+@pytest.mark.parametrize("name", ["D65", "A", "FL2", "E"])
+def test_illuminants_have_luminance_1_and_their_own_chromaticity(name: str) -> None:
+    import colour
+
+    xyz = integral(observer() * illuminant(name)) / integral(observer()[1])
+    assert xyz[1] == pytest.approx(1, rel=1e-12)
+    expected = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"][name]
+    # The published chromaticities have four or five digits, and spectra are cut at 380 and 780 nm.
+    np.testing.assert_allclose(xyz[:2] / xyz.sum(), expected, atol=2e-4)
+    assert (np.array([0.2126, 0.7152, 0.0722]) @ tint(name)) == pytest.approx(1)
+
+
+def test_grey_patches_are_grey_and_red_is_red() -> None:
+    grey = linear_srgb(patch("neutral 5"))
+    np.testing.assert_allclose(grey, 10**-0.7, atol=0.01)  # its density is 0.70
+    red = linear_srgb(patch("red"))
+    assert red[0] > 4 * red[1] > 0
+    assert len(patch_names()) == 24
+    assert patch_names()[0] == "dark skin"
+    # A surface that reflects everything is white.
+    np.testing.assert_allclose(linear_srgb(np.ones(WAVELENGTH_NM.size)), 1, rtol=1e-12)
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+@pytest.mark.parametrize("lamp", ["D65", "A", "FL2"])
+def test_drawn_wavelengths_tell_what_a_pixel_sees(camera: str, lamp: str) -> None:
+    filters = filters_for(sensitivity(camera, Path()), illuminant(lamp))
+    light = illuminant(lamp) * patch("cyan")
+    rng = np.random.default_rng(4)
+    fine_nm = np.linspace(380, 780, 8001)
+    for colour, curve in enumerate(filters.sensitivity):
+        chosen_nm, weight = filters.draw(np.full(20_000, colour), rng.random(20_000))
+        assert chosen_nm.min() >= 380
+        assert chosen_nm.max() <= 780
+        seen = (np.interp(chosen_nm, WAVELENGTH_NM, light) * weight).sum(axis=1)
+        product = np.interp(fine_nm, WAVELENGTH_NM, light) * np.interp(fine_nm, WAVELENGTH_NM, curve)
+        exact = np.trapezoid(product, fine_nm)
+        # Four standard errors; the fault, weights that forget how wide a cell is, is off by far more.
+        assert abs(seen.mean() - exact) < 4 * seen.std() / np.sqrt(seen.size)
+        assert seen.std() < 0.35 * seen.mean()  # what it is for: evenly drawn wavelengths give 0.5 to 2
+
+
+def test_of_light_that_follows_the_lamp_every_draw_tells_nearly_all() -> None:
+    filters = filters_for(sensitivity(CAMERAS[0], Path()), illuminant("FL2"))
+    chosen_nm, weight = filters.draw(np.ones(1000, dtype=np.int64), np.random.default_rng(1).random(1000))
+    seen = (np.interp(chosen_nm, WAVELENGTH_NM, filters.light) * weight).sum(axis=1)
+    assert seen.std() < 0.05 * filters.white[1]  # the floor of even draws, and lines within cells
+
+
+def test_a_perfect_detector_of_555_nm_counts_lumens() -> None:
+    curve = np.exp(-(((WAVELENGTH_NM - 555) / 4) ** 2))
+    filters = filters_for(curve[None], illuminant("E"))
+    # It detects each photon of 555 nm: of a narrow line there a pixel sees the luminance, whose
+    # integral with the luminosity function is 1 per nm there.
+    line = np.where(WAVELENGTH_NM == 555, 1.0, 0.0)
+    luminance = integral(observer()[1] * line) / integral(observer()[1])
+    assert integral(filters.sensitivity[0] * line) == pytest.approx(luminance, rel=2e-3)
+
+
+def test_cells_of_wavelengths_grow_and_cover_where_a_pixel_sees() -> None:
+    curve = np.where((WAVELENGTH_NM >= 500) & (WAVELENGTH_NM <= 600), 1.0, 0.0)
+    filters = Filters(curve[None], illuminant("D65"))
+    bounds = filters.wavelength_nm[0]
+    assert bounds.shape == (CELLS + 1,)
+    assert (np.diff(bounds) > 0).all()
+    assert bounds[0] == pytest.approx(499, abs=0.5)  # the curve rises from 0 at 499 nm
+    assert bounds[-1] == pytest.approx(601, abs=0.5)
+
+
+def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
+    lines = ["wavelength_nm,R,G,B"] + [f"{nm},{nm - 400},{50},{700 - nm}" for nm in range(400, 701, 10)]
+    (tmp_path / "mine.csv").write_text("\n".join(lines))
+    curves = sensitivity("mine.csv", tmp_path)
+    assert curves.shape == (3, WAVELENGTH_NM.size)
+    at = WAVELENGTH_NM.tolist().index
+    np.testing.assert_allclose(curves[:, at(550)], [0.5, 50 / 300, 0.5])
+    assert (curves[:, at(399)] == 0).all()  # beyond its ends a camera sees nothing
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "cannot be read"),
+        ("wavelength_nm,R,G,B\n400,1,2\n", "columns"),
+        ("wavelength_nm,R,G,B\n400,1,nan,2\n500,1,1,1\n", "finite"),
+        ("wavelength_nm,R,G,B\n500,1,1,2\n400,1,1,1\n", "grow"),
+        ("wavelength_nm,R,G,B\n400,1,-1,2\n500,1,1,1\n", "not negative"),
+        ("wavelength_nm,R,G,B\n900,1,1,2\n950,1,1,1\n", "sees no light"),
+        ("wavelength_nm,R,G,B\n400,a,1,2\n500,1,1,1\n", "cannot be read"),
+        ("wavelength_nm,R,G,B\n400,0,1,2\n500,0,1,1\n", "sees no light from 380 to 780 nm in R"),
+        ("wavelength_nm,B,G,R\n400,1,1,2\n500,1,1,1\n", "first line must be wavelength_nm,R,G,B"),
+        ("nm,y\n400,1\n500,1\n", "first line must be wavelength_nm"),
+        ("400,1,1,2\n500,1,1,1\n600,1,1,1\n", "first line must be wavelength_nm,R,G,B"),
+    ],
+)
+def test_bad_csv_files_are_told(tmp_path: Path, text: str, says: str) -> None:
+    (tmp_path / "bad.csv").write_text(text)
+    with pytest.raises(InputError, match=says):
+        sensitivity("bad.csv", tmp_path)
+
+
+def test_a_csv_file_as_spreadsheets_write_it(tmp_path: Path) -> None:
+    text = "\ufeffwavelength_nm, luminosity\r\n400, 0\r\n\r\n500, 2\r\n600, 0\r\n"
+    (tmp_path / "mine.csv").write_text(text, encoding="utf-8")
+    curve = sensitivity("mine.csv", tmp_path)
+    assert curve.shape == (1, WAVELENGTH_NM.size)
+    np.testing.assert_allclose(curve[0, WAVELENGTH_NM == 450], 0.5)
+
+
+def test_a_pixel_that_no_lamp_shines_for_is_dark_and_no_fault() -> None:
+    curve = np.where(WAVELENGTH_NM <= 384, 1.0, 0.0)
+    light = illuminant("LED-B4")
+    assert (light[WAVELENGTH_NM <= 385] == 0).all()
+    filters = filters_for(curve[None], light)
+    assert filters.white[0] == 0
+    chosen_nm, weight = filters.draw(np.zeros(100, dtype=np.int64), np.linspace(0, 0.99, 100))
+    assert chosen_nm.min() >= 380
+    assert chosen_nm.max() <= 385 + 1e-3
+    # Light that no lamp is known to have would be seen.
+    assert weight.sum(axis=1).mean() == pytest.approx(integral(filters.sensitivity[0]), rel=0.02)
+
+
+def test_tables_that_end_before_light_does_are_refused() -> None:
+    with pytest.raises(InputError, match="only told from 350 to 690 nm"):
+        illuminant("ISO 7589 Photoflood")
+
+
+def scene_of(reflectance: object, lamp: str) -> dict[str, Any]:
+    card = {
+        "name": "card",
+        "position_mm": (0, 0, 500),
+        "shape": {"type": "card", "width_mm": 9, "height_mm": 9},
+        "material": {"reflectance": reflectance},
+    }
+    light = {"type": "uniform", "luminance_cd_m2": 1.0, "illuminant": lamp}
+    return {"title": "test", "objects": [card], "lights": [light]}
+
+
+def test_names_that_do_not_exist_are_told_with_their_place_in_the_scene() -> None:
+    says = r"^scene\.toml: 'objects\[0\]\.material\.reflectance': there is no patch 'darkskin'; did you mean"
+    with pytest.raises(InputError, match=says):
+        validate(Scene, scene_of("darkskin", "D65"), "scene.toml")
+    with pytest.raises(InputError, match=r"^scene\.toml: 'lights\[0\]\.illuminant': there is no illuminant"):
+        validate(Scene, scene_of("dark skin", "D655"), "scene.toml")
+    values = scene_of("dark skin", "D65") | {"backdrop": {"z_mm": 900, "reflectance": "gray"}}
+    with pytest.raises(InputError, match=r"'backdrop\.reflectance': there is no patch 'gray'; known are"):
+        validate(Scene, values, "scene.toml")
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(("reflectance", "loads"), [([0.2, 0.3, 0.4], False), ("dark skin", True)])
+def test_colour_science_is_loaded_only_for_scenes_that_need_it(reflectance: object, loads: bool) -> None:
+    script = f"""
+import sys
+import pathlib
+from simgen.renderer import backend, mitsuba_scene
+from simgen.spec.scene import Scene
+world = Scene.model_validate({scene_of(reflectance, "D65")})
+mitsuba_scene.build(backend.load(), world, pathlib.Path(), 2)
+print("colour" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[-1] == str(loads)
+
+
+def test_unknown_names_get_a_suggestion() -> None:
+    with pytest.raises(InputError, match="did you mean 'Nikon 5100"):
+        sensitivity("Nikon 5100", Path())
+    with pytest.raises(InputError, match="did you mean 'D65'"):
+        illuminant("D655")
+    with pytest.raises(InputError, match="did you mean 'dark skin'"):
+        patch("darkskin")
+
+
+@pytest.mark.parametrize(
+    ("reflectance", "says"),
+    [
+        ({"wavelength_nm": [400, 500], "value": [0.1]}, "as many values"),
+        ({"wavelength_nm": [500, 400], "value": [0.1, 0.2]}, "must grow"),
+        ({"wavelength_nm": [0.4, 0.7], "value": [0.1, 0.2]}, "light has 380 to 780 nm"),
+        ({"wavelength_nm": [400, 500], "value": [0.1, 1.2]}, r"reflectance\.value\[1\]"),
+        ({"wavelength_nm": [400, 500], "values": [0.1, 0.2]}, r"reflectance\.values'; did you mean 'value'"),
+        ([0.1, 0.2], r"reflectance\[2\]' is missing"),
+        ([0.1, 0.2, 3], r"reflectance\[2\]"),
+    ],
+)
+def test_bad_reflectances_are_told_by_field(reflectance: object, says: str) -> None:
+    from simgen.spec.materials import Material
+
+    with pytest.raises(InputError, match=says):
+        validate(Material, {"reflectance": reflectance}, "scene.toml")
