@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.timing import timed
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, draw_photons
+from simgen.photons.thinning import PhotonList, thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
@@ -34,7 +34,7 @@ def setup_of(recipe: Recipe) -> Setup:
 def thinned(recipe: Recipe) -> tuple[float, PhotonList]:
     """Seconds to draw the photons of all views of a recipe, and the last draw."""
     setup = setup_of(recipe)
-    return timed(lambda seed: draw_photons(setup, recipe.photons, seed=seed))
+    return timed(lambda seed: thin_photons(setup, recipe.photons, seed=seed))
 
 
 def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
@@ -106,7 +106,7 @@ def _growth() -> Iterator[str]:
         recipe, _ = load_recipe("paper", ["grid.rows=2", "grid.cols=2", f"photons.budget={budget:g}"])
         setup = setup_of(recipe)
         start = time.perf_counter()
-        drawn = draw_photons(setup, recipe.photons, seed=1)
+        drawn = thin_photons(setup, recipe.photons, seed=1)
         seconds = time.perf_counter() - start
         yield f"| {budget:.0e} | {seconds:.2f} | {1e6 * seconds / drawn.k.size:.2f} |"
 

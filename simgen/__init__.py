@@ -1,6 +1,45 @@
-"""Physically based, photon-limited elemental images from recipes, with their truth."""
+"""Physically based, photon-limited elemental images from recipes, with their truth.
+
+    scene = simgen.load_scene("two_objects")
+    counts, truth = simgen.draw_photons(scene, grid, budget=1000, cfa="GRBG", seed=1)
+    manifest = simgen.generate(simgen.load_recipe("paper"), "out/paper")
+
+Importing this package loads no renderer: that happens when the first scene is rendered.
+"""
 
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["__version__"]
+if TYPE_CHECKING:
+    from simgen.app.library import (
+        RecipeFile,
+        SceneFile,
+        draw_photons,
+        generate,
+        load_recipe,
+        load_scene,
+        preview,
+    )
+
+__all__ = [
+    "RecipeFile",
+    "SceneFile",
+    "draw_photons",
+    "generate",
+    "load_recipe",
+    "load_scene",
+    "preview",
+]
 __version__ = version("photon-integral-imaging")
+
+
+def __getattr__(name: str) -> Any:
+    if name not in __all__:
+        raise AttributeError(f"module 'simgen' has no attribute {name!r}")
+    from simgen.app import library
+
+    return getattr(library, name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

@@ -18,7 +18,7 @@ from simgen.base import random_streams as seeds
 from simgen.cameras.rig import rig_of
 from simgen.photons.candidates import Setup
 from simgen.photons.rendering_noise import NOISE_SHARE, Probe, depths_seen, probe
-from simgen.photons.thinning import draw_photons, places
+from simgen.photons.thinning import places, thin_photons
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import Arrivals, detect, nested_subset, saturate
 from simgen.sensor.exposure import photons_per_radiance
@@ -99,7 +99,7 @@ def thin(
     grid = recipe.grid.camera_grid()
     setup = Setup(built, rig_of(recipe), recipe.cfa, recipe.render.max_depth)
     gain = absolute_gain(recipe)
-    drawn = draw_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
+    drawn = thin_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
     names = ("k", "l", "i", "j", "scope", "rank")
     arrivals = Arrivals(
         **{name: getattr(drawn, name).astype(np.int64) for name in names},
@@ -168,8 +168,9 @@ def write_counts(recipe: Recipe, arrivals: Arrivals, out: Path) -> dict[str, Any
             own = saturate(own, grid, sensor.counter_bits, recipe.seed)
         events = PhotonCounts.from_events(own.k, own.l, own.i, own.j, own.n, grid, cfa=cfa)
         _write_events(out / nested_name(COUNTS, budget), events)
-        if own.object_id is not None and own.z_mm is not None and recipe.products.truth:
-            _write_origins(out / nested_name(PHOTON_TRUTH, budget), own, grid)
+        origins = origins_of(own, grid) if recipe.products.truth else None
+        if origins is not None:
+            write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
         told = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
             found |= told
@@ -231,15 +232,17 @@ def _write_events(path: Path, counts: PhotonCounts) -> None:
     write_arrays_safely(path, {**small, "n": counts.events.n}, COUNTS_LABELS)
 
 
-def _write_origins(path: Path, counts: Arrivals, grid: CameraGrid) -> None:
-    """First hits of the counts, in the order of the events: by view and pixel."""
-    assert counts.object_id is not None
-    assert counts.z_mm is not None
+def origins_of(counts: Arrivals, grid: CameraGrid) -> dict[str, np.ndarray] | None:
+    """`object_id` (int16) and `z_mm` (float32) of the first hit of every photon, (photons,).
+
+    In the order of the events: by view and pixel. None if not known.
+    """
+    if counts.object_id is None or counts.z_mm is None:
+        return None
     pixel = np.ravel_multi_index((counts.k, counts.l, counts.i, counts.j), grid.shape_KLHW)
     order = np.argsort(pixel, kind="stable")
     order = order.repeat(counts.n[order])
-    origins = {
+    return {
         "object_id": counts.object_id[order].astype(np.int16),
         "z_mm": counts.z_mm[order].astype(np.float32),
     }
-    write_arrays_safely(path, origins, PHOTON_TRUTH_LABELS)

@@ -101,7 +101,7 @@ class _Tally:
     overshoot: int = 0
 
 
-def draw_photons(
+def thin_photons(
     setup: Setup,
     photons: Photons,
     *,

@@ -14,7 +14,7 @@ from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.io.dataset_layout import write_exr_safely
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, draw_photons
+from simgen.photons.thinning import PhotonList, thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
@@ -76,7 +76,7 @@ def thinned(built: RenderScene, grid: CameraGrid, max_depth: int, gain: float, s
     """Photons, `gain` for each unit of radiance."""
     setup = Setup(built, grid, "GRBG", max_depth)
     photons = Photons(scope="exposure")
-    return draw_photons(setup, photons, seed=seed, photons_per_radiance=gain)
+    return thin_photons(setup, photons, seed=seed, photons_per_radiance=gain)
 
 
 def counted(photons: PhotonList, grid: CameraGrid) -> np.ndarray:

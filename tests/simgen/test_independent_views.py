@@ -13,7 +13,7 @@ from pcii.io.dataset import open_dataset
 from simgen.base import random_streams as seeds
 from simgen.dataset.generation import generate
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import draw_photons
+from simgen.photons.thinning import thin_photons
 from simgen.spec.recipe import Grid, Photons, Recipe
 
 pytestmark = pytest.mark.renders
@@ -82,7 +82,7 @@ def one_by_one(folder: Path) -> np.ndarray:
     built = made(
         [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
     )
-    photons = draw_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
+    photons = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
     found = np.zeros((VIEWS, SIDE, SIDE))
     np.add.at(found, (10 * photons.k + photons.l, photons.i, photons.j), 1)
     return found

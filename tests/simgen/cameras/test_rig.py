@@ -17,7 +17,7 @@ from pcii.core.geometry import project_px
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, draw_photons
+from simgen.photons.thinning import PhotonList, thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.path_tracing import film_rays
@@ -54,7 +54,7 @@ def dot(point_mm: tuple[float, float, float], side_mm: float = SIDE_MM) -> Rende
 
 def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonList:
     settings = Photons(budget=budget)
-    return draw_photons(Setup(scene, cameras, None, 2), settings, seed=seed)
+    return thin_photons(Setup(scene, cameras, None, 2), settings, seed=seed)
 
 
 def off_places(grid: CameraGrid, seed: int = 3) -> Rig:
@@ -231,7 +231,7 @@ def test_a_lens_leaves_an_even_field_as_bright_as_a_pinhole() -> None:
     image = render_view(scene, rig, 0, 0, samples_per_pixel=4, seed=1)
     np.testing.assert_allclose(image, 100.0, rtol=1e-5)  # corners, 44 degrees off the axis, too
     settings = Photons(scope="exposure")
-    drawn = draw_photons(Setup(scene, rig, None, 2), settings, seed=1, photons_per_radiance=0.1)
+    drawn = thin_photons(Setup(scene, rig, None, 2), settings, seed=1, photons_per_radiance=0.1)
     counts = np.bincount(drawn.i * 40 + drawn.j, minlength=1640)
     assert abs(counts.mean() / 10 - 1) < 4 / np.sqrt(16_400)
     chi_square = ((counts - 10.0) ** 2 / 10.0).sum()
@@ -259,7 +259,7 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
         radiance = mosaic(np.stack(views).astype(np.float64), "GRBG")
         return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
 
-    drawn = draw_photons(Setup(scene, rig, "GRBG", DEPTH), Photons(budget=budget), seed=3)
+    drawn = thin_photons(Setup(scene, rig, "GRBG", DEPTH), Photons(budget=budget), seed=3)
     counts = np.zeros((4, 33, 31))
     np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
 

@@ -10,7 +10,7 @@ from scipy import stats
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import OVERSHOOT_SHARE, PhotonList, draw_photons
+from simgen.photons.thinning import OVERSHOOT_SHARE, PhotonList, thin_photons
 from simgen.renderer import backend
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene, build
@@ -44,7 +44,7 @@ def radiance(scene: RenderScene) -> np.ndarray:
 
 def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonList:
     settings = Photons.model_validate(photons)
-    return draw_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
+    return thin_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
 
 
 def counted(drawn: PhotonList) -> np.ndarray:
@@ -356,7 +356,7 @@ def test_each_attempt_is_a_stage_that_says_why_it_begins_again(
     monkeypatch.setattr("simgen.photons.thinning.ATTEMPTS", 3)
     told: list[tuple[str, int, int]] = []
     setup, gain = Setup(scene, GRID, "GRBG", DEPTH), 0.01 if "scope" in light else None
-    draw_photons(
+    thin_photons(
         setup,
         Photons.model_validate(light),
         seed=1,

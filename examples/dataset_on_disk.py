@@ -1,0 +1,18 @@
+"""Make a small dataset, open it, and check that it is whole. The folder to make it in is the argument."""
+
+import sys
+from pathlib import Path
+
+import pcii
+import simgen
+from pcii.io.verification import verify
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/example")
+recipe = simgen.load_recipe("small", ["photons.nested=[1000]"])
+manifest = simgen.generate(recipe, folder)
+print(f"{manifest['photons']['total']} photons by {manifest['photons']['method']}")
+
+dataset = pcii.open_dataset(folder)
+print(dataset)
+print(dataset.at_budget(1000).counts)
+print(f"{verify(folder)} files are as they were written")

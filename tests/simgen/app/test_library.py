@@ -1,0 +1,80 @@
+"""The functions of `import simgen`: what the commands do."""
+
+import pydoc
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny import TINY_RECIPE
+
+import pcii
+import simgen
+from simgen.spec.recipe import Recipe
+
+pytestmark = pytest.mark.renders
+RECIPE = simgen.RecipeFile(
+    Recipe.model_validate(TINY_RECIPE | {"seed": 3, "photons": {"budget": 200}}), Path()
+)
+GRID = RECIPE.recipe.grid.camera_grid()
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> pcii.Dataset:
+    out = tmp_path_factory.mktemp("library") / "made"
+    manifest = simgen.generate(RECIPE, out)
+    assert manifest["photons"]["method"] == "thinning"
+    return pcii.open_dataset(out)
+
+
+def test_photons_without_a_file_are_those_of_the_dataset(dataset: pcii.Dataset) -> None:
+    scene = simgen.load_scene(RECIPE.recipe.scene)
+    counts, truth = simgen.draw_photons(scene, GRID, budget=200, cfa="GRBG", seed=3)
+    assert (counts.grid, counts.cfa) == (dataset.grid, dataset.cfa)
+    for name in "klijn":
+        np.testing.assert_array_equal(getattr(counts.events, name), getattr(dataset.counts.events, name))
+    known = dataset.truth
+    assert known is not None
+    assert truth.names == known.names
+    for name in ("z_mm", "object_id", "normal", "coverage"):
+        np.testing.assert_array_equal(getattr(truth, name), getattr(known, name))
+    assert truth.photons is not None
+    assert known.photons is not None
+    for name in ("k", "l", "i", "j", "object_id", "z_mm"):
+        np.testing.assert_array_equal(getattr(truth.photons, name), getattr(known.photons, name))
+
+
+def test_photons_of_much_light_are_drawn_from_views_and_can_be_scored() -> None:
+    counts, truth = simgen.draw_photons(simgen.load_scene("two_objects"), GRID, budget=6e6, seed=1)
+    assert abs(counts.total - 36e6) < 5 * np.sqrt(36e6)
+    assert truth.photons is None
+    focus = pcii.segment(counts, [540, 620], method="brightness")
+    assert pcii.score(focus, None, truth).planes
+
+
+def test_what_is_wrong_is_told_in_one_sentence() -> None:
+    scene = simgen.load_scene("two_objects")
+    for wrong in ({"budget": -1}, {"cfa": "GRGB"}, {"seed": -1}):
+        with pytest.raises(pcii.InputError, match=rf"^draw_photons: .*{next(iter(wrong))}"):
+            simgen.draw_photons(scene, GRID, **wrong)  # type: ignore[arg-type]
+    with pytest.raises(pcii.InputError, match=r"^scene: "):
+        simgen.draw_photons("two_objects", GRID)  # type: ignore[arg-type]
+    with pytest.raises(pcii.InputError, match=r"^grid: "):
+        simgen.draw_photons(scene, None)  # type: ignore[arg-type]
+    with pytest.raises(AttributeError, match="nothing_of_that_name"):
+        simgen.nothing_of_that_name  # noqa: B018
+
+
+def test_a_preview_is_written(tmp_path: Path) -> None:
+    simgen.preview("two_objects", tmp_path / "look.png", samples_per_pixel=1)
+    assert (tmp_path / "look.png").stat().st_size > 1000
+
+
+def test_help_shows_the_functions_and_importing_loads_no_renderer() -> None:
+    text = pydoc.plain(pydoc.render_doc(simgen))
+    for name in ("draw_photons", "generate", "load_recipe", "load_scene", "preview"):
+        assert f"    {name}(" in text
+    script = "import sys, simgen; print(*[m for m in ('mitsuba', 'drjit', 'pydantic') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
