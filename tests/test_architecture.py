@@ -48,8 +48,7 @@ SHARED_ROOMS = {"core", "io"}
 NOT_SHARED = {"pcii.core.geometry"}
 MOST_FILES, FEWEST_FILES = 14, 3
 LONGEST_FILE = 300
-# The removal method `likelihood` is to be replaced as a whole, and `depth` to be filled; so they stay as they
-# are.
+# Files that are longer and rooms that are smaller than they should be: none may be added.
 LONGER = {
     "pcii.evidence.prediction_kernels",
     "pcii.removal.likelihood.layers",
