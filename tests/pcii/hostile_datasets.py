@@ -29,25 +29,29 @@ VALUES: list[Any] = [
 
 def mutated(document: Any, rng: random.Random) -> Any:
     """A copy of a JSON value in which a few members are changed, deleted, added or exchanged."""
-    document = json.loads(json.dumps(document))
+    document = _copied(document)
     for _ in range(rng.choice((1, 1, 1, 2, 5))):
         places = [(node, key) for node in _nodes(document) for key in _keys(node)]
         if not places:
-            return rng.choice(VALUES)
+            return _copied(rng.choice(VALUES))
         node, key = rng.choice(places)
         kind = rng.randrange(5)
         if kind == 0:
             del node[key]
         elif kind == 1:
             other, its = rng.choice(places)
-            node[key] = json.loads(json.dumps(other[its])) if its in _keys(other) else None
+            node[key] = _copied(other[its]) if its in _keys(other) else None
         elif kind == 2 and isinstance(node, dict):
-            node[str(rng.choice(VALUES))] = rng.choice(VALUES)
+            node[str(rng.choice(VALUES))] = _copied(rng.choice(VALUES))
         elif kind == 3 and type(node[key]) in (int, float):
             node[key] = rng.choice((node[key] * -1, node[key] * 10**9, node[key] + 1, node[key] * 0.5))
         else:
-            node[key] = rng.choice(VALUES)
+            node[key] = _copied(rng.choice(VALUES))
     return document
+
+
+def _copied(value: Any) -> Any:
+    return json.loads(json.dumps(value))
 
 
 def _nodes(value: Any) -> list[Any]:
