@@ -17,6 +17,7 @@ from pcii.core.truth import PhotonTruth, Truth
 from pcii.io.dataset_layout import (
     COUNTS,
     COUNTS_LABELS,
+    MANIFEST,
     PHOTON_TRUTH,
     PHOTON_TRUTH_LABELS,
     RADIANCE,
@@ -135,7 +136,11 @@ class Dataset(Brief):
         """Radiance of the views, read from disk one view at a time, or None if not stored."""
         if not self.has(RADIANCE):
             return None
-        channels = int(self.manifest["radiance_channels"])
+        channels = self.manifest.get("radiance_channels")
+        if channels is None:
+            raise InputError(
+                f"{self.path / MANIFEST}: radiance_channels: missing, though it lists {RADIANCE}"
+            )
         cfa = self.cfa if channels == 1 else None
         shape = (*self.grid.shape_KLHW, channels)
         return Views(StoredRadiance(shape, lambda k, l: self.check(radiance_name(k, l))), self.grid, cfa)

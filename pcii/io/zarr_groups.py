@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from pcii.core.errors import InputError
+from pcii.core.plain_text import visible
 from pcii.core.safe_files import new_folder_safely
 from pcii.io.sealed_json import check_file, parse_json, read_small
 
@@ -130,7 +131,7 @@ def read_array(
     try:
         array = np.asarray(zarr.open_array(path, mode="r", zarr_format=3)[...])
     except Exception as fault:  # whatever a decoder makes of damaged content
-        raise InputError(f"{path}: cannot be read ({fault}); {remedy}") from None
+        raise InputError(f"{path}: cannot be read ({visible(str(fault))}); {remedy}") from None
     return array
 
 

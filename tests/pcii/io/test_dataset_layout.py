@@ -210,6 +210,13 @@ def test_what_no_manifest_lists_is_not_read(tmp_path):
     assert counts.total == DENSE.sum()
 
 
+def test_radiance_of_unknown_channels_is_refused(tmp_path):
+    root = make_dataset(tmp_path / "d", radiance_channels=None)
+    dataset = open_dataset(root)
+    assert dataset.counts.total == DENSE.sum()
+    assert "radiance_channels: missing" in one_sentence(lambda: dataset.views, root / MANIFEST)
+
+
 def test_radiance_of_another_size_is_refused_by_its_header(tmp_path):
     root = make_dataset(tmp_path / "d")
     wrong = root / radiance_name(1, 2)
