@@ -34,7 +34,7 @@ from pcii.io.dataset import Dataset
 from pcii.io.dataset_layout import MAP_AXES, lists_part
 from pcii.io.results_list import RESULTS, read_results, write_results
 from pcii.io.sealed_json import list_files
-from pcii.io.zarr_groups import Label, read_array, write_arrays_safely
+from pcii.io.zarr_groups import Label, read_array, write_arrays
 from pcii.sections.reconstruction import reconstruct
 
 REMEDY = "make it again"
@@ -160,7 +160,7 @@ class Results:
         attributes: Mapping[str, Any] | None = None,
     ) -> Path:
         with self.replacing(name) as path:
-            write_arrays_safely(path, arrays, labels, attributes)
+            write_arrays(path, arrays, labels, attributes)
         return self.path / name
 
     def load_segmented(self) -> list[Segmented]:

@@ -33,7 +33,7 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
 def json_bytes(value: Any) -> bytes:
     """`value` as indented JSON; infinities and NaN are refused, since JSON has none."""
     text = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
-    # Names of files may hold bytes that are no characters; in JSON those are told by their escapes.
+    # Names of files may hold bytes that are not valid characters; JSON holds them as escape sequences.
     return (text + "\n").encode(errors="backslashreplace")
 
 
@@ -99,7 +99,7 @@ def sweep_temporaries(root: Path) -> None:
 
 
 @contextmanager
-def locked(path: Path, *, wait: bool) -> Iterator[IO[str]]:
+def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
     """The file `path`, made if it is not there, open to read and append, with other processes kept out.
 
     Whoever holds the lock may delete the file. Raises BlockingIOError if another process holds it and
@@ -108,7 +108,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[IO[str]]:
     import fcntl  # not everywhere, and only writers need it
 
     while True:
-        with path.open("a+", encoding="utf-8") as file:
+        with path.open("a+b") as file:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             # The last holder may have deleted the file between opening and locking; then this is another.
             if _is_at(file, path):
@@ -117,7 +117,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[IO[str]]:
                 return
 
 
-def _is_at(file: IO[str], path: Path) -> bool:
+def _is_at(file: IO[bytes], path: Path) -> bool:
     try:
         return os.path.samestat(os.fstat(file.fileno()), path.stat())
     except FileNotFoundError:

@@ -1,5 +1,6 @@
 """What values with large contents say of themselves: one line, and in notebooks a small table."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -9,26 +10,26 @@ from pcii.core.plain_text import in_html, visible
 LONGEST = 119
 """Characters of the line: it fits where one of code would."""
 MOST = 4
-"""Of longer lists the number and both ends are told."""
+"""Longer lists are abbreviated to their first and last value and their length."""
 
 
-class Brief:
-    """Gives a class that tells its `_facts` a short `repr` and a table for notebooks."""
+class Brief(ABC):
+    """Gives a class that states its `_facts` a short `repr` and a table for notebooks."""
 
+    @abstractmethod
     def _facts(self) -> Mapping[str, object]:
-        """What tells this value from others of its kind, the most telling first; None is left out."""
-        raise NotImplementedError
+        """What distinguishes this value from others of its kind, by importance; None is left out."""
 
-    def _told(self) -> list[tuple[str, object]]:
+    def _known_facts(self) -> list[tuple[str, object]]:
         return [(name, fact) for name, fact in self._facts().items() if fact is not None]
 
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name}={visible(str(_figure(fact)))}" for name, fact in self._told())
+        facts = ", ".join(f"{name}={visible(str(_figure(fact)))}" for name, fact in self._known_facts())
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= LONGEST else f"{line[: LONGEST - 2]}…)"
 
     def _repr_html_(self) -> str:
-        return table(type(self).__name__, self._told())
+        return table(type(self).__name__, self._known_facts())
 
 
 def table(caption: str, rows: Sequence[Sequence[object]], header: Sequence[str] = ()) -> str:

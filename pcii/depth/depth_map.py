@@ -41,10 +41,10 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     that stop at edges (`pcii.evidence.focus_likelihood`); neighbours agree unless it costs too much; between
     planes a parabola is fitted. `confidence` (H, W) is the posterior probability, all planes being equally
     likely beforehand, that the depth lies within 2 planes of the best. Below one half, or where there are
-    next to no photons or nothing to be seen, the method abstains; and where two halves of the cameras do not
-    agree on what is seen (`pcii.evidence.half_agreement`), so that of noise, however bright, at most 1 pixel
-    in 1000 is answered.
-    Pixels that are hot in most views are not looked at (`pcii.evidence.hot_pixels`).
+    next to no photons or nothing to be seen, the method abstains. It also abstains where two halves of the
+    cameras do not see the same (`pcii.evidence.half_agreement`): in images of uniform light, at any photon
+    level, at most 1 pixel in 1000 gets a depth. Pixels that are hot in most views are ignored
+    (`pcii.evidence.hot_pixels`).
 
     Raises `InputError` for a range that is not 0 < near < far, or a single view.
     """

@@ -9,9 +9,10 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from pcii.core.errors import InputError
+from pcii.core.safe_files import locked
 from pcii.io.dataset import Dataset
 
 ROWS = "rows.jsonl"
@@ -78,24 +79,13 @@ def claim_rows(out: Path) -> None:
 
 
 @contextmanager
-def _locked(out: Path) -> Iterator[IO[bytes]]:
-    """The file of rows, ready to be appended to, with all other processes kept out of it."""
-    import fcntl  # not everywhere, and only evaluations need it
-
-    with (out / ROWS).open("a+b") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield file
-
-
-@contextmanager
 def all_rows(out: Path) -> Iterator[list[Row]]:
     """Every row that is there, each key once, while no process adds any.
 
     A last line without an end was being written when its process was killed: it does not count.
     Raises `InputError` for another line that is no row.
     """
-    with _locked(out) as file:
-        file.seek(0)
+    with locked(out / ROWS, wait=True) as file:
         *lines, _ = file.read().split(b"\n")
         rows: dict[Key, Row] = {}
         for number, line in enumerate(lines, start=1):
@@ -111,7 +101,7 @@ def append_row(out: Path, row: Row) -> None:
     """Add a row and flush it to disk; what a killed process left of a line goes first."""
     text = json.dumps(row, ensure_ascii=False, allow_nan=False)
     line = text.encode(errors="backslashreplace") + b"\n"
-    with _locked(out) as file:
+    with locked(out / ROWS, wait=True) as file:
         if file.seek(0, os.SEEK_END):
             file.seek(-1, os.SEEK_END)
             if file.read(1) != b"\n":

@@ -268,7 +268,7 @@ def _predict_cells(
 
     Block by block, in which rates are linear, and by how many views see each block: so `samples` times `mean`
     is the sum of what events are predicted with over all pixels of the cell, whatever chance made of them.
-    If `sharp`, coarser scales are told at the cell's centre instead, as a picture of the light is.
+    If `sharp`, coarser scales are evaluated at the cell's centre instead, as in a picture of the light.
     """
     prior = section[6]
     seen, light, _, everywhere, by_row, by_col = scales

@@ -18,7 +18,6 @@ LARGEST_DOCUMENT_BYTES = 1 << 24
 """JSON takes up to 30 times its length in memory; a list of 100 000 files is shorter than this."""
 _BLANK = b"0" * 64
 _SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"\n\}\n\Z')
-_CHUNK = 1 << 20
 
 
 def write_sealed(path: Path, document: Mapping[str, Any]) -> None:

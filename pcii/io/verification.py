@@ -9,7 +9,7 @@ from pcii.io.results_list import RESULTS, read_results
 from pcii.io.sealed_json import check_file, strays
 
 MOST_TOLD = 5
-"""So many faults are told by name."""
+"""At most so many unlisted files are named."""
 
 
 def verify(path: Path, report: Report = silent) -> int:

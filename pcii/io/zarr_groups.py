@@ -25,7 +25,6 @@ CHUNK_ELEMENTS = 1 << 20
 LARGEST_METADATA_BYTES = 1 << 16
 METADATA = "zarr.json"
 DTYPES = ("bool", "uint8", "uint16", "uint32", "int16", "int32", "int64", "float32", "float64")
-CRC32C_BYTES = 4
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 
@@ -45,22 +44,32 @@ def write_arrays_safely(
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a group of arrays as a whole: all of it or nothing. `labels` has one for each array."""
-    with new_group_safely(folder, attributes or {}) as group:
-        for name, array in arrays.items():
-            stored = new_array(group, name, array.shape, array.dtype, labels[name])
-            if array.size:
-                stored[...] = array
+    with new_folder_safely(folder) as temporary:
+        write_arrays(temporary, arrays, labels, attributes)
+
+
+def write_arrays(
+    folder: Path,
+    arrays: Mapping[str, np.ndarray],
+    labels: Mapping[str, Label],
+    attributes: Mapping[str, Any] | None = None,
+) -> None:
+    """Write a group of arrays to a new folder, for callers that put it in its place safely themselves."""
+    group = _new_group(folder, attributes or {})
+    for name, array in arrays.items():
+        stored = new_array(group, name, array.shape, array.dtype, labels[name])
+        if array.size:
+            stored[...] = array
 
 
 @contextmanager
 def new_group_safely(folder: Path, attributes: Mapping[str, Any]) -> Iterator[Any]:
     """A new Zarr v3 group to write to, which stands in `folder` once the block has ended without fault."""
     with new_folder_safely(folder) as temporary:
-        yield new_group(temporary, attributes)
+        yield _new_group(temporary, attributes)
 
 
-def new_group(folder: Path, attributes: Mapping[str, Any]) -> Any:
-    """A new Zarr v3 group in an empty folder."""
+def _new_group(folder: Path, attributes: Mapping[str, Any]) -> Any:
     import zarr
 
     return zarr.open_group(folder, mode="w", zarr_format=3, attributes=dict(attributes))

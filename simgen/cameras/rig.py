@@ -135,6 +135,17 @@ def as_rig(cameras: Cameras) -> Rig:
     return Rig(cameras, position_mm, np.tile(np.eye(3), (*across.shape, 1, 1)))
 
 
+def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> CameraGrid:
+    """The same field of view on pixels `scale` times as large, at least `least_px` of them to a side."""
+    return replace(
+        grid,
+        height=max(least_px, round(grid.height / scale)),
+        width=max(least_px, round(grid.width / scale)),
+        pixel_mm=grid.pixel_mm * scale,
+        shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
+    )
+
+
 def centre_camera(grid: CameraGrid) -> Camera:
     """The virtual centre, at X = Y = 0 between the cameras of an even grid: no errors, a pinhole."""
     return Camera(grid, np.zeros(3), np.eye(3), (0.0, 0.0), None)

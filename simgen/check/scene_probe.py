@@ -13,7 +13,7 @@ import numpy as np
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import as_rig
+from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
 from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, seen_alone
 from simgen.dataset.prepared import Prepared
@@ -95,14 +95,7 @@ def probe_scene(target: Prepared) -> Facts:
 
 def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
     """The same cameras with the same field of view on at most so many pixels to a side."""
-    scale = max(1.0, max(grid.height, grid.width) / side_px)
-    return replace(
-        grid,
-        height=max(1, round(grid.height / scale)),
-        width=max(1, round(grid.width / scale)),
-        pixel_mm=grid.pixel_mm * scale,
-        shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
-    )
+    return with_larger_pixels(grid, max(1.0, max(grid.height, grid.width) / side_px), least_px=1)
 
 
 def _picture(built: RenderScene, grid: CameraGrid, recipe: Recipe) -> tuple[np.ndarray, float]:

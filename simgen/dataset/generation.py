@@ -173,7 +173,7 @@ def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]
             if text:
                 _check_begun(marker, text, identity, engine)
             else:
-                file.write(json.dumps({"identity": identity, "backend": engine}))
+                file.write(json.dumps({"identity": identity, "backend": engine}).encode())
                 file.flush()
                 os.fsync(file.fileno())
             yield marker
@@ -181,7 +181,7 @@ def _claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]
         raise InputError(f"{out}: another run is writing this dataset") from None
 
 
-def _check_begun(marker: Path, text: str, identity: str, engine: dict[str, Any]) -> None:
+def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
     """Raise `InputError` unless the dataset was begun for the same recipe on the same backend."""
     decisive = ("variant", "mitsuba", "drjit")
     try:

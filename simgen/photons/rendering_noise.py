@@ -13,6 +13,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
+from simgen.cameras.rig import with_larger_pixels
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.sensor.mosaic import sense
@@ -90,11 +91,4 @@ def depths_seen(built: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
 
 def _coarse(grid: CameraGrid) -> CameraGrid:
     """The same cameras with the same field of view on few pixels."""
-    scale = max(grid.height, grid.width) / PROBE_PX
-    return replace(
-        grid,
-        height=max(2, round(grid.height / scale)),
-        width=max(2, round(grid.width / scale)),
-        pixel_mm=grid.pixel_mm * scale,
-        shear_px=(grid.shear_px[0] / scale, grid.shear_px[1] / scale),
-    )
+    return with_larger_pixels(grid, max(grid.height, grid.width) / PROBE_PX, least_px=2)
