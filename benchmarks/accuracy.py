@@ -14,7 +14,8 @@ from benchmarks.photons import setup_of
 from benchmarks.timing import timed
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Sections, Views
+from pcii.core.images import Views
+from pcii.core.section_stack import Sections
 from pcii.sections.demosaicing import METHODS, demosaic
 from pcii.sections.reconstruction import reconstruct
 from simgen.renderer import backend

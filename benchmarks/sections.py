@@ -13,7 +13,8 @@ import numpy as np
 
 from benchmarks.timing import timed
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import disparity_px, nearest_shifts_px
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import disparity_px
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic
@@ -72,7 +73,7 @@ def by_slices(images: np.ndarray, grid: CameraGrid) -> np.ndarray:
     """Mean of views shifted by whole pixels, as slices."""
     H, W = images.shape[2:4]
     mean = np.zeros((H, W), dtype=np.float32)
-    rows, cols = nearest_shifts_px(grid, Z_MM)
+    rows, cols = (shifts[0] for shifts in FocalPlanes.at_depths(grid, Z_MM).whole_shifts_px)
     for k, l in np.ndindex(grid.rows, grid.cols):
         r, c = int(rows[k]), int(cols[l])
         target = mean[max(r, 0) : H + min(r, 0), max(c, 0) : W + min(c, 0)]

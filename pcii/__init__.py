@@ -9,8 +9,9 @@ __version__ = "0.1.0"
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.images import Sections, Views
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.comparison import evaluate

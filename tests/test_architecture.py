@@ -45,14 +45,19 @@ ROOMS = {
 # What simgen may share with pcii: types, masks, the file format and how commands behave. Not its geometry
 # or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
 SHARED_ROOMS = {"core", "io"}
-NOT_SHARED = {"pcii.core.geometry"}
+NOT_SHARED = {
+    "pcii.core.estimates",
+    "pcii.core.focal_planes",
+    "pcii.core.geometry",
+    "pcii.core.section_stack",
+    "pcii.io.suggested_depths",
+}
 MOST_FILES, FEWEST_FILES = 14, 3
 LONGEST_FILE = 300
 # Files that are longer and rooms that are smaller than they should be: none may be added.
 LONGER = {
     "pcii.evidence.prediction_kernels",
     "pcii.removal.likelihood.layers",
-    "pcii.sections.dense_kernels",
     "simgen.dataset.generation",
     "simgen.photons.majorant",
     "simgen.photons.thinning",

@@ -206,8 +206,8 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
     from pcii.app.pipeline import full_light_sections
-    from pcii.core.arrays import check_z_mm
     from pcii.core.errors import InputError
+    from pcii.core.focal_planes import FocalPlanes
     from pcii.metrics.scoring import score as compare
 
     data = _open(dataset, budget)
@@ -219,10 +219,14 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
     if not focus and found is None:
         steps = "`pcii segment`, `pcii depth` or `pcii run`"
         raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
-    z_mm = focus[0].z_mm if focus else data.analysis.get("z_mm")
-    knows = data.truth is not None and z_mm is not None
-    with Stages() as report:
-        light = full_light_sections(data, check_z_mm(z_mm), report) if knows else None
+    named = data.analysis.get("z_mm")
+    planes = FocalPlanes.at_depths(data.grid, named) if named else None
+    if focus:
+        planes = focus[0].sections.planes
+    light = None
+    if data.truth is not None and planes is not None:
+        with Stages() as report:
+            light = full_light_sections(data, planes, report)
     result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
     with results.writing():
         say(f"{results.save_score(result)}")

@@ -5,16 +5,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from pcii.core.console import Report, silent
 from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.images import ArrayLike5D, Sections, Views
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import ArrayLike5D, Views
+from pcii.core.photon_counts import check_depth_counts
+from pcii.core.section_stack import Sections
 from pcii.depth.depth_map import estimate_depth
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.scoring import score
-from pcii.removal.methods import DEFAULT_METHODS, segment
+from pcii.removal.methods import DEFAULT_METHODS, find_method
 from pcii.sections.reconstruction import reconstruct
 
 
@@ -46,8 +47,9 @@ def analyse(
     """
     methods = tuple(dict.fromkeys(methods))
     seconds: dict[str, float] = {}
-    z, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
+    planes, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
     counts = dataset.counts
+    check_depth_counts(counts)
     total = 4 + len(methods)
     done = 0
 
@@ -58,17 +60,17 @@ def analyse(
         report("analysis", done, total)
 
     start = time.perf_counter()
-    full_light = full_light_sections(dataset, z, report)
+    full_light = full_light_sections(dataset, planes, report)
     finished("sections at full light", start)
 
     start = time.perf_counter()
-    sections = reconstruct(counts, z)
+    sections = reconstruct(counts, planes)
     finished("sections", start)
 
     focus: list[Segmented] = []
     for method in methods:
         start = time.perf_counter()
-        focus.append(segment(counts, z, method=method))
+        focus.append(find_method(method)(counts, sections))
         finished(f"removal, {method}", start)
 
     start = time.perf_counter()
@@ -81,13 +83,13 @@ def analyse(
     return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
 
 
-def full_light_sections(dataset: Dataset, z: np.ndarray, report: Report = silent) -> Sections | None:
-    """Sections of the radiance at the depths z (Eq. 2); None if the dataset has none."""
+def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = silent) -> Sections | None:
+    """Sections of the radiance at the planes (Eq. 2); None if the dataset has none."""
     views = dataset.views
     if views is None:
         return None
     counted = _Counted(views.radiance, views.grid.view_count, report)
-    return reconstruct(Views(counted, views.grid, views.cfa), z)
+    return reconstruct(Views(counted, views.grid, views.cfa), planes)
 
 
 class _Counted:

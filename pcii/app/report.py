@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.core.images import Sections
 from pcii.core.safe_files import write_bytes_safely
+from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.evaluation.pages import page
 from pcii.evaluation.summary import own_planes

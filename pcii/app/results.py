@@ -21,7 +21,6 @@ import numpy as np
 
 from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.images import Sections
 from pcii.core.safe_files import (
     locked,
     replace_folder,
@@ -30,6 +29,7 @@ from pcii.core.safe_files import (
     temporary_folder,
     write_json_safely,
 )
+from pcii.core.section_stack import Sections
 from pcii.io.dataset import Dataset
 from pcii.io.dataset_layout import MAP_AXES, lists_part
 from pcii.io.results_list import RESULTS, read_results, write_results
@@ -168,6 +168,7 @@ class Results:
         files = read_results(self.path)["files"]
         tops = {name.split("/")[0] for name in files}
         found: list[Segmented] = []
+        sections: dict[bytes, Sections] = {}
         for top in sorted(top for top in tops if top.startswith("segmented_") and top.endswith(".zarr")):
             tells = lists_part(files, f"{top}/photon_in_focus")
             names = ("z_mm", "in_focus", *(["photon_in_focus"] if tells else []))
@@ -177,9 +178,11 @@ class Results:
                 raise InputError(f"{self.path / top}: its photon_in_focus is of other counts; {REMEDY}")
             method = top.removeprefix("segmented_").removesuffix(".zarr")
             try:
-                sections = reconstruct(self.dataset.counts, arrays["z_mm"])
-                z_mm, in_focus = arrays["z_mm"], arrays["in_focus"]
-                found.append(Segmented(z_mm, in_focus, method, sections, photon_in_focus=photons))
+                depths = arrays["z_mm"].tobytes()
+                if depths not in sections:
+                    sections[depths] = reconstruct(self.dataset.counts, arrays["z_mm"])
+                in_focus = arrays["in_focus"]
+                found.append(Segmented(in_focus, method, sections[depths], photon_in_focus=photons))
             except InputError as fault:
                 raise InputError(f"{self.path / top}: {fault}; {REMEDY}") from None
         return found

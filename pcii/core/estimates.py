@@ -6,22 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.arrays import check_z_mm, read_only
+from pcii.core.arrays import read_only
 from pcii.core.errors import InputError
-from pcii.core.images import Sections
+from pcii.core.section_stack import Sections
 from pcii.core.short_form import Brief, listed, span, table, times
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segmented(Brief):
-    """Which points of each section are in focus: `in_focus` (Z, H, W) bool.
+    """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
 
     `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at. A method that decides
     about single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
     (`PhotonCounts.events`, in their order) come from what is in focus in each plane; else that is None.
     """
 
-    z_mm: np.ndarray
     in_focus: np.ndarray
     method: str
     sections: Sections
@@ -41,7 +40,6 @@ class Segmented(Brief):
                     f"photon_in_focus: expected bool ({expected[0]}, events), got {kept.dtype} {kept.shape}"
                 )
             object.__setattr__(self, "photon_in_focus", read_only(kept))
-        object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
 
     def _facts(self) -> dict[str, object]:
@@ -52,6 +50,11 @@ class Segmented(Brief):
             "shape": times(self.in_focus.shape),
             "in_focus": listed(shares),
         }
+
+    @property
+    def z_mm(self) -> np.ndarray:
+        """Depths of the sections (Z,) float64."""
+        return self.sections.z_mm
 
     @property
     def cleaned(self) -> np.ndarray:

@@ -1,19 +1,15 @@
-"""Elemental images and the sections made of them."""
+"""Elemental images: the radiance of every view."""
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from pcii.core.arrays import check_z_mm, read_only
+from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
-from pcii.core.short_form import Brief, listed, times
-
-Normalisation = Literal["overlap", "views"]
-Shifts = Literal["nearest", "bilinear", "even"]
+from pcii.core.short_form import Brief, times
 
 
 class ArrayLike5D(Protocol):
@@ -64,64 +60,3 @@ class Views(Brief):
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
         return image
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Sections(Brief):
-    """Sections of the scene at depths `z_mm`, in the frame of the virtual centre camera.
-
-    `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
-    real numbers for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
-    the voxel grid is M times finer in both axes. `variance` is that of the samples of each voxel, if it
-    was asked for. `cfa` is the Bayer pattern of sections that are mosaics themselves (of even shifts).
-    """
-
-    grid: CameraGrid
-    z_mm: np.ndarray
-    counts: np.ndarray
-    coverage: np.ndarray
-    subpixel: int = 1
-    normalisation: Normalisation = "overlap"
-    variance: np.ndarray | None = None
-    cfa: str | None = None
-
-    def __post_init__(self) -> None:
-        z = check_z_mm(self.z_mm)
-        H, W = self.grid.height * self.subpixel, self.grid.width * self.subpixel
-        if self.counts.shape[:3] != (z.size, H, W) or self.counts.ndim != 4:
-            raise InputError(f"counts: expected ({z.size}, {H}, {W}, C), got {self.counts.shape}")
-        if self.coverage.shape != self.counts.shape:
-            raise InputError("coverage: must have the shape of counts")
-        object.__setattr__(self, "z_mm", read_only(z))
-        object.__setattr__(self, "counts", read_only(self.counts))
-        object.__setattr__(self, "coverage", read_only(self.coverage))
-        check_cfa(self.cfa)
-        if self.variance is not None:
-            if self.variance.shape != self.counts.shape:
-                raise InputError("variance: must have the shape of counts")
-            object.__setattr__(self, "variance", read_only(self.variance))
-
-    def _facts(self) -> dict[str, object]:
-        counted = self.counts.dtype.kind in "iu"
-        return {
-            "z_mm": listed(self.z_mm.tolist()),
-            "shape": times(self.counts.shape),
-            "photons": int(self.counts.sum(dtype=np.int64)) if counted else None,
-            "subpixel": self.subpixel,
-            "cfa": self.cfa,
-        }
-
-    @cached_property
-    def estimate(self) -> np.ndarray:
-        """Mean per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
-
-        For photon counts it is the maximum-likelihood estimate of the photons per pixel and view;
-        Eq. 3 divides it further by the photon budget n. Under `normalisation` "overlap" the sum is
-        divided by the coverage, under "views" by R S, the number of cameras. A voxel that no
-        sample reaches is 0.
-        """
-        if self.normalisation == "views":
-            return read_only(self.counts / self.grid.view_count)
-        mean = np.zeros(self.counts.shape, dtype=np.float64)
-        np.divide(self.counts, self.coverage, out=mean, where=self.coverage > 0)
-        return read_only(mean)

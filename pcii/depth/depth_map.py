@@ -7,11 +7,8 @@ import numpy as np
 from pcii.core.arrays import check_z_mm
 from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap
-from pcii.core.geometry import (
-    depth_of_total_disparity_mm,
-    depths_of_equal_disparity_steps_mm,
-    total_disparity_px,
-)
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.core.photon_counts import PhotonCounts, check_depth_counts
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import Focus, best_labels, focus_evidence, windowed
@@ -20,7 +17,7 @@ from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.sections.photon_statistics import cells_to_pixels
 
 PLANE_STEP_PX = 2.0
-"""Planes differ by so much in total disparity spread: 1 px of blur."""
+"""Planes differ by so much in total disparity: 1 px of blur."""
 MOST_PLANES = 1000
 STEP_NATS, JUMP_NATS = 0.002, 0.08
 """What a change of depth from cell to cell must earn, per plane and at most; less than between objects."""
@@ -61,20 +58,19 @@ def estimate_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
             f"z_range_mm: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
             f"most {MOST_PLANES * PLANE_STEP_PX:g} px can be searched; choose a farther near end"
         )
-    spread = np.sort(
-        total_disparity_px(grid, depths_of_equal_disparity_steps_mm(grid, near, far, PLANE_STEP_PX))
-    )
+    planes = FocalPlanes.between(grid, near, far, PLANE_STEP_PX)
     counts = without_hot_pixels(counts)
-    focus = focus_evidence(counts, spread)
+    focus = focus_evidence(counts, planes)
     evidence = windowed(focus.gain, focus.photons)
-    best = best_labels(evidence, np.full(spread.size - 1, STEP_NATS), JUMP_NATS)
-    depth = np.clip(depth_of_total_disparity_mm(grid, _refined(spread, evidence, best)), near, far)
+    best = best_labels(evidence, np.full(len(planes) - 1, STEP_NATS), JUMP_NATS)
+    refined_px = _refined(planes.total_disparity_px, evidence, best)
+    depth = np.clip(depth_of_total_disparity_mm(grid, refined_px), near, far)
     confidence = _posterior_near(evidence, best)
     at_best = np.take_along_axis(evidence, best[None], axis=0)[0]
     photons = _photons_nearby(focus, best)
     abstains = (at_best < SIGNIFICANT_NATS) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
-    halves = halves_of(counts, spread)
+    halves = halves_of(counts, planes)
     abstains |= halves.agreement(best, ~abstains) < least_agreement(halves.planes)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
@@ -89,16 +85,16 @@ def _photons_nearby(focus: Focus, best: np.ndarray) -> np.ndarray:
     return 2 * np.pi * NEARBY_CELLS**2 * gaussian_filter(here, NEARBY_CELLS, mode="constant")
 
 
-def _refined(spread: np.ndarray, evidence: np.ndarray, best: np.ndarray) -> np.ndarray:
-    """Disparity spread at the top of a parabola through the best plane and its neighbours."""
-    if spread.size < 3:
-        return spread[best]
-    inner = np.clip(best, 1, spread.size - 2)
+def _refined(total_px: np.ndarray, evidence: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """Total disparity at the top of a parabola through the best plane and its neighbours."""
+    if total_px.size < 3:
+        return total_px[best]
+    inner = np.clip(best, 1, total_px.size - 2)
     before, at, after = (np.take_along_axis(evidence, (inner + s)[None], axis=0)[0] for s in (-1, 0, 1))
     curvature = before - 2 * at + after
     offset = np.where(curvature < 0, (before - after) / (2 * np.where(curvature < 0, curvature, 1)), 0)
     offset = np.where(best == inner, np.clip(offset, -0.5, 0.5), 0.0)
-    return spread[best] + offset * (spread[1] - spread[0])
+    return total_px[best] + offset * (total_px[1] - total_px[0])
 
 
 def _posterior_near(evidence: np.ndarray, best: np.ndarray) -> np.ndarray:

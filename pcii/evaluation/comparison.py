@@ -156,12 +156,12 @@ def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequenc
 def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
     """The row of a task; the first call of a method at a budget is made twice, and the second one timed."""
     data = task.dataset.at_budget(task.budget)
-    counts, z_mm, z_range_mm = data.counts, planes_of(data, ()), depth_range_of(data)
+    counts, planes, z_range_mm = data.counts, planes_of(data, ()), depth_range_of(data)
 
     def work() -> Any:
         if task.method == DEPTH:
             return estimate_depth(counts, z_range_mm)
-        return segment(counts, z_mm, method=task.method)
+        return segment(counts, planes, method=task.method)
 
     if (task.budget, task.method) not in warm:
         work()

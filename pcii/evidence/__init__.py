@@ -5,8 +5,7 @@ focus_kernels       Compiled loops over photons and planes: what a plane predict
                     several does best.
 focus_likelihood    Evidence of focus from the Poisson likelihood: what does the section at a depth
                     predict?
-half_agreement      Do both halves of the cameras show the same thing? Evidence of depth needs several
-                    cameras.
+half_agreement      Do both halves of the cameras show the same thing?
 hot_pixels          Pixels that are hot in the same place of all cameras: what is fixed to the sensor
                     tells no depth.
 label_kernels       Compiled loops over cells: evidence summed within edges, and labels that agree with

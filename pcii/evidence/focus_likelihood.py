@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.core.bayer import sites_of_colours
-from pcii.core.geometry import whole_shifts_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 
@@ -42,12 +42,12 @@ twentieth to the darkest fifth of the picture it grows by less than 15 % and noi
 
 @dataclass(frozen=True)
 class Focus:
-    """What sections at `spread_px` (Z,) gain over blurred ones, on cells of 4 x 4 pixels.
+    """What sections at the `planes` gain over blurred ones, on cells of 4 x 4 pixels.
 
     `gain` (Z, H / 4, W / 4) float32 in nats, `photons` (Z, C, H / 4, W / 4) float32 by colour.
     """
 
-    spread_px: np.ndarray
+    planes: FocalPlanes
     gain: np.ndarray
     photons: np.ndarray
 
@@ -70,23 +70,23 @@ def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
     return -(-counts.grid.height // CELL_PX), -(-counts.grid.width // CELL_PX)
 
 
-def focus_evidence(counts: PhotonCounts, spread_px: np.ndarray) -> Focus:
-    """Evidence at the depths of these total spreads (Z,)."""
-    return _look(counts, spread_px, keep=False)[0]
+def focus_evidence(counts: PhotonCounts, planes: FocalPlanes) -> Focus:
+    """Evidence that surfaces are at these planes."""
+    return _look(counts, planes, keep=False)[0]
 
 
-def predictions_of(counts: PhotonCounts, spread_px: np.ndarray) -> tuple[Focus, Predictions]:
-    """The same, and what is predicted of each event: 8 bytes for each event and depth."""
-    return _look(counts, spread_px, keep=True)
+def predictions_of(counts: PhotonCounts, planes: FocalPlanes) -> tuple[Focus, Predictions]:
+    """The same, and what is predicted of each event: 8 bytes for each event and plane."""
+    return _look(counts, planes, keep=True)
 
 
-def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[Focus, Predictions]:
+def _look(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[Focus, Predictions]:
     from pcii.core.compiled_loops import threads
     from pcii.evidence import focus_kernels as kernels
     from pcii.evidence.prediction_kernels import land, predict
 
     grid, events = counts.grid, counts.events
-    rows, cols = whole_shifts_px(grid, spread_px)
+    rows, cols = planes.whole_shifts_px
     sites = sites_of_colours(counts.cfa)
     Z, N, C, (h, w) = len(rows), events.n.size, counts.channel_count, cell_shape(counts)
     gain, photons = np.zeros((Z, h, w), np.float32), np.zeros((Z, C, h, w), np.float32)
@@ -112,7 +112,7 @@ def _look(counts: PhotonCounts, spread_px: np.ndarray, *, keep: bool) -> tuple[F
 
     with ThreadPoolExecutor(threads()) as pool:
         list(pool.map(look, range(Z)))
-    return Focus(np.asarray(spread_px, dtype=np.float64), gain, photons), Predictions(rate, cell, expected)
+    return Focus(planes, gain, photons), Predictions(rate, cell, expected)
 
 
 def photon_weighted_mean(photons: np.ndarray) -> float:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.geometry import whole_shifts_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.imaging.bright_regions import box_around
@@ -96,12 +96,12 @@ def least_agreement(planes: int) -> float:
     return float(np.sqrt(2 * np.log(planes / FALSE_RATE)))
 
 
-def halves_of(counts: PhotonCounts, spread_px: np.ndarray) -> Halves:
-    """What the halves show in sections at these total spreads (Z,)."""
+def halves_of(counts: PhotonCounts, planes: FocalPlanes) -> Halves:
+    """What the halves show in the sections at these planes."""
     from pcii.core.compiled_loops import threads
 
     grid, events = counts.grid, counts.events
-    rows, cols = whole_shifts_px(grid, spread_px)
+    rows, cols = planes.whole_shifts_px
     h, w = -(-grid.height // CELL_PX), -(-grid.width // CELL_PX)
     half_of = (events.k + events.l) % 2
     place = events.k, events.l, events.i, events.j

@@ -2,19 +2,17 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
-from pcii.core.arrays import check_z_mm
 from pcii.core.errors import InputError
+from pcii.core.focal_planes import FocalPlanes
 from pcii.io.dataset import Dataset
 
 
-def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> np.ndarray:
-    """The depths to reconstruct: those asked for, else those that the recipe names."""
+def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
+    """The planes to reconstruct: those asked for, else those that the recipe names."""
     asked = z_mm or dataset.analysis.get("z_mm") or ()
     if not len(asked):
         raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
-    return check_z_mm(asked)
+    return FocalPlanes.at_depths(dataset.grid, asked)
 
 
 def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
@@ -22,5 +20,5 @@ def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tup
     named = dataset.analysis.get("z_range_mm")
     if named:
         return float(named[0]), float(named[1])
-    z = planes_of(dataset, z_mm)
+    z = planes_of(dataset, z_mm).z_mm
     return 0.8 * float(z.min()), 1.25 * float(z.max())

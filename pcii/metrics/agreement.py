@@ -4,7 +4,7 @@ import numpy as np
 
 from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
-from pcii.core.geometry import blur_half_extent_px, project_to_section
+from pcii.core.geometry import blur_half_extent_px
 from pcii.core.truth import PhotonTruth, Truth
 from pcii.imaging.mask_outlines import boundary_f
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, objects_by_plane
@@ -42,7 +42,7 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
     if truth is None or truth.photons is None:
         return {"photon_precision": None, "photon_recall": None}
     grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
-    row, col, inside = project_to_section(grid, photons, z0)
+    row, col, inside = focus.sections.planes.project(photons, plane)
     if focus.photon_in_focus is None:
         kept = focus.in_focus[plane][row[inside], col[inside]]
     else:

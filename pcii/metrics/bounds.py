@@ -1,6 +1,6 @@
 """How good it could be: masks from the true depth, and how well photons can tell depth at all.
 
-Notation: u total disparity spread in px; g gradient of the logarithm of the rate, per px; N photons; the
+Notation: u total disparity in px; g gradient of the logarithm of the rate, per px; N photons; the
 rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k), where a_l = (l - (L-1)/2)
 d_x / u and b_k likewise. The Fisher information of u is then N (<a^2> <g_x^2> + <b^2> <g_y^2>).
 """
@@ -13,7 +13,7 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
-from pcii.core.images import Sections
+from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, object_masks, objects_by_plane, pixel_masks
 
@@ -42,24 +42,24 @@ def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"]
     blur = np.stack([blur_half_extent_px(sections.grid, truth.z_mm, z) for z in z_mm])
     nearest = np.argmin(blur, axis=0) == np.arange(z_mm.size)[:, None, None]
     shown = truth.object_id > 0 if kind == "object" else blur <= FOCUS_TOLERANCE_PX
-    return Segmented(z_mm, nearest & shown, "oracle", sections)
+    return Segmented(nearest & shown, "oracle", sections)
 
 
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
-    """Mean square of the cameras' shifts per px of total disparity spread, (horizontal, vertical).
+    """Mean square of the cameras' shifts per px of total disparity, (horizontal, vertical).
 
-    (n + 1) / (12 (n - 1)) along an axis of n cameras that has the whole spread: 0.102 for 10. An axis
-    of less spread has less by its square, one of a single camera 0.
+    (n + 1) / (12 (n - 1)) along an axis of n cameras that has all of it: 0.102 for 10. An axis
+    of less total disparity has less by its square, one of a single camera 0.
     """
-    spread = float(total_disparity_px(grid, 1.0))
-    if spread == 0:
+    total = float(total_disparity_px(grid, 1.0))
+    if total == 0:
         return 0.0, 0.0
-    d_x, d_y = (float(d) / spread for d in parallax_px(grid, 1.0))
+    d_x, d_y = (float(d) / total for d in parallax_px(grid, 1.0))
     return (grid.cols**2 - 1) / 12 * d_x**2, (grid.rows**2 - 1) / 12 * d_y**2
 
 
 def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[float, float]) -> float | None:
-    """Least standard deviation of total disparity spread that any unbiased method can have, in px.
+    """Least standard deviation of total disparity that any unbiased method can have, in px.
 
     The Cramer-Rao bound 1 / sqrt(N (c_x <g_x^2> + c_y <g_y^2>)) for a surface at one depth with a known
     texture that shows N = `photons` in all views together; `gradient_squared` is (<g_x^2>, <g_y^2>), means

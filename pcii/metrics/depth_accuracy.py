@@ -1,4 +1,4 @@
-"""Errors of a depth map: in mm, in px of total disparity spread, and by the 4D light field benchmark.
+"""Errors of a depth map: in mm, in px of total disparity, and by the 4D light field benchmark.
 
 Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated.
 A missing answer is bad in every share, and is left out of means and quantiles, beside which stands the
@@ -30,7 +30,7 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     `hci` is over all pixels where something is hit, as the benchmark has it; `hci_objects` over the objects'
     pixels, since nothing can be known of a dark backdrop.
     `mae_mm`, `median_mm`, `mae_px` and `median_px` are of the pixels answered, in mm and in px of total
-    disparity spread; `bad_1px` and `bad_3px` the shares off by more than that; `coverage` the share
+    disparity; `bad_1px` and `bad_3px` the shares off by more than that; `coverage` the share
     answered. All are None without a depth map, without truth or without objects.
     """
     keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px")
@@ -44,8 +44,8 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     answered = _answered(estimate)
     error_mm = np.abs(estimate[answered] - true[answered])
     error_px = np.full(estimate.shape, np.inf)
-    spread = total_disparity_px(grid, estimate[answered]) - total_disparity_px(grid, true[answered])
-    error_px[answered] = np.abs(spread)
+    claimed_px, true_px = (total_disparity_px(grid, z_mm[answered]) for z_mm in (estimate, true))
+    error_px[answered] = np.abs(claimed_px - true_px)
     some = answered.any()
     return errors | {
         "mae_mm": float(error_mm.mean()) if some else None,

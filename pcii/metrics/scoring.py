@@ -12,7 +12,7 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.geometry import blur_half_extent_px
-from pcii.core.images import Sections
+from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.imaging.mask_outlines import object_share
 from pcii.metrics.agreement import mask_agreement, photon_agreement
@@ -62,7 +62,10 @@ def score(
                 raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shape}")
         if depth is not None and grid is None:
             raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
-    pooled = [pooled_estimate(one.sections, section_window_px(one.sections)) for one in methods]
+    # Methods mostly share their sections, which are pooled once then.
+    different = {id(one.sections): one.sections for one in methods}
+    pooled_of = {key: pooled_estimate(each, section_window_px(each)) for key, each in different.items()}
+    pooled = [pooled_of[id(one.sections)] for one in methods]
     rows = [
         row for one, section in zip(methods, pooled, strict=True) for row in _plane_rows(one, section, truth)
     ]

@@ -1,6 +1,5 @@
 """Removal of defocused points: which points of each section are in focus there."""
 
-from pcii.core.arrays import check_z_mm
 from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts, check_depth_counts
@@ -8,6 +7,7 @@ from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.simple_methods import brightness, shape_from_focus, variance
 from pcii.removal.three_step.three_step_method import ThreeStep
+from pcii.sections.reconstruction import reconstruct
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
@@ -15,7 +15,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
 
     `method` is one of `pcii.removal_methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood",
     a simple one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an
-    installed package; or anything that makes a `Segmented` of counts and depths, such as
+    installed package; or anything that makes a `Segmented` of counts and their sections, such as
     `ThreeStep(entropy=False)`. None is told how many objects there are, their colours or their depths.
     Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown
     method, a single view, or a package's method that returns something else than it should.
@@ -24,11 +24,9 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     >>> focus.in_focus.shape                                  # doctest: +SKIP
     (2, 1024, 1024)
     """
-    z = check_z_mm(z_mm)
     check_depth_counts(counts)
-    if callable(method):
-        return method(counts, z)
-    return find_method(method)(counts, z)
+    remove = method if callable(method) else find_method(method)
+    return remove(counts, reconstruct(counts, z_mm))
 
 
 def removal_methods() -> tuple[str, ...]:

@@ -5,7 +5,8 @@ In the pyproject.toml of such a package:
     [project.entry-points."pcii.methods"]
     my-method = "my_package:remove"
 
-`remove` is called with the `PhotonCounts` and the depths, float64 (Z,), and returns a `Segmented`.
+`remove` is called with the `PhotonCounts` and their `Sections` at the requested planes, and returns a
+`Segmented` of these sections.
 Nothing is looked up, and no such package imported, before a method is asked for that is not built in.
 """
 
@@ -13,17 +14,16 @@ import re
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 GROUP = "pcii.methods"
-Method = Callable[[PhotonCounts, np.ndarray], Segmented]
+Method = Callable[[PhotonCounts, Sections], Segmented]
 
 
 def registered(taken: Collection[str]) -> dict[str, "EntryPoint"]:
@@ -56,11 +56,11 @@ def load(point: "EntryPoint") -> Method:
     if not callable(remove):
         raise InputError(f"{told} is {type(remove).__name__}, which cannot be called")
 
-    def checked(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
-        answer = remove(counts, z_mm)
+    def checked(counts: PhotonCounts, sections: Sections) -> Segmented:
+        answer = remove(counts, sections)
         if not isinstance(answer, Segmented):
             raise InputError(f"{told} must return a pcii.Segmented, not {type(answer).__name__}")
-        expected = _expected(answer, point.name, counts, z_mm)
+        expected = _expected(answer, point.name, counts, sections)
         if expected:
             raise InputError(f"{told} must return {expected}")
         return answer
@@ -68,12 +68,10 @@ def load(point: "EntryPoint") -> Method:
     return checked
 
 
-def _expected(answer: Segmented, name: str, counts: PhotonCounts, z_mm: np.ndarray) -> str | None:
+def _expected(answer: Segmented, name: str, counts: PhotonCounts, sections: Sections) -> str | None:
     """What the answer should have been, if it is not that."""
-    if not np.array_equal(answer.z_mm, z_mm) or not np.array_equal(answer.sections.z_mm, z_mm):
-        return f"masks and sections at the depths it was given, {z_mm.tolist()} mm"
-    if answer.sections.grid != counts.grid or answer.sections.subpixel != 1:
-        return "sections of the counts' own camera grid with whole pixels"
+    if answer.sections is not sections:
+        return "a Segmented of the sections that it was given"
     if answer.method != name:
         return f"its own name as `method`, not {answer.method!r}"
     kept, events = answer.photon_in_focus, counts.events.n.size

@@ -7,13 +7,14 @@ photons in a window, whose noise is the same everywhere (see `pcii.imaging.brigh
 import numpy as np
 
 from pcii.core.estimates import Segmented
-from pcii.core.images import Sections
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
 from pcii.imaging.bright_regions import brightness as root_photons
 from pcii.sections.photon_statistics import cells_to_pixels, pooled_estimate, section_window_px, view_samples
 from pcii.sections.probe_planes import with_probes
-from pcii.sections.reconstruction import coverage_of, reconstruct
+from pcii.sections.reconstruction import extend, view_coverage
 
 NOISE = 0.5
 """Standard deviation of the square root of a Poisson count."""
@@ -28,17 +29,16 @@ FOCUS_WINDOW = 6
 """Sharpness is summed over this many pooling windows along each axis."""
 
 
-def brightness(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+def brightness(counts: PhotonCounts, sections: Sections) -> Segmented:
     """In focus is what is bright in the section at z: Otsu's threshold on its pooled brightness.
 
     Otsu 1979. A section whose two classes differ by no more than noise can make is all dark.
     """
-    sections = reconstruct(counts, z_mm)
     bright = _bright(_root_photons(sections, section_window_px(sections)))
-    return Segmented(z_mm, bright, "brightness", sections)
+    return Segmented(bright, "brightness", sections)
 
 
-def variance(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+def variance(counts: PhotonCounts, sections: Sections) -> Segmented:
     """In focus is what is bright at z and varies over the views no more than Poisson noise does.
 
     Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point follows chi-square
@@ -46,32 +46,29 @@ def variance(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
     square of even side, which holds each Bayer colour alike, large enough for about 10 of them where it
     is bright. `steps` holds `bright` and `even`, the outcome of the test.
     """
-    sections = reconstruct(counts, z_mm)
     window_px = section_window_px(sections)
     bright = _bright(_root_photons(sections, window_px))
     cell_px = _cell_px(pooled_estimate(sections, window_px), bright)
-    even = np.stack([_is_even(counts, z, cell_px) for z in z_mm])
-    return Segmented(z_mm, bright & even, "variance", sections, {"bright": bright, "even": even})
+    even = np.stack([_is_even(counts, sections.planes, p, cell_px) for p in range(len(bright))])
+    return Segmented(bright & even, "variance", sections, {"bright": bright, "even": even})
 
 
-def shape_from_focus(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+def shape_from_focus(counts: PhotonCounts, sections: Sections) -> Segmented:
     """In focus is what is bright at z and sharper there than at any other requested or probe plane.
 
     Nayar and Nakagawa 1994: sharpness is the modified Laplacian |2 I - I(left) - I(right)| +
     |2 I - I(above) - I(below)|, one pooling window apart, summed over a window where it exceeds the
     noise. `steps` holds `bright` and `sharpness`.
     """
-    compared = with_probes(counts.grid, z_mm)
-    everything = reconstruct(counts, compared)
-    window_px = section_window_px(everything)
-    image = _root_photons(everything, window_px)
+    compared = extend(sections, counts, with_probes(sections.planes))
+    window_px = section_window_px(compared)
+    image = _root_photons(compared, window_px)
     sharpness = np.stack([sum_modified_laplacian(plane, window_px) for plane in image])
-    count = z_mm.size
+    count = len(sections.planes)
     bright = _bright(image[:count])
     sharpest = np.argmax(sharpness, axis=0) == np.arange(count)[:, None, None]
-    sections = Sections(counts.grid, z_mm, everything.counts[:count], everything.coverage[:count])
     steps = {"bright": bright, "sharpness": sharpness[:count]}
-    return Segmented(z_mm, bright & sharpest, "shape-from-focus", sections, steps)
+    return Segmented(bright & sharpest, "shape-from-focus", sections, steps)
 
 
 def sum_modified_laplacian(image: np.ndarray, step_px: int) -> np.ndarray:
@@ -121,12 +118,12 @@ def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
     return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
 
 
-def _is_even(counts: PhotonCounts, z_mm: float, cell_px: int) -> np.ndarray:
+def _is_even(counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int) -> np.ndarray:
     """Where the views' samples vary no more than Poisson noise, (H, W) bool; so does what has no photons."""
     from scipy.special import chdtri
 
-    samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
-    views = _views(counts, z_mm, cell_px)
+    samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
+    views = _views(planes.take([plane]), cell_px)
     total = samples.number * samples.mean
     squares = np.maximum(samples.number - 1, 0) * samples.variance + samples.mean * total
     dispersion = views * squares / np.maximum(total, 1) - total
@@ -135,10 +132,10 @@ def _is_even(counts: PhotonCounts, z_mm: float, cell_px: int) -> np.ndarray:
     return cells_to_pixels(even, cell_px, counts.grid)
 
 
-def _views(counts: PhotonCounts, z_mm: float, cell_px: int) -> np.ndarray:
-    """How many views see the middle of each cell, at least 1."""
-    grid = counts.grid
-    coverage = coverage_of(grid, None, 1, z_mm, 1)[..., 0].astype(np.float64)
+def _views(planes: FocalPlanes, cell_px: int) -> np.ndarray:
+    """How many views see the middle of each cell of the first plane, at least 1."""
+    grid = planes.grid
+    coverage = view_coverage(planes)[0].astype(np.float64)
     rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in (grid.height, grid.width))
     at = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
     return np.maximum(coverage[at], 1)

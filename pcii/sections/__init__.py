@@ -6,9 +6,13 @@ demosaicing        Demosaicing of Bayer images: Laroche and Prescott's gradient 
 dense_kernels      Compiled loops that add up whole images, with their variances.
 dense_sections     Sections of dense images: whole rows of every view added to whole rows of the section.
 event_kernels      Compiled loops over photons: sections, and samples of windows.
+image_moves        Whole-pixel moves of whole images: by how much each view moves, with what weight, in
+                   what order.
 photon_statistics  Statistics of photon counts: pooled samples, entropy, and what Poisson noise alone
                    would give.
 probe_planes       Planes to compare: an object is in focus at z only if no other depth explains it
                    better.
 reconstruction     Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.
+row_kernels        Compiled: one row of a section from the rows of shifted images, with sums of squared
+                   deviations.
 """

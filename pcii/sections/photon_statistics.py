@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import project_to_section
-from pcii.core.images import Sections
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
@@ -107,8 +107,10 @@ class ViewSamples:
     """Unbiased variance of the non-zero samples; 0 below two samples."""
 
 
-def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
-    """Mean and variance of the non-zero samples of each pooled voxel at depth z (for Eq. 7).
+def view_samples(
+    counts: PhotonCounts, planes: FocalPlanes, plane: int, *, cell_px: int, window_cells: int
+) -> ViewSamples:
+    """Mean and variance of the non-zero samples of each pooled voxel of a plane (for Eq. 7).
 
     With cells and windows of 1 these are the samples of single voxels, whatever their colour.
 
@@ -120,7 +122,7 @@ def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cell
     from pcii.sections import event_kernels as kernels
 
     grid, events = counts.grid, counts.events
-    row, col, inside = project_to_section(grid, events, z_mm)
+    row, col, inside = planes.project(events, plane)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
     number, total, squares = (np.zeros(shape, dtype=np.int64) for _ in range(3))
     # Events are sorted by view, so each view's are one run.
@@ -129,8 +131,8 @@ def view_samples(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cell
     kernels.window_samples(number, total, squares, *cells, events.n[inside], starts, window_cells, threads())
     mean = total / np.maximum(number, 1)
     # n Q - S^2 in integers cannot cancel.
-    spread = number * squares - total * total
-    variance = spread / np.maximum(number * (number - 1), 1)
+    deviations = number * squares - total * total
+    variance = deviations / np.maximum(number * (number - 1), 1)
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
 
 

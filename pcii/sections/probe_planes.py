@@ -6,28 +6,26 @@ probe planes stand around each of them, a stated blur away; what is sharper ther
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
+from pcii.core.focal_planes import FocalPlanes
 
 PROBE_STEPS_PX = (-28.0, -14.0, 14.0, 28.0)
-"""Distance of the probes from their plane, in px of total disparity spread; half of it is blur."""
+"""Distance of the probes from their plane, in px of total disparity; half of it is blur."""
 
 
-def with_probes(grid: CameraGrid, z_mm: np.ndarray, *, clear_px: float = 7.0) -> np.ndarray:
-    """The requested depths (Z,), then the probes around them, float64.
+def with_probes(planes: FocalPlanes, *, clear_px: float = 7.0) -> FocalPlanes:
+    """The requested planes (Z,), then the probes around them.
 
-    A probe less than `clear_px` of spread from a requested plane is left out, one less than half a probe
-    step from another probe, and one beyond infinity.
+    A probe less than `clear_px` of total disparity from a requested plane is left out, one less than half a
+    probe step from another probe, and one beyond infinity.
     """
-    unit = float(total_disparity_px(grid, 1.0))
-    if unit == 0:  # a single camera has no disparity, so nothing tells depths apart
-        return z_mm
-    requested, probes = unit / z_mm, []
+    requested, probes = planes.total_disparity_px, []
+    if not requested.all():  # a single camera has no disparity, so nothing tells depths apart
+        return planes
     apart = min(abs(step) for step in PROBE_STEPS_PX) / 2
-    for spread in requested:
+    for own in requested:
         for step in PROBE_STEPS_PX:
-            probe = spread + step
+            probe = own + step
             clear = np.all(np.abs(probe - requested) > clear_px - 1e-9)  # rounding of the sum
             if probe > 0 and clear and all(abs(probe - other) > apart for other in probes):
                 probes.append(probe)
-    return depth_of_total_disparity_mm(grid, np.array([*requested, *probes]))
+    return planes.followed_by(probes)

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.arrays import check_z_mm
 from pcii.core.bayer import colour_cells
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
-from pcii.core.geometry import target_indices
-from pcii.core.images import Normalisation, Sections, Shifts, Views
+from pcii.core.focal_planes import FocalPlanes, planes_at
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.sections.dense_sections import Moves, colours_apart, moves, step_px, sum_counts, sum_fine, sum_views
+from pcii.core.section_stack import Normalisation, Sections, Shifts
+from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
+from pcii.sections.image_moves import AxisMoves, axis_moves, step_px
 
 MUCH_LIGHT = 1 / 16
 """Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.
@@ -36,7 +36,7 @@ def reconstruct(
     shifts: Shifts = "nearest",
     variance: bool = False,
 ) -> Sections:
-    """Sections of photon counts (Eq. 3) or radiance (Eq. 2) at the depths `z_mm`.
+    """Sections of photon counts (Eq. 3) or radiance (Eq. 2) at the depths `z_mm`, or at `FocalPlanes`.
 
     Returns `Sections` with arrays (Z, H M, W M, C): M = `subpixel`, C = 3 for Bayer or colour data,
     1 for monochrome. `normalisation` "overlap" divides by the samples that reach a voxel, "views"
@@ -56,35 +56,51 @@ def reconstruct(
     >>> sections.estimate.shape                                  # doctest: +SKIP
     (2, 1024, 1024, 3)
     """
-    z = check_z_mm(z_mm)
     _check(data, subpixel, normalisation, shifts, variance)
-    grid, spread = data.grid, None
+    grid, planes, of_samples = data.grid, planes_at(data.grid, z_mm), None
     cfa, channels = colours_apart(data, shifts)
-    shape = (z.size, grid.height * subpixel, grid.width * subpixel, channels)
-    rows, cols = _targets(grid, z, subpixel, step_px(shifts))
+    shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
+    rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
     if shifts == "bilinear":
-        coverage = _shared_coverage(grid, cfa, shape, z)
+        coverage = _shared_coverage(planes, cfa, shape)
     else:
-        coverage = _coverage(grid, cfa, shape, rows, cols)
+        coverage = _coverage(planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
         if not data.is_sparse and subpixel == 1 and data.lit_share > MUCH_LIGHT:
-            sums = sum_counts(data, z, shifts)
+            sums = sum_counts(data, planes, shifts)
         else:
             sums = _scatter(data, data.events.n, shape, rows, cols)
         if variance:
-            spread = _count_variance(data, sums, coverage, rows, cols)
+            of_samples = _count_variance(data, sums, coverage, rows, cols)
     elif subpixel > 1:
-        sums, spread = sum_fine(data, z, subpixel, coverage, variance=variance)
+        sums, of_samples = sum_fine(data, rows, cols, coverage, variance=variance)
     else:
-        sums, spread = sum_views(data, z, shifts, variance=variance)
+        sums, of_samples = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
-    return Sections(grid, z, sums, coverage, subpixel, normalisation, spread, mosaic)
+    return Sections(planes, sums, coverage, subpixel, normalisation, of_samples, mosaic)
 
 
 def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
     """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane."""
-    for depth in check_z_mm(z_mm):
-        yield reconstruct(data, depth, **options)
+    planes = planes_at(data.grid, z_mm)
+    for plane in range(len(planes)):
+        yield reconstruct(data, planes.take([plane]), **options)
+
+
+def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sections:
+    """Sections of the counts at `planes`, of which the first are those of `sections`: they are not made anew.
+
+    For sections of whole pixels as `reconstruct` makes them unless told otherwise.
+    """
+    known = len(sections.planes)
+    if len(planes) == known:
+        return sections
+    others = reconstruct(counts, planes.take(slice(known, None)))
+    return Sections(
+        planes,
+        np.concatenate([sections.counts, others.counts]),
+        np.concatenate([sections.coverage, others.coverage]),
+    )
 
 
 def _check(
@@ -142,34 +158,24 @@ def _count_variance(
         raise InputError("variance: the counts are too large for their squares to be added up exactly")
     squares = _scatter(data, n * n, sums.shape, rows, cols)
     samples = coverage.astype(np.int64)
-    spread = samples * squares - sums.astype(np.int64) ** 2
-    return spread / np.maximum(samples * (samples - 1), 1)
+    return (samples * squares - sums.astype(np.int64) ** 2) / np.maximum(samples * (samples - 1), 1)
 
 
-def _targets(
-    grid: CameraGrid, z: np.ndarray, subpixel: int, step_px: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """Voxel rows (Z, K, H) and columns (Z, L, W) of each pixel of each camera."""
-    targets = [target_indices(grid, depth, subpixel, step_px) for depth in z]
-    rows, cols = (np.stack(axis).astype(np.int32) for axis in zip(*targets, strict=True))
-    return rows, cols
+def view_coverage(planes: FocalPlanes) -> np.ndarray:
+    """How many views see each voxel of each plane, (Z, H, W)."""
+    shape = (len(planes), planes.grid.height, planes.grid.width, 1)
+    return _coverage(planes, None, shape, *planes.voxel_indices())[..., 0]
 
 
-def coverage_of(grid: CameraGrid, cfa: str | None, channels: int, z_mm: float, subpixel: int) -> np.ndarray:
-    """How many samples of each colour meet at each voxel, (H M, W M, C), in closed form."""
-    shape = (1, grid.height * subpixel, grid.width * subpixel, channels)
-    return _coverage(grid, cfa, shape, *_targets(grid, np.array([z_mm]), subpixel))[0]
-
-
-def _shared_coverage(grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], z: np.ndarray) -> np.ndarray:
+def _shared_coverage(planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...]) -> np.ndarray:
     """The sum of the shares that samples have in each voxel (Z, H, W, C), float64: it separates too."""
     coverage = np.zeros(shape)
-    for plane, depth in zip(coverage, z, strict=True):
+    for plane in range(len(planes)):
         by_row, by_col = (
             np.sum([_shares(move, size) for move in axis], axis=0)
-            for axis, size in zip(moves(grid, depth, "bilinear"), shape[1:3], strict=True)
+            for axis, size in zip(axis_moves(planes, plane, "bilinear"), shape[1:3], strict=True)
         )
-        _add_product(plane, by_row, by_col, cfa)
+        _add_product(coverage[plane], by_row, by_col, cfa)
     return coverage
 
 
@@ -182,7 +188,7 @@ def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, c
         coverage[..., 1:] = coverage[..., :1]  # all pixels see all colours
 
 
-def _shares(move: Moves, size: int) -> np.ndarray:
+def _shares(move: AxisMoves, size: int) -> np.ndarray:
     """What samples at pixels of even and of odd number bring to each voxel row (or column), (2, size)."""
     pixel = np.arange(size) - move.px[:, None]
     inside = (pixel >= 0) & (pixel < size)
@@ -191,20 +197,20 @@ def _shares(move: Moves, size: int) -> np.ndarray:
 
 
 def _coverage(
-    grid: CameraGrid, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
+    planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:
-    """The same for all planes (Z, H M, W M, C).
+    """How many samples of each colour meet at each voxel (Z, H M, W M, C), in closed form.
 
     The samples of Bayer phase (a, b) at voxel (r, c) are (camera rows whose pixel of row parity a
     lands on r) x (camera columns whose pixel of column parity b lands on c): it separates.
     """
     from pcii.sections import event_kernels as kernels
 
-    planes, H, W, C = shape
-    coverage = np.empty(shape, np.uint16 if grid.view_count < 1 << 16 else np.uint32)
-    for plane in range(planes):
+    _, H, W, C = shape
+    coverage = np.empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
+    for plane in range(len(planes)):
         by_row, by_col = (
-            np.array([_landings(targets[plane, :, parity::2], size) for parity in (0, 1)])
+            np.array([_samples_at(targets[plane, :, parity::2], size) for parity in (0, 1)])
             for targets, size in ((rows, H), (cols, W))
         )
         # There are but a few kinds of rows: away from the borders the pattern repeats.
@@ -215,7 +221,7 @@ def _coverage(
     return coverage
 
 
-def _landings(targets: np.ndarray, size: int) -> np.ndarray:
+def _samples_at(targets: np.ndarray, size: int) -> np.ndarray:
     """How many targets fall on each of the voxel rows 0 .. size-1."""
     inside = targets[(targets >= 0) & (targets < size)]
     return np.bincount(inside, minlength=size)

@@ -1,6 +1,6 @@
 """Spectra of lights, surfaces and cameras, by wavelength.
 
 filters  What a camera's pixels see of a spectrum, and the wavelengths that tell most about it.
-spectra  Spectra of lights, surfaces and cameras, on one set of wavelengths; measured ones from
-         colour-science.
+spectra  Spectra of lights, surfaces and cameras, on one set of wavelengths; measured ones from colour-
+         science.
 """

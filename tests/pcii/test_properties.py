@@ -10,8 +10,8 @@ from twins import unit_grid
 
 from pcii.core.bayer import PATTERNS
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Sections
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.sections.reconstruction import reconstruct
 
 pytestmark = pytest.mark.parametrize("number", [400, pytest.param(10_000, marks=pytest.mark.slow)])

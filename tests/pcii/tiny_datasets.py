@@ -8,10 +8,10 @@ from twins import unit_grid
 
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, TRUTH, TRUTH_LABELS, nested_name, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
-from pcii.sections.reconstruction import reconstruct
 
 GRID = unit_grid(2, 2, 8, 12, pitch_mm=(10.0, 10.0))
 Z_MM = (1.0, 2.0)  # 10 and 5 px of disparity: 2.5 px of blur at the other's depth
@@ -62,15 +62,15 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
     return root
 
 
-def as_told(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+def as_told(counts: PhotonCounts, sections: Sections) -> Segmented:
     """Claims at the plane p the pixels of the first view that have p + 1 photons."""
     first = counts.view(0, 0)
-    masks = np.stack([first == plane + 1 for plane in range(len(z_mm))])
-    return Segmented(z_mm, masks, "as told", reconstruct(counts, z_mm))
+    masks = np.stack([first == plane + 1 for plane in range(len(sections.planes))])
+    return Segmented(masks, "as told", sections)
 
 
-def two_rows(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
+def two_rows(_: PhotonCounts, sections: Sections) -> Segmented:
     """Claims at both planes the near object's two rows from edge to edge: 24 pixels."""
-    masks = np.zeros((len(z_mm), 8, 12), dtype=bool)
+    masks = np.zeros((len(sections.planes), 8, 12), dtype=bool)
     masks[:, 1:3] = True
-    return Segmented(z_mm, masks, "two rows", reconstruct(counts, z_mm))
+    return Segmented(masks, "two rows", sections)

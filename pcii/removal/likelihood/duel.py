@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.core.geometry import whole_shifts_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import in_cells
 from pcii.evidence.focus_likelihood import JUMP_NATS, Predictions, best_labels, predictions_of, windowed
@@ -37,8 +37,10 @@ def duelled(
     named = {region.plane for region in strong}
     idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
     labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
-    focus, seen = predictions_of(counts, np.array([spread for spread, _ in labels]))
-    gain = _duel(counts, focus.spread_px, seen)
+    focus, seen = predictions_of(
+        counts, FocalPlanes.at_total_disparity(counts.grid, [spread for spread, _ in labels])
+    )
+    gain = _duel(counts, focus.planes, seen)
     # Any change costs the same: these labels are in no order.
     cost = np.full(len(labels) - 1, JUMP_NATS)
     best = best_labels(windowed(gain, focus.photons), cost, JUMP_NATS)
@@ -59,12 +61,11 @@ def _strong(regions: Sequence[Region]) -> list[Region]:
     return [region for region in regions if region.gain_nats > DUEL_NATS and region.cells >= DUEL_CELLS]
 
 
-def _duel(counts: PhotonCounts, spread_px: np.ndarray, seen: Predictions) -> np.ndarray:
+def _duel(counts: PhotonCounts, planes: FocalPlanes, seen: Predictions) -> np.ndarray:
     """Nats that each depth gains over all of them together (S, h, w)."""
     from pcii.evidence import focus_kernels as kernels
 
-    grid = counts.grid
-    rows, cols = (in_cells(axis[:, _some(axis.shape[1])]) for axis in whole_shifts_px(grid, spread_px))
+    rows, cols = (in_cells(axis[:, _some(axis.shape[1])]) for axis in planes.whole_shifts_px)
     S, h, w = seen.expected.shape
     views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)
     kernels.views_of_planes(seen.expected, rows, cols, 1 / S, views)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import whole_shifts_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.imaging.bright_regions import box_around, dilated
@@ -70,7 +70,7 @@ def _box_of_light(lit: np.ndarray, grid: CameraGrid, spread_px: np.ndarray) -> t
     """Rows and columns of cells around all that is `lit` (h, w), and as far as its light goes by parallax."""
     down, right = (
         int(np.ceil(np.abs(shifts).max() / CELL_PX)) + AROUND_CELLS
-        for shifts in whole_shifts_px(grid, spread_px)
+        for shifts in FocalPlanes.at_total_disparity(grid, spread_px).whole_shifts_px
     )
     return box_around(lit, (down, right))
 

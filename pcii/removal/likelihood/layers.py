@@ -18,7 +18,7 @@ Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
 import numpy as np
 
 from pcii.core.bayer import sites_of_colours
-from pcii.core.geometry import depth_of_total_disparity_mm, project_to_section, whole_shifts_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX, in_cells
 from pcii.evidence.focus_likelihood import cell_shape, dark_around, photon_weighted_mean
@@ -46,12 +46,11 @@ def background_bounds(counts: PhotonCounts, spread_px: float) -> tuple[float, fl
 
     grid, events = counts.grid, counts.events
     V, (h, w) = grid.view_count, cell_shape(counts)
-    row, col, inside = project_to_section(
-        grid, events, float(depth_of_total_disparity_mm(grid, np.array(spread_px)))
-    )
+    planes = FocalPlanes.at_total_disparity(grid, spread_px)
+    row, col, inside = planes.project(events, 0)
     cell = (row // CELL_PX * w + col // CELL_PX)[inside]
     photons = np.bincount(cell, events.n[inside], h * w).reshape(h, w)
-    rows, cols = (axis[0] for axis in whole_shifts_px(grid, np.array([spread_px])))
+    rows, cols = (axis[0] for axis in planes.whole_shifts_px)
     # A cell is seen by whoever sees the pixel at its centre.
     i, j = (np.arange(size) * CELL_PX + CELL_PX // 2 for size in (h, w))
     views = _views_of(i, j, rows, cols, (grid.height, grid.width))
@@ -92,7 +91,7 @@ class Layers:
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
         self.least_dark, self.most_dark = dark
-        self.rows, self.cols = whole_shifts_px(grid, spread_px)
+        self.rows, self.cols = FocalPlanes.at_total_disparity(grid, spread_px).whole_shifts_px
         self.n = events.n.astype(np.float32)
         self.place = events.k, events.l, events.i, events.j
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)

@@ -27,8 +27,9 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import Segmented
-from pcii.core.geometry import depth_of_total_disparity_mm, project_to_section, total_disparity_px
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import (
     JUMP_NATS,
@@ -71,20 +72,20 @@ FAINT_PER_PX = 1.0
 """Below a photon per px in what is seen the depth within a thing shows nowhere."""
 
 
-def remove_by_likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
-    """In-focus masks (Z, H, W) at the depths `z_mm` (Z,), and which photons came from there.
+def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
+    """In-focus masks (Z, H, W) of the sections, and which photons came from there.
 
     `steps` holds `evidence`, the gain of each plane in nats over a window (Z, H, W) float32; `bright`,
     what is not dark (H, W repeated); `region`, the numbers of regions that are in focus.
     """
     grid = counts.grid
-    sections = reconstruct(counts, z_mm)
-    own_spread, which = np.unique(total_disparity_px(grid, z_mm), return_inverse=True)
+    own_spread, which = np.unique(sections.planes.total_disparity_px, return_inverse=True)
     planes = searched_planes(own_spread)
     # More photons would not tell planes apart better, only later; outlines take all of them.
     most = max(ENOUGH_PHOTONS, ENOUGH_PER_PX * grid.height * grid.width)
     enough = without_hot_pixels(counts).subsample(most, np.random.default_rng(0))
-    focus, halves = focus_evidence(enough, planes.spread_px), halves_of(enough, planes.spread_px)
+    searched = FocalPlanes.at_total_disparity(grid, planes.spread_px)
+    focus, halves = focus_evidence(enough, searched), halves_of(enough, searched)
     close = np.flatnonzero(planes.away_px <= NEAR_PX)
     evidence = windowed(focus.gain[close], focus.photons[close])
     label = best_labels(evidence, STEP_NATS * np.diff(planes.spread_px[close]) / SEARCH_STEP_PX, JUMP_NATS)
@@ -119,7 +120,7 @@ def remove_by_likelihood(counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
         "bright": np.broadcast_to(_on_pixels(bright, grid), in_focus.shape),
         "region": np.broadcast_to(_on_pixels(numbers, grid), in_focus.shape),
     }
-    return Segmented(z_mm, in_focus, "likelihood", sections, steps, own == which[:, None])
+    return Segmented(in_focus, "likelihood", sections, steps, own == which[:, None])
 
 
 def searched_planes(own_spread_px: np.ndarray) -> Planes:
@@ -153,7 +154,7 @@ def _outlines(
     found: list[tuple[Region, tuple[slice, slice], Future[np.ndarray]]] = []
     with ThreadPoolExecutor(threads()) as pool:
         for spread in spreads:
-            section = reconstruct(counts, depth_of_total_disparity_mm(grid, np.array([spread])))
+            section = reconstruct(counts, FocalPlanes.at_total_disparity(grid, spread))
             for region in regions:
                 if not region.is_there or region.spread_px != spread:
                     continue
@@ -166,8 +167,7 @@ def _outlines(
                 )
                 found.append((region, box, pool.submit(outlined, photons, samples, start[box], taken)))
     for spread in spreads:
-        z_mm = float(depth_of_total_disparity_mm(grid, np.array(spread)))
-        row, col, inside = project_to_section(grid, counts.events, z_mm)
+        row, col, inside = FocalPlanes.at_total_disparity(grid, spread).project(counts.events, 0)
         for region, box, outline in found:
             if region.spread_px == spread:
                 mask = np.zeros((grid.height, grid.width), dtype=bool)

@@ -13,12 +13,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
-from pcii.core.geometry import total_disparity_px
-from pcii.core.images import Sections
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.imaging.bright_regions import (
     EDGE_SMOOTHING_PX,
     SMALLEST_REGION_PX,
@@ -39,7 +38,7 @@ from pcii.sections.photon_statistics import (
     view_samples,
 )
 from pcii.sections.probe_planes import PROBE_STEPS_PX, with_probes
-from pcii.sections.reconstruction import reconstruct
+from pcii.sections.reconstruction import extend, reconstruct
 
 WINDOW_CELLS = 4
 PHOTONS_PER_SAMPLE = 10.0
@@ -83,8 +82,8 @@ class ThreeStep:
         fine = [f"subpixel-{self.subpixel}"] if self.subpixel > 1 else []
         return "-".join(["three-step", *fine, *missing])
 
-    def __call__(self, counts: PhotonCounts, z_mm: np.ndarray) -> Segmented:
-        """In-focus masks (Z, H, W) at the depths `z_mm` (Z,), with the maps of each step in `steps`.
+    def __call__(self, counts: PhotonCounts, requested: Sections) -> Segmented:
+        """In-focus masks (Z, H, W) of the requested sections, with the maps of each step in `steps`.
 
         Step 1: `mean` and `variance` of the non-zero samples, `threshold` (T of Eq. 7), `answered` (where
         there were enough samples) and `kept`. Step 2: `edges` (Roberts magnitude), `bright` (what it
@@ -92,12 +91,12 @@ class ThreeStep:
         0 outside, and `winner`, the plane where it is lowest, -1 outside; numbers from Z on are probes.
         With `subpixel` > 1 `fine` holds the masks (Z, H M, W M) that the pixels are made from.
         """
-        compared = with_probes(counts.grid, z_mm, clear_px=PROBE_STEP_PX)
-        sections = reconstruct(counts, compared)
-        own = range(z_mm.size)
+        planes = with_probes(requested.planes, clear_px=PROBE_STEP_PX)
+        sections = extend(requested, counts, planes)
+        count = len(requested.planes)
         cell_px = _cell_px(sections)
         first = [
-            adaptive_threshold(counts, z, cell_px, _tolerance_px(counts.grid, z, compared)) for z in z_mm
+            adaptive_threshold(counts, planes, p, cell_px, _tolerance_px(planes, p)) for p in range(count)
         ]
         steps = {name: np.stack([maps[name] for maps in first]) for name in first[0]}
 
@@ -105,38 +104,33 @@ class ThreeStep:
         pooled = pooled_estimate(sections, window_px)
         edges = np.stack([_edges(plane, _samples(sections, p, window_px)) for p, plane in enumerate(pooled)])
         smooth = _smoothed(edges)
-        fine = np.stack(
-            [self._bright(counts, z, pooled[p], sections, p, window_px) for p, z in enumerate(z_mm)]
-        )
+        fine = np.stack([self._bright(counts, pooled[p], sections, p, window_px) for p in range(count)])
         bright = _half_of_each_pixel(fine, self.subpixel)
         anywhere: np.ndarray = np.logical_or.reduce(bright)
         margin = int(LARGEST_BLUR_PX)
         if self.boundary:
-            ridges = smooth[: z_mm.size].max(axis=0)
+            ridges = smooth[:count].max(axis=0)
             regions = pieces_along_ridges(anywhere, ridges, margin**2)
         else:
             ridges, regions = None, _tiles(anywhere, 2 * margin)
-        steps |= {"edges": edges[: z_mm.size], "bright": bright, "regions": _for_each(regions, own)}
+        steps |= {"edges": edges[:count], "bright": bright, "regions": _for_each(regions, count)}
 
         kept = np.ones_like(bright)
         if self.threshold:
             kept &= steps["kept"]
         if self.entropy:
             entropies = edge_entropies(smooth, regions, margin)
-            planes = planes_of_least_entropy(entropies, regions, ridges, window_px)
-            winner = planes[regions]
-            kept &= winner == np.arange(z_mm.size)[:, None, None]
-            steps |= {"entropy": entropies.T[: z_mm.size][:, regions], "winner": _for_each(winner, own)}
+            winner = planes_of_least_entropy(entropies, regions, ridges, window_px)[regions]
+            kept &= winner == np.arange(count)[:, None, None]
+            steps |= {"entropy": entropies.T[:count][:, regions], "winner": _for_each(winner, count)}
         if self.subpixel > 1:
             M = self.subpixel
             steps["fine"] = fine & kept.repeat(M, axis=1).repeat(M, axis=2)
-        requested = Sections(counts.grid, z_mm, sections.counts[: z_mm.size], sections.coverage[: z_mm.size])
-        return Segmented(z_mm, bright & kept, self.name, requested, steps)
+        return Segmented(bright & kept, self.name, requested, steps)
 
     def _bright(
         self,
         counts: PhotonCounts,
-        z_mm: float,
         pooled: np.ndarray,
         sections: Sections,
         plane: int,
@@ -146,7 +140,7 @@ class ThreeStep:
         M = self.subpixel
         samples = _samples(sections, plane, window_px)
         if M > 1:
-            finer = reconstruct(counts, z_mm, subpixel=M)
+            finer = reconstruct(counts, sections.planes.take([plane]), subpixel=M)
             window = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
             pooled, samples = pooled_estimate(finer, window)[0], _samples(finer, 0, window)
         if not self.boundary:
@@ -155,7 +149,7 @@ class ThreeStep:
 
 
 def adaptive_threshold(
-    counts: PhotonCounts, z_mm: float, cell_px: int, tolerance_px: float
+    counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int, tolerance_px: float
 ) -> dict[str, np.ndarray]:
     """Step 1: where the variance of the non-zero samples is at most T (Eq. 7), and all that it takes.
 
@@ -165,7 +159,7 @@ def adaptive_threshold(
     focus may have: up to `tolerance_px` either way and the rounding to whole pixels, each uniform. Where
     there are fewer than `FEWEST_SAMPLES` the step does not object, nor to less than a window of cells.
     """
-    samples = view_samples(counts, z_mm, cell_px=cell_px, window_cells=WINDOW_CELLS)
+    samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
     limit = _threshold(samples, cell_px, tolerance_px)
     known = samples.number >= FEWEST_SAMPLES
     # One window above T is chance: there are many, and the cells around share its samples.
@@ -188,9 +182,9 @@ def _threshold(samples: ViewSamples, cell_px: int, tolerance_px: float) -> np.nd
     return noise + slope2 * (tolerance_px**2 / 3 + 1 / 12)
 
 
-def _tolerance_px(grid: CameraGrid, z_mm: float, compared: np.ndarray) -> float:
+def _tolerance_px(planes: FocalPlanes, plane: int) -> float:
     """Blur half-extent halfway to the nearest other plane: what is nearer to this one may stay."""
-    apart = np.abs(total_disparity_px(grid, compared) - total_disparity_px(grid, z_mm))
+    apart = np.abs(planes.total_disparity_px - planes.total_disparity_px[plane])
     others = apart[apart > 0]
     return float(others.min()) / 4 if others.size else 0.0
 
@@ -234,5 +228,5 @@ def _tiles(lit: np.ndarray, side_px: int) -> np.ndarray:
     return np.where(lit, numbers, 0).astype(np.int32)
 
 
-def _for_each(values: np.ndarray, planes: range) -> np.ndarray:
-    return np.broadcast_to(values, (len(planes), *values.shape))
+def _for_each(values: np.ndarray, planes: int) -> np.ndarray:
+    return np.broadcast_to(values, (planes, *values.shape))

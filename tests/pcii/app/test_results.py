@@ -31,7 +31,7 @@ def dataset_of(tmp_path: Path, rate: float, identity: str = "a") -> Dataset:
 
 def masks_of(dataset: Dataset, photons: np.ndarray | None = None) -> Segmented:
     masks = np.random.default_rng(4).random((2, 6, 7)) < 0.5
-    return Segmented(Z, masks, "by-hand", reconstruct(dataset.counts, Z), photon_in_focus=photons)
+    return Segmented(masks, "by-hand", reconstruct(dataset.counts, Z), photon_in_focus=photons)
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ def values(tmp_path: Path) -> list[tuple[object, str]]:
     counts, truth = dataset.counts, dataset.truth
     assert truth is not None
     sections = reconstruct(counts, [1.0, 2.0])
-    focus = as_told(counts, np.array([1.0, 2.0]))
+    focus = as_told(counts, sections)
     z_mm = np.full((8, 12), np.nan)
     z_mm[0, :6] = np.arange(500, 506)
     depth = DepthMap(z_mm, np.zeros((8, 12)))

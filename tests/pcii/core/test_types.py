@@ -8,8 +8,10 @@ from pcii.core.arrays import check_z_mm
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.images import Sections, Views
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
@@ -85,7 +87,7 @@ def test_one_depth_is_a_list_of_one():
 def test_no_array_of_a_result_can_be_written_to():
     grid = unit_grid(1, 2, 2, 2)
     sections = reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid), 1.0)
-    focus = Segmented(np.ones(1), np.ones((1, 2, 2), dtype=bool), "none", sections)
+    focus = Segmented(np.ones((1, 2, 2), dtype=bool), "none", sections)
     depth = DepthMap(np.ones((2, 2)), np.ones((2, 2)))
     truth = Truth(np.ones((2, 2)), np.zeros((2, 2), dtype=int), {})
     views = Views(np.ones((*grid.shape_KLHW, 1)), grid)
@@ -130,35 +132,41 @@ def test_sections_of_another_shape_are_refused():
     grid = unit_grid(1, 1, 2, 2)
     good = np.zeros((1, 2, 2, 1))
     with pytest.raises(InputError, match=r"^counts: "):
-        Sections(grid, np.ones(2), good, good)
+        Sections(FocalPlanes.at_depths(grid, np.ones(2)), good, good)
     with pytest.raises(InputError, match=r"^coverage: "):
-        Sections(grid, np.ones(1), good, good[..., 0])
+        Sections(FocalPlanes.at_depths(grid, np.ones(1)), good, good[..., 0])
 
 
 def test_masks_that_do_not_fit_their_sections_are_refused():
     grid = unit_grid(1, 1, 2, 2)
-    sections = Sections(grid, np.ones(1), np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2, 1)))
+    sections = Sections(
+        FocalPlanes.at_depths(grid, np.ones(1)), np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2, 1))
+    )
     for bad in (np.zeros((1, 2, 2)), np.zeros((2, 2, 2), dtype=bool)):
         with pytest.raises(InputError, match=r"^in_focus: expected bool"):
-            Segmented(np.ones(1), bad, "none", sections)
+            Segmented(bad, "none", sections)
 
 
 def test_photons_in_focus_must_be_bool_with_a_row_per_plane():
     grid = unit_grid(1, 1, 2, 2)
-    sections = Sections(grid, np.ones(1), np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2, 1)))
+    sections = Sections(
+        FocalPlanes.at_depths(grid, np.ones(1)), np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2, 1))
+    )
     masks = np.zeros((1, 2, 2), dtype=bool)
     for bad in (np.zeros((1, 5)), np.zeros((2, 5), dtype=bool), np.zeros(5, dtype=bool)):
         with pytest.raises(InputError, match=r"^photon_in_focus: expected bool \(1, events\)"):
-            Segmented(np.ones(1), masks, "none", sections, photon_in_focus=bad)
-    kept = Segmented(np.ones(1), masks, "none", sections, photon_in_focus=np.ones((1, 5), dtype=bool))
+            Segmented(masks, "none", sections, photon_in_focus=bad)
+    kept = Segmented(masks, "none", sections, photon_in_focus=np.ones((1, 5), dtype=bool))
     assert kept.photon_in_focus is not None
     assert not kept.photon_in_focus.flags.writeable
 
 
 def test_cleaned_keeps_what_is_in_focus_and_zeroes_the_rest():
     grid = unit_grid(1, 1, 1, 2)
-    sections = Sections(grid, np.ones(1), np.array([[[[6], [8]]]]), np.full((1, 1, 2, 1), 2))
-    focus = Segmented(np.ones(1), np.array([[[True, False]]]), "none", sections)
+    sections = Sections(
+        FocalPlanes.at_depths(grid, np.ones(1)), np.array([[[[6], [8]]]]), np.full((1, 1, 2, 1), 2)
+    )
+    focus = Segmented(np.array([[[True, False]]]), "none", sections)
     np.testing.assert_array_equal(focus.cleaned, [[[[3.0], [0.0]]]])
 
 

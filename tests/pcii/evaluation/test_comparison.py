@@ -170,11 +170,11 @@ def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
     loop = nb.njit(lambda n: n + 1)
     seconds: list[float] = []
 
-    def late(counts: Any, z_mm: Any) -> Any:
+    def late(counts: Any, sections: Any) -> Any:
         start = time.perf_counter()
         if counts.total != first_total:  # of the first dataset: the others take another path
             loop(counts.total)
-        found = as_told(counts, z_mm)
+        found = as_told(counts, sections)
         seconds.append(time.perf_counter() - start)
         return found
 

@@ -52,9 +52,9 @@ class Read(HTMLParser):
 def named(name: str) -> Any:
     """`two_rows` under another name."""
 
-    def method(counts: Any, z_mm: Any) -> Segmented:
-        found = two_rows(counts, z_mm)
-        return Segmented(found.z_mm, found.in_focus, name, found.sections)
+    def method(counts: Any, sections: Any) -> Segmented:
+        found = two_rows(counts, sections)
+        return Segmented(found.in_focus, name, found.sections)
 
     return method
 

@@ -78,7 +78,7 @@ def test_the_score_uses_the_coverage_if_there_is_one() -> None:
     z = np.where(mask, 540.0, np.inf)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=np.int64), grid)
     claimed = (half_plane(12.5) > 0.5)[None]
-    focus = Segmented(np.array([540.0]), claimed, "by hand", reconstruct(counts, [540.0]))
+    focus = Segmented(claimed, "by hand", reconstruct(counts, [540.0]))
     plain = score(focus, None, Truth(z, ids, {1: "edge"}))
     fine = score(focus, None, Truth(z, ids, {1: "edge"}, coverage=coverage))
     # In whole pixels the outlines are 2 px apart (columns 10 and 12), in truth 2.05 px.

@@ -6,8 +6,9 @@ from twins import unit_grid
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
-from pcii.core.images import Sections, Views
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.core.truth import PhotonTruth, Truth
 from pcii.metrics.bounds import (
     camera_information,

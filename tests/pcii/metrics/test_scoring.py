@@ -27,7 +27,7 @@ def truth() -> Truth:
 
 def segmented(masks: np.ndarray) -> Segmented:
     counts = PhotonCounts.from_dense(np.ones(GRID.shape_KLHW, dtype=np.int64), GRID)
-    return Segmented(Z, masks, "by hand", reconstruct(counts, Z))
+    return Segmented(masks, "by hand", reconstruct(counts, Z))
 
 
 def test_agreement_is_counted_by_hand() -> None:
@@ -152,7 +152,7 @@ def test_removal_lowers_the_entropy_of_the_section() -> None:
     rng = np.random.default_rng(2)
     counts = PhotonCounts.from_dense(rng.poisson(0.5, GRID.shape_KLHW), GRID)
     masks = object_masks(GRID, truth(), Z)
-    result = score(Segmented(Z, masks, "by hand", reconstruct(counts, Z)), None, truth())
+    result = score(Segmented(masks, "by hand", reconstruct(counts, Z)), None, truth())
     for row in result.planes:
         assert row["entropy_after"] < row["entropy_before"]
 
@@ -187,7 +187,7 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     masks = np.zeros((1, 200, 200), dtype=bool)
     masks[0, 41, 41] = True  # where the event of three photons lands
     said = None if kept is None else np.array([kept])
-    focus = Segmented(Z[:1], masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
+    focus = Segmented(masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
     rows = score(focus, None, true).planes
     assert all(row["iou"] is not None for row in rows)
     row = next(row for row in rows if row["truth"] == "pixel")

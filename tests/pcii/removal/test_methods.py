@@ -5,6 +5,7 @@ import pytest
 from twins import bayer_photons, intersection_over_union, patch_views, unit_grid
 
 from pcii.core.errors import InputError
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks
 from pcii.removal.methods import DEFAULT_METHODS, METHODS, segment
@@ -189,24 +190,26 @@ def test_a_depth_that_is_asked_for_twice_is_answered_twice(two_squares):
     np.testing.assert_array_equal(twice.in_focus[2], once.in_focus[0])
 
 
-def test_probes_stand_14_and_28_px_of_spread_around_a_plane():
-    grid = unit_grid(5, 5, 8, 8)  # spread 4 / z
-    z = with_probes(grid, np.array([4 / 50]))
-    np.testing.assert_allclose(4 / z, [50, 50 - 28, 50 - 14, 50 + 14, 50 + 28], rtol=1e-14)  # two divisions
+def test_probes_stand_14_and_28_px_of_total_disparity_around_a_plane():
+    grid = unit_grid(5, 5, 8, 8)  # total disparity 4 / z
+    planes = with_probes(FocalPlanes.at_depths(grid, 4 / 50))
+    np.testing.assert_allclose(
+        4 / planes.z_mm, [50, 50 - 28, 50 - 14, 50 + 14, 50 + 28], rtol=1e-14
+    )  # two divisions
 
 
 def test_no_probe_is_near_another_plane_or_beyond_infinity():
     grid = unit_grid(5, 5, 8, 8)
-    planes = np.array([4 / 20, 4 / 35])
-    spread = 4 / with_probes(grid, planes)
-    np.testing.assert_allclose(spread[:2], [20, 35], rtol=1e-14)  # two divisions
-    assert np.all(spread > 0)
-    gaps = np.abs(spread[2:, None] - spread[:2])
+    total_px = with_probes(FocalPlanes.at_depths(grid, [4 / 20, 4 / 35])).total_disparity_px
+    np.testing.assert_allclose(total_px[:2], [20, 35], rtol=1e-14)  # two divisions
+    assert np.all(total_px > 0)
+    gaps = np.abs(total_px[2:, None] - total_px[:2])
     assert gaps.min() > 7  # half a probe step
 
 
 def test_a_single_camera_has_no_probes():
-    np.testing.assert_array_equal(with_probes(unit_grid(1, 1, 4, 4), np.array([1.0, 2.0])), [1.0, 2.0])
+    planes = FocalPlanes.at_depths(unit_grid(1, 1, 4, 4), [1.0, 2.0])
+    np.testing.assert_array_equal(with_probes(planes).z_mm, [1.0, 2.0])
 
 
 def test_roberts_cross_takes_both_diagonals_and_continues_the_border():

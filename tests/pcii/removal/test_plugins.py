@@ -13,30 +13,29 @@ from pcii.removal.methods import METHODS, removal_methods, segment
 CODE = """
 from dataclasses import replace
 import numpy as np
-from pcii import InputError, PhotonCounts, Segmented, reconstruct
+from pcii import InputError, PhotonCounts, Sections, Segmented, reconstruct
 
-def good(counts, z_mm):
-    assert isinstance(counts, PhotonCounts) and z_mm.dtype == np.float64
-    sections = reconstruct(counts, z_mm)
+def good(counts, sections):
+    assert isinstance(counts, PhotonCounts) and isinstance(sections, Sections)
     mask = sections.counts.sum(axis=-1) > 0
-    return Segmented(z_mm, mask, "good", sections)
+    return Segmented(mask, "good", sections)
 
-def text(counts, z_mm):
+def text(counts, sections):
     return "in focus"
 
-def other_depths(counts, z_mm):
-    return replace(good(counts, z_mm + 1), method="other-depths")
+def other_depths(counts, sections):
+    return replace(good(counts, reconstruct(counts, sections.z_mm + 1)), method="other-depths")
 
-def fine(counts, z_mm):
-    sections = reconstruct(counts, z_mm, subpixel=2)
-    return Segmented(z_mm, sections.counts[..., 0] > 0, "fine", sections)
+def fine(counts, sections):
+    sections = reconstruct(counts, sections.planes, subpixel=2)
+    return Segmented(sections.counts[..., 0] > 0, "fine", sections)
 
-def photons(counts, z_mm):
-    kept = np.ones((z_mm.size, 1 + counts.events.n.size), dtype=bool)
-    return replace(good(counts, z_mm), method="photons", photon_in_focus=kept)
+def photons(counts, sections):
+    kept = np.ones((len(sections.planes), 1 + counts.events.n.size), dtype=bool)
+    return replace(good(counts, sections), method="photons", photon_in_focus=kept)
 
-def renamed(counts, z_mm):
-    return good(counts, z_mm)
+def renamed(counts, sections):
+    return good(counts, sections)
 
 number = 3
 """
@@ -101,8 +100,8 @@ def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
     ("name", "sentence"),
     [
         ("text", r"must return a pcii\.Segmented, not str$"),
-        ("other_depths", r"must return masks and sections at the depths it was given, \[1\.0\] mm$"),
-        ("fine", r"must return sections of the counts' own camera grid with whole pixels$"),
+        ("other_depths", r"must return a Segmented of the sections that it was given$"),
+        ("fine", r"must return a Segmented of the sections that it was given$"),
         ("renamed", r"must return its own name as `method`, not 'good'$"),
         ("photons", r"must return photon_in_focus for the \d+ events of the counts, not for \d+$"),
         ("number", r"is int, which cannot be called$"),

@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 from twins import unit_grid, voxel_of
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.photon_statistics import (
+    ViewSamples,
     entropy_bits,
     pooled_estimate,
     region_entropy_bits,
@@ -107,6 +109,11 @@ def test_pooling_leaves_the_dark_exactly_dark():
 # Samples of the views, Eq. 7
 
 
+def samples_at(counts: PhotonCounts, z_mm: float, *, cell_px: int, window_cells: int) -> ViewSamples:
+    planes = FocalPlanes.at_depths(counts.grid, z_mm)
+    return view_samples(counts, planes, 0, cell_px=cell_px, window_cells=window_cells)
+
+
 def view_samples_twin(dense: np.ndarray, grid: CameraGrid, cell_px: int, window: int) -> list[np.ndarray]:
     """Number, mean and variance of the non-zero samples at z = 1 mm, one view and one pixel at a time."""
     K, L, H, W = grid.shape_KLHW
@@ -143,7 +150,7 @@ def view_samples_twin(dense: np.ndarray, grid: CameraGrid, cell_px: int, window:
 def test_samples_of_the_views_are_those_of_a_plain_loop(cell_px, window, pitch):
     grid = unit_grid(3, 4, 9, 10, pitch_mm=pitch)
     dense = np.random.default_rng(6).poisson(0.2, size=grid.shape_KLHW)
-    got = view_samples(PhotonCounts.from_dense(dense, grid), 1.0, cell_px=cell_px, window_cells=window)
+    got = samples_at(PhotonCounts.from_dense(dense, grid), 1.0, cell_px=cell_px, window_cells=window)
     number, mean, variance = view_samples_twin(dense, grid, cell_px, window)
     np.testing.assert_array_equal(got.number, number)
     np.testing.assert_array_equal(got.mean, mean)
@@ -156,24 +163,24 @@ def test_views_that_agree_at_the_planted_shift_have_no_variance_there():
     for l in range(3):
         dense[0, l, 4, 8 - 2 * (l - 1)] = 5  # further right sees it further left
     counts = PhotonCounts.from_dense(dense, grid)
-    focused = view_samples(counts, 1.0, cell_px=1, window_cells=1)
+    focused = samples_at(counts, 1.0, cell_px=1, window_cells=1)
     assert (focused.number[4, 8], focused.mean[4, 8], focused.variance[4, 8]) == (3, 5.0, 0.0)
     assert focused.number.sum() == 3
-    assert view_samples(counts, 2.0, cell_px=1, window_cells=1).number.max() == 1
+    assert samples_at(counts, 2.0, cell_px=1, window_cells=1).number.max() == 1
 
 
 def test_the_variance_of_huge_counts_does_not_cancel():
     grid = unit_grid(1, 3, 1, 1)
     dense = np.array([10**8, 10**8 + 1, 10**8 + 2]).reshape(1, 3, 1, 1)
     far = 1e9  # no shift
-    samples = view_samples(PhotonCounts.from_dense(dense, grid), far, cell_px=1, window_cells=1)
+    samples = samples_at(PhotonCounts.from_dense(dense, grid), far, cell_px=1, window_cells=1)
     assert (samples.mean[0, 0], samples.variance[0, 0]) == (10**8 + 1, 1.0)
 
 
 def test_no_photons_have_no_samples():
     grid = unit_grid(2, 2, 5, 5)
     counts = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid)
-    samples = view_samples(counts, 1.0, cell_px=4, window_cells=4)
+    samples = samples_at(counts, 1.0, cell_px=4, window_cells=4)
     assert not samples.number.any()
     assert not samples.mean.any()
     assert not samples.variance.any()
@@ -245,7 +252,7 @@ def test_voxels_of_a_section_hold_two_photons_as_often_as_the_paper_says():
 
 def variance_excess(dense: np.ndarray, grid: CameraGrid) -> tuple[float, float]:
     """Mean and standard error of variance over its Poisson expectation at rate 0.34, over the cells."""
-    samples = view_samples(PhotonCounts.from_dense(dense, grid), 1e9, cell_px=4, window_cells=1)
+    samples = samples_at(PhotonCounts.from_dense(dense, grid), 1e9, cell_px=4, window_cells=1)
     _, _, expected = non_zero_moments(PAPER_RATE)
     ratio = samples.variance[samples.number > 1] / expected
     return float(ratio.mean()), float(ratio.std() / math.sqrt(ratio.size))

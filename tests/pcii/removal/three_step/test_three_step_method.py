@@ -7,6 +7,7 @@ from twins import intersection_over_union, unit_grid, voxel_of
 
 import pcii
 from pcii.core.errors import InputError
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
@@ -125,7 +126,9 @@ def test_the_threshold_is_that_of_a_slow_loop():
     grid = unit_grid(3, 3, 14, 14)
     rate = np.linspace(0.2, 0.6, 14)[:, None] * np.ones(14)
     dense = np.random.default_rng(0).poisson(rate, size=grid.shape_KLHW)
-    maps = adaptive_threshold(PhotonCounts.from_dense(dense, grid), 1.0, 1, 2.0)
+    maps = adaptive_threshold(
+        PhotonCounts.from_dense(dense, grid), FocalPlanes.at_depths(grid, 1.0), 0, 1, 2.0
+    )
     for row, col in ((6, 6), (7, 5)):
         mean, variance, limit = threshold_twin(dense, grid, 1.0, 2.0, row, col)
         # Maps are single precision.
@@ -210,10 +213,10 @@ def test_the_entropy_of_edges_counts_how_many_pixels_share_them():
 
 def test_probes_of_the_three_steps_stand_clear_of_the_requested_planes():
     grid = unit_grid(5, 5, 8, 8)
-    planes = np.array([4 / 40, 4 / 58])
-    spread = 4 / with_probes(grid, planes, clear_px=14.0)
-    assert np.abs(spread[2:, None] - spread[:2]).min() > 14 - 1e-9
-    assert {26, 12, 72, 86} <= set(np.round(spread, 6))
+    planes = FocalPlanes.at_depths(grid, [4 / 40, 4 / 58])
+    total_px = with_probes(planes, clear_px=14.0).total_disparity_px
+    assert np.abs(total_px[2:, None] - total_px[:2]).min() > 14 - 1e-9
+    assert {26, 12, 72, 86} <= set(np.round(total_px, 6))
 
 
 def touching(photons: float):
