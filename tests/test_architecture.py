@@ -56,7 +56,6 @@ MOST_FILES, FEWEST_FILES = 14, 3
 LONGEST_FILE = 300
 # Files that are longer and rooms that are smaller than they should be: none may be added.
 LONGER = {
-    "pcii.evidence.prediction_kernels",
     "pcii.removal.likelihood.layers",
     "simgen.dataset.generation",
     "simgen.photons.majorant",

@@ -12,4 +12,8 @@ label_kernels       Compiled loops over cells: evidence summed within edges, and
                     their neighbours.
 prediction_kernels  Compiled: the rate of each photon's own pixel and colour, as all other photons of a
                     section tell it.
+prediction_types    What the compiled loops that predict photons take and give, without the compiler.
+projection_kernels  Compiled: the cells of a section that events fall into, and how many views cover each
+                    block of pixels.
+smoothing_kernels   Compiled: light at coarser and coarser scales, and between the centres of cells.
 """

@@ -9,23 +9,18 @@ import numba as nb
 import numpy as np
 
 from pcii.core.compiled_loops import compiled, helper
+from pcii.evidence.prediction_types import PlacedEvents, Predicted
 
 
 @helper
-def gain_over_blur(
-    cell: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-    rate: np.ndarray,
-    base: np.ndarray,
-    gain: np.ndarray,
-    photons: np.ndarray,
-) -> None:
-    """Adds to `gain` (H, W) by how much events (N,) are better predicted than by the blurred `base`.
+def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray, photons: np.ndarray) -> None:
+    """Adds to `gain` (H, W) by how much events are better predicted than by the blurred section alone.
 
-    `photons` (C, H, W), from zeros, counts them by colour and `cell`.
+    `photons` (C, H, W), from zeros, counts them by colour and cell.
     """
     w = gain.shape[1]
+    cell, colour, n = events.cell, events.colour, events.n
+    rate, base = predicted.rate, predicted.base
     for e in range(cell.size):
         if cell[e] >= 0:
             a, b = cell[e] // w, cell[e] % w

@@ -21,6 +21,7 @@ from pcii.core.bayer import sites_of_colours
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
+from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 
 WINDOW_CELLS = 2.0
 WIDER_CELLS = (4.0, 8.0, 16.0)
@@ -83,7 +84,8 @@ def predictions_of(counts: PhotonCounts, planes: FocalPlanes) -> tuple[Focus, Pr
 def _look(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[Focus, Predictions]:
     from pcii.core.compiled_loops import threads
     from pcii.evidence import focus_kernels as kernels
-    from pcii.evidence.prediction_kernels import land, predict
+    from pcii.evidence.prediction_kernels import predict
+    from pcii.evidence.projection_kernels import cells_of_events
 
     grid, events = counts.grid, counts.events
     rows, cols = planes.whole_shifts_px
@@ -98,17 +100,17 @@ def _look(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[Foc
     film, everywhere = (grid.height, grid.width), np.ones((h, w), np.float32)
 
     def look(z: int) -> None:
-        own_cell, (own_rate, base) = np.empty(N, np.int32), np.empty((2, N))
-        samples, mean, blurred = np.empty((3, h, w))
-        land(*place, rows[z], cols[z], film, own_cell)
-        seen = (*place, counts.event_colours, n, believed, own_cell)
-        section = (rows[z], cols[z], *film, sites, everywhere, 0.0)
-        predict(seen, section, (own_rate, base, samples, mean, blurred))
-        own_gain = samples * (blurred - mean)
-        kernels.gain_over_blur(own_cell, counts.event_colours, n, own_rate, base, own_gain, photons[z])
-        gain[z] = own_gain
+        cell_of = np.empty(N, np.int32)
+        cells_of_events(*place, rows[z], cols[z], film, cell_of)
+        placed = PlacedEvents(*place, counts.event_colours, n, believed, cell_of)
+        section = PlaneView(rows[z], cols[z], *film, sites, everywhere, 0.0)
+        predicted = Predicted(*np.empty((2, N)), *np.empty((3, h, w)))
+        predict(placed, section, predicted)
+        plane_gain = predicted.samples * (predicted.blurred - predicted.mean)
+        kernels.gain_over_blur(placed, predicted, plane_gain, photons[z])
+        gain[z] = plane_gain
         if keep:
-            rate[z], cell[z], expected[z] = own_rate, own_cell, samples * mean
+            rate[z], cell[z], expected[z] = predicted.rate, cell_of, predicted.samples * predicted.mean
 
     with ThreadPoolExecutor(threads()) as pool:
         list(pool.map(look, range(Z)))

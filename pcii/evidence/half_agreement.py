@@ -108,10 +108,10 @@ def halves_of(counts: PhotonCounts, planes: FocalPlanes) -> Halves:
     n = events.n.astype(np.float64)
 
     def compare(z: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        from pcii.evidence.prediction_kernels import land, views_of_blocks
+        from pcii.evidence.projection_kernels import cells_of_events, views_of_blocks
 
         cell = np.empty(n.size, np.int32)
-        land(*place, rows[z], cols[z], (grid.height, grid.width), cell)
+        cells_of_events(*place, rows[z], cols[z], (grid.height, grid.width), cell)
         shown = []
         for which in (0, 1):
             mine = (cell >= 0) & (half_of == which)

@@ -3,18 +3,16 @@
 Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
 
 from pcii.core.compiled_loops import compiled, helper
-from pcii.evidence.cells import CELL_PX
+from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
+from pcii.evidence.projection_kernels import BLOCK_PX, views_of_blocks
+from pcii.evidence.smoothing_kernels import CENTRE, centres_around, halved, linear_at, smoothed
 
-BLOCK_PX = 2
-"""Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
-
-Single pixels are not. At depths where all shifts are even a colour falls on every fourth voxel only, where
-photons have four times as many partners, and textured patches would be drawn to such depths.
-"""
 SCALES = 5
 """Rates are smoothed over 2, 4, 8, 16 and 32 px and their mean taken: texture may be of any scale."""
 COLOUR_SCALE = 3
@@ -28,142 +26,24 @@ BASE_SHARE = 0.05
 AT_ONCE = 512
 """Events that are taken through the scales together."""
 
-# Smoothing is by the binomial weights 1/4, 1/2, 1/4 along both axes, then linear between centres.
-CENTRE, SIDE = 0.5, 0.25
 
+class Scales(NamedTuple):
+    """A section at each scale, smoothed."""
 
-Events = tuple[np.ndarray, ...]
-"""Pixels that caught photons, (N,) each: camera k, l and pixel i, j; colour; number of photons; weight, 0 to
-1, how far they are believed; cell, see `land`."""
-Section = tuple[np.ndarray, np.ndarray, int, int, np.ndarray, np.ndarray, float]
-"""A depth, and what is believed there: whole shifts of the rows (K,) and columns (L,) of cameras; height and
-width of the film in px; sites (C,) of each colour in a block; of the views that cover a cell the share that
-is believed (H, W); how many samples a coarser scale is worth."""
-Predicted = tuple[np.ndarray, ...]
-"""What a section says, overwritten, in double precision: of many photons a small share is many. Of events:
-rate, photons per sample of its pixel by all other events, and base, the same by the widest window alone. Of
-cells: samples, the views of all its blocks; mean, photons per block and view, and blurred, the same by the
-widest window alone."""
-Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
-"""A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
-how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks."""
+    views: list[np.ndarray]
+    """Views (1, H, W) of blocks, a coarser array for each scale."""
+    photons: list[np.ndarray]
+    """Photons (1, H, W)."""
+    by_colour: list[np.ndarray]
+    """Photons by colour (C, H, W)."""
+    mean_rate: float
+    by_row: np.ndarray
+    """How many camera rows see each row of blocks (2 h,), and `by_col` (2 w,) likewise."""
+    by_col: np.ndarray
 
 
 @helper
-def _smoothed(values: np.ndarray) -> np.ndarray:
-    """Each plane of (C, H, W) smoothed along both axes; nothing comes in across borders."""
-    C, H, W = values.shape
-    centre, side = CENTRE, SIDE
-    result = np.empty_like(values)
-    across = np.empty((H, W))
-    for c in range(C):
-        for i in range(H):
-            # Slices, so that the compiler sees that neighbours exist and takes several at a time.
-            row, line = values[c, i], across[i]
-            for j in range(line.size):
-                line[j] = centre * row[j]
-            before, after, later, ended = row[:-1], row[1:], line[1:], line[:-1]
-            for j in range(later.size):
-                later[j] += side * before[j]
-            for j in range(later.size):
-                ended[j] += side * after[j]
-        for i in range(H):
-            row, line = across[i], result[c, i]
-            above, below = across[max(i - 1, 0)], across[min(i + 1, H - 1)]
-            up, down = side if i > 0 else 0.0, side if i + 1 < H else 0.0
-            for j in range(line.size):
-                line[j] = centre * row[j] + up * above[j] + down * below[j]
-    return result
-
-
-@helper
-def _halved(values: np.ndarray) -> np.ndarray:
-    """Sums over 2 x 2 of (C, H, W), sizes rounded up."""
-    C, H, W = values.shape
-    result = np.zeros((C, (H + 1) // 2, (W + 1) // 2))
-    for c in range(C):
-        for i in range(H):
-            row, line = values[c, i], result[c, i // 2]
-            for b in range(W // 2):
-                line[b] = (line[b] + row[2 * b]) + row[2 * b + 1]
-            if W % 2:
-                line[W // 2] += row[W - 1]
-    return result
-
-
-@helper
-def _between(place: float, size: int) -> tuple[int, int, float, float]:
-    """The cells whose centres are around a place (in cells), the share of the second, an event's own part.
-
-    Beside the frame both are the same.
-    """
-    low = int(place + 0.5) - 1
-    share = place - 0.5 - low
-    if low < 0 or low + 1 >= size:
-        low = min(max(low, 0), size - 1)
-        return low, low, share, CENTRE
-    nearer = max(share, 1 - share)
-    return low, low + 1, share, CENTRE * nearer + SIDE * (1 - nearer)
-
-
-@helper
-def _at(
-    values: np.ndarray, top: int, bottom: int, share_i: float, left: int, right: int, share_j: float
-) -> float:
-    """Linear between the four centres (see `_between`) in `values` (H, W)."""
-    upper = (1 - share_j) * values[top, left] + share_j * values[top, right]
-    lower = (1 - share_j) * values[bottom, left] + share_j * values[bottom, right]
-    return (1 - share_i) * upper + share_i * lower
-
-
-@helper
-def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
-    """First and last row (or column) + 1 of the blocks that a shifted view covers as a whole.
-
-    Blocks that it covers in part are left out: there it would bring more of one colour than of another.
-    """
-    first, last = max(0, shift), min(size, size + shift)
-    return first + first % BLOCK_PX, last - last % BLOCK_PX
-
-
-@helper
-def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
-    """How many camera rows (or columns) see each block row (or column), (blocks,)."""
-    seen = np.zeros(blocks)
-    for camera in range(shifts.size):
-        first, last = _whole_blocks(int(shifts[camera]), size)
-        for place in range(first, last):
-            seen[place // BLOCK_PX] += 1.0 / BLOCK_PX
-    return seen
-
-
-@helper
-def land(
-    k: np.ndarray,
-    l: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    size: tuple[int, int],
-    cell: np.ndarray,
-) -> None:
-    """The `cell` (N,) that each event lands in, row by row; -1 outside the blocks that its view covers.
-
-    Whole shifts `rows` (K,) and `cols` (L,); `size` of the film in px.
-    """
-    H, W = size
-    across = -(-W // CELL_PX)
-    for e in range(k.size):
-        row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
-        top, bottom = _whole_blocks(int(rows[k[e]]), H)
-        left, right = _whole_blocks(int(cols[l[e]]), W)
-        inside = top <= row < bottom and left <= col < right
-        cell[e] = (row // CELL_PX) * across + col // CELL_PX if inside else -1
-
-
-@helper
-def _scales(events: Events, section: Section, finest: int) -> Scales:
+def _scales(events: PlacedEvents, section: PlaneView, finest: int) -> Scales:
     """The section at the scales from the `finest` on."""
     k, l, i, j, colour, n, weight, cell = events
     rows, cols, H, W, sites, share_seen, _ = section
@@ -186,15 +66,15 @@ def _scales(events: Events, section: Section, finest: int) -> Scales:
     seen, light, coloured = [], [], []
     for scale in range(SCALES):
         if scale > 0:
-            totals, views = _halved(totals), _halved(views)
+            totals, views = halved(totals), halved(views)
         if scale > COLOUR_SCALE:
-            counts = _halved(counts)
+            counts = halved(counts)
         # A scale that nobody looks at is there in name only.
         whole, by_colour = scale >= finest, scale >= max(COLOUR_SCALE, finest)
-        seen.append(_smoothed(views if whole else views[:, :1, :1].copy()))
-        light.append(_smoothed(totals if whole else totals[:, :1, :1].copy()))
-        coloured.append(_smoothed(counts if by_colour else counts[:, :1, :1].copy()))
-    return seen, light, coloured, everywhere, by_row, by_col
+        seen.append(smoothed(views if whole else views[:, :1, :1].copy()))
+        light.append(smoothed(totals if whole else totals[:, :1, :1].copy()))
+        coloured.append(smoothed(counts if by_colour else counts[:, :1, :1].copy()))
+    return Scales(seen, light, coloured, everywhere, by_row, by_col)
 
 
 @helper
@@ -203,16 +83,16 @@ def _predict_events(
     last: int,
     asked: np.ndarray,
     finest: int,
-    events: Events,
-    section: Section,
+    events: PlacedEvents,
+    section: PlaneView,
     scales: Scales,
-    told: Predicted,
+    predicted: Predicted,
 ) -> None:
     """The `rate` and `base` of those events from `first` to `last` that are `asked` for (N,)."""
     k, l, i, j, colour, _, weight, cell = events
     rows, cols, _, _, sites, _, prior = section
     seen, light, coloured, everywhere, _, _ = scales
-    rate, base, _, _, _ = told
+    rate, base, _, _, _ = predicted
     share_of_site = sites / sites.sum()
     # Scale by scale for some events at a time: to take an array from a list costs as much as to look one up.
     which = np.empty(AT_ONCE, np.int64)
@@ -243,13 +123,15 @@ def _predict_events(
                     there = views[0, row // BLOCK_PX, col // BLOCK_PX] * sites[c]
                     others = max(photons[0, row // BLOCK_PX, col // BLOCK_PX] - own, 0.0)
                 else:
-                    top, bottom, share_i, own_i = _between((float(row) + 0.5) * narrow, high)
-                    left, right, share_j, own_j = _between((float(col) + 0.5) * narrow, wide)
+                    top, bottom, share_i, own_i = centres_around((float(row) + 0.5) * narrow, high)
+                    left, right, share_j, own_j = centres_around((float(col) + 0.5) * narrow, wide)
                     own = own_i * own_j * weight[e]
-                    there = _at(views[0], top, bottom, share_i, left, right, share_j) * sites[c]
-                    others = max(_at(photons[0], top, bottom, share_i, left, right, share_j) - own, 0.0)
+                    there = linear_at(views[0], top, bottom, share_i, left, right, share_j) * sites[c]
+                    others = max(linear_at(photons[0], top, bottom, share_i, left, right, share_j) - own, 0.0)
                     if scale >= COLOUR_SCALE:
-                        same = max(_at(by_colour[c], top, bottom, share_i, left, right, share_j) - own, 0.0)
+                        same = max(
+                            linear_at(by_colour[c], top, bottom, share_i, left, right, share_j) - own, 0.0
+                        )
                         shares[x] = (same + COLOUR_PRIOR * share_of_site[c]) / (others + COLOUR_PRIOR)
                 coarsers[x] = (others * shares[x] + prior * coarsers[x]) / max(there + prior, 1e-6)
                 sums[x] += coarsers[x] / SCALES
@@ -262,7 +144,7 @@ def _predict_events(
 
 @helper
 def _predict_cells(
-    first: int, last: int, finest: int, sharp: bool, section: Section, scales: Scales, told: Predicted
+    first: int, last: int, finest: int, sharp: bool, section: PlaneView, scales: Scales, predicted: Predicted
 ) -> None:
     """The `samples`, `mean` and `blurred` light of the rows from `first` to `last`.
 
@@ -270,9 +152,9 @@ def _predict_cells(
     is the sum of what events are predicted with over all pixels of the cell, whatever chance made of them.
     If `sharp`, coarser scales are evaluated at the cell's centre instead, as in a picture of the light.
     """
-    prior = section[6]
+    prior = section.prior_samples
     seen, light, _, everywhere, by_row, by_col = scales
-    _, _, samples, mean, blurred = told
+    _, _, samples, mean, blurred = predicted
     blocks = by_col.size
     coarsers, sums, widest = np.zeros((3, blocks), np.float64)
     for a in range(first, last):
@@ -290,14 +172,14 @@ def _predict_cells(
                 high, wide = views.shape
                 narrow, centred = 1 / float(1 << scale), sharp and scale > 0
                 row = 2 * a + 1.0 if centred else u + 0.5
-                top, bottom, share_i, _ = _between(row * narrow, high)
+                top, bottom, share_i, _ = centres_around(row * narrow, high)
                 for v in range(blocks):
                     if by_col[v] <= 0:
                         continue
                     col = v // 2 * 2 + 1.0 if centred else v + 0.5
-                    left, right, share_j, _ = _between(col * narrow, wide)
-                    there = _at(views, top, bottom, share_i, left, right, share_j)
-                    others = _at(photons, top, bottom, share_i, left, right, share_j)
+                    left, right, share_j, _ = centres_around(col * narrow, wide)
+                    there = linear_at(views, top, bottom, share_i, left, right, share_j)
+                    others = linear_at(photons, top, bottom, share_i, left, right, share_j)
                     coarsers[v] = (others + prior * coarsers[v]) / max(there + prior, 1e-6)
                     sums[v] += coarsers[v] / SCALES
                     if scale == BASE_SCALE:
@@ -309,12 +191,12 @@ def _predict_cells(
 
 
 @helper
-def predict(events: Events, section: Section, told: Predicted) -> None:
+def predict(events: PlacedEvents, section: PlaneView, predicted: Predicted) -> None:
     """What a section says of every event and cell. One thread's part."""
-    N, h = events[0].size, told[3].shape[0]
+    N, h = events.k.size, predicted.mean.shape[0]
     scales = _scales(events, section, 0)
-    _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, told)
-    _predict_cells(0, h, 0, False, section, scales, told)
+    _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, predicted)
+    _predict_cells(0, h, 0, False, section, scales, predicted)
 
 
 @compiled
@@ -323,9 +205,9 @@ def predict_shared(
     asked: np.ndarray,
     asked_rows: tuple[int, int],
     finest: int,
-    events: Events,
-    section: Section,
-    told: Predicted,
+    events: PlacedEvents,
+    section: PlaneView,
+    predicted: Predicted,
 ) -> None:
     """The same, shared among threads in so many `parts`, for those events alone that are `asked` for (N,).
 
@@ -333,11 +215,11 @@ def predict_shared(
     Of cells those in the `asked_rows`, first and last + 1. With `finest` = BASE_SCALE the widest window alone
     is looked at: `base` and `blurred` are right, `rate` and `mean` mean nothing.
     """
-    N, (first, last) = events[0].size, asked_rows
+    N, (first, last) = events.k.size, asked_rows
     scales = _scales(events, section, finest)
     for part in nb.prange(parts):
         this, beyond = N * part // parts, N * (part + 1) // parts
-        _predict_events(this, beyond, asked, finest, events, section, scales, told)
+        _predict_events(this, beyond, asked, finest, events, section, scales, predicted)
         top = first + (last - first) * part // parts
         bottom = first + (last - first) * (part + 1) // parts
-        _predict_cells(top, bottom, finest, True, section, scales, told)
+        _predict_cells(top, bottom, finest, True, section, scales, predicted)

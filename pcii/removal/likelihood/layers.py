@@ -22,6 +22,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX, in_cells
 from pcii.evidence.focus_likelihood import cell_shape, dark_around, photon_weighted_mean
+from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 
 LENGTH_NATS, AREA_NATS = 0.3, 0.15
 HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25
@@ -86,7 +87,7 @@ class Layers:
     """
 
     def __init__(self, counts: PhotonCounts, spread_px: np.ndarray, dark: tuple[float, float]) -> None:
-        from pcii.evidence.prediction_kernels import land
+        from pcii.evidence.projection_kernels import cells_of_events
 
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
@@ -112,7 +113,7 @@ class Layers:
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
-            land(*self.place, self.rows[layer], self.cols[layer], self.film, self.cells[layer])
+            cells_of_events(*self.place, self.rows[layer], self.cols[layer], self.film, self.cells[layer])
         self.home = self._home(D // 2)
 
     def put(self, masks: np.ndarray) -> None:
@@ -290,8 +291,8 @@ class Layers:
         if asked is None:
             asked = np.ones(self.n.size, dtype=bool)
         first, last = asked_rows or (0, len(self.light))
-        events = (*self.place, self.colours, self.n, weight, self.cells[layer])
-        section = (
+        events = PlacedEvents(*self.place, self.colours, self.n, weight, self.cells[layer])
+        section = PlaneView(
             self.rows[layer],
             self.cols[layer],
             *self.film,
@@ -299,9 +300,9 @@ class Layers:
             seen.astype(np.float32),
             PRIOR_SAMPLES,
         )
-        told = (self.rate, self.base, self.samples, self.light, self.blurred)
+        predicted = Predicted(self.rate, self.base, self.samples, self.light, self.blurred)
         finest = BASE_SCALE if blurred else 0
-        predict_shared(threads(), asked, (first, last), finest, events, section, told)
+        predict_shared(threads(), asked, (first, last), finest, events, section, predicted)
         for light in (self.blurred,) if blurred else (self.light, self.blurred):
             light[first:last] *= 4  # from blocks to cells
 
