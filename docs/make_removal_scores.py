@@ -60,7 +60,7 @@ Mean IoU over the scenes that have objects, and mean seconds ({machine}).
 
 ## Depth of slanted surfaces
 
-Depth maps (`pcii.estimate_depth`): median error in px of total disparity spread, the share of the surface
+Depth maps (`pcii.estimate_depth`): median error in px of total disparity, the share of the surface
 that is answered, and seconds.
 
 {depths}
