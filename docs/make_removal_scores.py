@@ -1,7 +1,8 @@
-"""Write docs/removal_scores.md and its picture: `python docs/make_removal_scores.py EVALUATION MACHINE`.
+"""Write docs/experiments/removal_scores.md and its picture from an evaluation.
 
-EVALUATION is scores/evaluation.json of what `BENCH_SEEDS=1 make bench TABLES=removal` leaves in
-out/benchmark; MACHINE is a few words on where it ran, since the page tells times.
+`python docs/make_removal_scores.py EVALUATION MACHINE`: EVALUATION is scores/evaluation.json of what
+`BENCH_SEEDS=1 make bench TABLES=removal` leaves in out/benchmark; MACHINE is a few words on where it ran,
+since the page has times.
 """
 
 import json
@@ -35,9 +36,10 @@ photons.
 BENCH_SEEDS=1 make bench TABLES=removal     # an hour and a half on two cores, shared by BENCH_PART
 ```
 
-[Removal of defocused points](removal.md) tells what the methods do, what they cannot do and why; figures of
-many seeds, with their intervals, are there. With one seed a difference of 0.02 may be chance, and one of 0.1
-or more where things touch or hide one another. 300 000 photons per view, 0.3 per pixel, stand for full light.
+[Removal of defocused points](../removal.md) describes the methods; [the likelihood method](likelihood.md) and
+[the three steps](three_step.md) have figures of many seeds, with their intervals. With one seed a difference
+of 0.02 may be chance, and one of 0.1 or more where objects touch or hide one another. 300 000 photons per
+view, 0.3 per pixel, stand for full light.
 
 ![IoU against photons and against time](removal_scores.jpg)
 
@@ -58,7 +60,7 @@ Mean IoU over the scenes that have objects, and mean seconds ({machine}).
 
 ## Depth of slanted surfaces
 
-Depth maps (`pcii.estimate_depth`): median error in px of total disparity spread, the share of the surface
+Depth maps (`pcii.estimate_depth`): median error in px of total disparity, the share of the surface
 that is answered, and seconds.
 
 {depths}
@@ -72,7 +74,7 @@ By more than {fall:g} from one budget to the next:
 
 
 def main(evaluation: Path, machine: str) -> None:
-    """Write the page and the picture beside this script."""
+    """Write the page and the picture into the folder of experiments."""
     entries = {entry.name: entry for entry in load_corpus()}
     groups = [group for group in json.loads(evaluation.read_text())["groups"] if group["title"] in entries]
     groups.sort(key=lambda group: list(entries).index(group["title"]))
@@ -87,9 +89,9 @@ def main(evaluation: Path, machine: str) -> None:
         machine=machine,
         fall=FALL,
     )
-    here = Path(__file__)
-    here.with_name("removal_scores.md").write_text(page)
-    draw(full, entries, here.with_name("removal_scores.jpg"))
+    folder = Path(__file__).with_name("experiments")
+    (folder / "removal_scores.md").write_text(page)
+    draw(full, entries, folder / "removal_scores.jpg")
 
 
 def measured(group: Group) -> Iterator[tuple[str, float, float, float]]:
