@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_counts import PhotonCounts
 
@@ -164,7 +163,10 @@ def photons_of(
 
 def bayer_photons(rates: np.ndarray, cfa: str, seed: int) -> np.ndarray:
     """Poisson counts (K, L, H, W) of colour rates (K, L, H, W, 3) behind a Bayer pattern."""
-    return np.random.default_rng(seed).poisson(mosaic(rates, cfa))
+    own = np.empty(rates.shape[:-1])
+    for a, b in np.ndindex(2, 2):
+        own[..., a::2, b::2] = rates[..., a::2, b::2, colour_of(a, b, cfa)]
+    return np.random.default_rng(seed).poisson(own)
 
 
 def square_mask(grid: CameraGrid, top: int, left: int, size: int) -> np.ndarray:

@@ -12,9 +12,6 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import (
-    WIDER_CELLS,
-    WINDOW_CELLS,
-    WINDOW_WEIGHT,
     best_labels,
     cell_shape,
     focus_evidence,
@@ -25,10 +22,13 @@ from pcii.evidence.focus_likelihood import (
 from pcii.sections.reconstruction import reconstruct
 
 DISPARITIES = np.arange(1, 9)  # z = 1 / d mm on a unit grid
+WINDOW_CELLS, WIDER_CELLS = 2.0, (4.0, 8.0, 16.0)  # 8 px, and up to 64 px where there are no edges
+# The widths squared, the wider ones weighing as 1 / width: 2 pi 2^2 (1 + 4 / 2 + 8 / 2 + 16 / 2).
+WINDOW_WEIGHT = 2 * math.pi * 4 * 15
 
 
 def spread_of(grid: CameraGrid, disparity: float) -> np.ndarray:
-    return np.array([float(total_disparity_px(grid, 1 / disparity))])
+    return (max(grid.rows, grid.cols) - 1.0) * np.array([disparity])
 
 
 class Twin(NamedTuple):
