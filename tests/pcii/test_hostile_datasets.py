@@ -24,7 +24,7 @@ def test_hostile_datasets_are_refused_or_read(tmp_path: Path, number: int, seed:
         text=True,
         env=environment,
         check=False,
-        timeout=60 + 2 * number,  # each is a few kB: more than this is a hang
+        timeout=60 + 2 * number,  # a hang, not a slow machine: each is a few kB
     )
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout.splitlines()[-1])  # OpenEXR prints its warnings before

@@ -9,7 +9,6 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
 from pcii.depth.depth_map import estimate_depth
-from pcii.evidence.half_agreement import FALSE_RATE
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 
@@ -18,6 +17,7 @@ SIZES = [(1, 1), (2, 3), (7, 90), (64, 7), (14, 10), (33, 5), (64, 72)]
 GRIDS = [(2, 1), (1, 8), (3, 3), (5, 5)]
 LIGHT = [1e-3, 0.05, 1.0, 100.0, 1e4]
 HOT = 10_000
+MOST_FALSE = 1 / 1000  # what both methods promise of noise, as a share of pixels
 
 
 def grid_of(views: tuple[int, int], size: tuple[int, int]) -> CameraGrid:
@@ -59,8 +59,8 @@ def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, s
 def test_even_light_is_not_answered(size, rate):
     draws = [noise(views, size, rate, cfa, 0) for views, cfa in zip(GRIDS, itertools.cycle(["GRBG", None]))]
     depth, claimed = np.mean([answered(counts) for counts in draws], axis=0)
-    assert depth <= FALSE_RATE
-    assert claimed <= FALSE_RATE
+    assert depth <= MOST_FALSE
+    assert claimed <= MOST_FALSE
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
@@ -69,14 +69,14 @@ def test_even_light_is_not_answered(size, rate):
 def test_hot_pixels_are_not_answered(rate, pixels, everywhere):
     for views in ((5, 5), (2, 1)):
         counts = hot(views, rate, pixels, everywhere=everywhere, seed=0)
-        assert max(answered(counts)) <= FALSE_RATE
+        assert max(answered(counts)) <= MOST_FALSE
 
 
 @pytest.mark.slow
 def test_noise_is_answered_as_seldom_as_is_said():
     cases = itertools.product([*GRIDS, (10, 10)], [*SIZES[2:], (96, 128)], LIGHT, ["GRBG", None], range(3))
     shares = np.array([answered(noise(*case)) for case in cases])
-    assert np.all(shares.mean(axis=0) <= FALSE_RATE)
+    assert np.all(shares.mean(axis=0) <= MOST_FALSE)
 
 
 @pytest.mark.slow
@@ -88,7 +88,7 @@ def test_hot_pixels_are_answered_as_seldom_as_is_said():
             for views, rate, pixels, everywhere, seed in cases
         ]
     )
-    assert np.all(shares.mean(axis=0) <= FALSE_RATE)
+    assert np.all(shares.mean(axis=0) <= MOST_FALSE)
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])

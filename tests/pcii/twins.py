@@ -1,11 +1,12 @@
 """Slow loops that read as the formulas, and small synthetic scenes; shared by the tests."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_counts import PhotonCounts
 
 
 def unit_grid(
@@ -139,9 +140,33 @@ def patch_views(patch: np.ndarray, top: int, left: int, disparity_px: int, grid:
     return views
 
 
+def opaque_views(surfaces: Sequence[tuple[np.ndarray, int, int, int]], grid: CameraGrid) -> np.ndarray:
+    """Views (K, L, H, W, 3) of (patch, top, left, disparity in px) from far to near: each hides those before.
+
+    Where a patch is 0 in all colours it is not there.
+    """
+    views = np.zeros((*grid.shape_KLHW, 3))
+    for patch, top, left, disparity_px in surfaces:
+        own = patch_views(patch, top, left, disparity_px, grid)
+        views = np.where(own.any(axis=-1, keepdims=True), own, views)
+    return views
+
+
+def photons_of(
+    views: np.ndarray, grid: CameraGrid, per_view: float, *, seed: int, dark: float = 0.002
+) -> PhotonCounts:
+    """So many photons per view on average of views (K, L, H, W, 3) before the `dark`, behind GRBG."""
+    rates = views + dark
+    rates *= 3 * per_view * grid.view_count / rates.sum()  # a pixel sees one colour of three
+    return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), grid, cfa="GRBG")
+
+
 def bayer_photons(rates: np.ndarray, cfa: str, seed: int) -> np.ndarray:
     """Poisson counts (K, L, H, W) of colour rates (K, L, H, W, 3) behind a Bayer pattern."""
-    return np.random.default_rng(seed).poisson(mosaic(rates, cfa))
+    own = np.empty(rates.shape[:-1])
+    for a, b in np.ndindex(2, 2):
+        own[..., a::2, b::2] = rates[..., a::2, b::2, colour_of(a, b, cfa)]
+    return np.random.default_rng(seed).poisson(own)
 
 
 def square_mask(grid: CameraGrid, top: int, left: int, size: int) -> np.ndarray:

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-import time
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -12,6 +11,7 @@ from typing import Any
 import numba as nb
 import numpy as np
 import pytest
+from slow_clock import SlowClock
 from tiny_datasets import NESTED, OWN, as_told, two_rows, write_dataset
 
 from pcii.app import commands as cli
@@ -167,22 +167,22 @@ def test_groups_of_one_title_are_told_by_what_differs(tmp_path: Path, calls: lis
 def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loop = nb.njit(lambda n: n + 1)
-    seconds: list[float] = []
+    loop, clock, calls = nb.njit(lambda n: n + 1), SlowClock(monkeypatch), 0
 
     def late(counts: Any, sections: Any) -> Any:
-        start = time.perf_counter()
+        nonlocal calls
+        calls += 1
         if counts.total != first_total:  # of the first dataset: the others take another path
+            clock.go_on(1 if loop.signatures else 100)
             loop(counts.total)
-        found = as_told(counts, sections)
-        seconds.append(time.perf_counter() - start)
-        return found
+        clock.go_on(1)
+        return as_told(counts, sections)
 
     monkeypatch.setitem(METHODS, "late", late)
     first_total = open_dataset(series / "seed_3").counts.total
     evaluation = evaluate([series], tmp_path / "out", methods=["late"], budgets=[OWN])
-    assert len(seconds) == 5  # three, the warm-up and the one that compiled
-    assert max(row["seconds"] for row in rows_of(tmp_path / "out")) < max(seconds) / 2
+    assert calls == 5  # three, the warm-up and the one that compiled
+    assert sorted(row["seconds"] for row in rows_of(tmp_path / "out")) == [1, 2, 2]
     interval = result_of(evaluation, OWN, "late")["seconds"]["interval"]
     assert interval[0] > 0
 

@@ -2,7 +2,6 @@
 
 import importlib.util
 import sys
-import time
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -10,8 +9,9 @@ from types import ModuleType
 
 import numba as nb
 import pytest
+from slow_clock import SlowClock
 
-from pcii.evaluation.timing import MOST_CALLS, timed
+from pcii.evaluation.timing import timed
 
 NAMES = count()
 LOOP = """
@@ -26,14 +26,19 @@ def loop(n):
 """
 
 
-def counted(work: Callable[[int], object]) -> tuple[Callable[[], object], list[float]]:
-    """The work, given the number of its call, and the seconds that each call took."""
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> SlowClock:
+    return SlowClock(monkeypatch)
+
+
+def counted(clock: SlowClock, work: Callable[[int], object]) -> tuple[Callable[[], object], list[float]]:
+    """The work, given the number of its call, and the seconds that each call took: 100, 101 and so on."""
     calls: list[float] = []
 
     def again() -> object:
-        start = time.perf_counter()
         answer = work(len(calls))
-        calls.append(time.perf_counter() - start)
+        calls.append(100.0 + len(calls))
+        clock.go_on(calls[-1])
         return answer
 
     return again, calls
@@ -49,49 +54,48 @@ def loaded(file: Path) -> ModuleType:
     return module
 
 
-def test_what_compiles_nothing_is_called_once() -> None:
-    work, calls = counted(lambda _: 7)
-    seconds, answer = timed(work)
-    assert (len(calls), answer) == (1, 7)
-    assert seconds >= calls[0]
+def test_what_compiles_nothing_is_called_once(clock: SlowClock) -> None:
+    work, calls = counted(clock, lambda _: 7)
+    assert timed(work) == (100.0, 7)
+    assert len(calls) == 1
 
 
-def test_a_call_that_compiles_is_made_again() -> None:
+def test_a_call_that_compiles_is_made_again(clock: SlowClock) -> None:
     loop = nb.njit(lambda n: n + 1)
     loop(1)  # other data needs the loop for other numbers
-    work, calls = counted(lambda _: loop(1.5))
-    seconds, answer = timed(work)
-    assert (len(calls), answer) == (2, 2.5)
-    assert seconds < calls[0] / 2
+    work, calls = counted(clock, lambda _: loop(1.5))
+    assert timed(work) == (101.0, 2.5)
+    assert len(calls) == 2
 
 
-def test_a_call_that_reads_compiled_code_is_made_again(tmp_path: Path) -> None:
+def test_a_call_that_reads_compiled_code_is_made_again(tmp_path: Path, clock: SlowClock) -> None:
     (tmp_path / "loop.py").write_text(LOOP)
     loaded(tmp_path / "loop.py").loop(3)
     again = loaded(tmp_path / "loop.py")
-    work, calls = counted(lambda _: again.loop(3))
-    seconds, answer = timed(work)
+    work, calls = counted(clock, lambda _: again.loop(3))
+    assert timed(work) == (101.0, 3)
+    assert len(calls) == 2
     assert sum(again.loop.stats.cache_hits.values()) == 1
     assert sum(again.loop.stats.cache_misses.values()) == 0
-    assert (len(calls), answer) == (2, 3)
-    assert seconds < calls[0] / 2
 
 
-def test_a_call_that_imports_is_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "slow_to_import.py").write_text("import time\ntime.sleep(0.05)\n")
+def test_a_call_that_imports_is_made_again(
+    tmp_path: Path, clock: SlowClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "not_imported_yet.py").write_text("")
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def work(_: int) -> None:
-        import slow_to_import  # type: ignore[import-not-found]  # noqa: F401
+        import not_imported_yet  # type: ignore[import-not-found]  # noqa: F401
 
-    again, calls = counted(work)
-    seconds, _ = timed(again)
-    del sys.modules["slow_to_import"]
+    again, calls = counted(clock, work)
+    assert timed(again)[0] == 101.0
+    del sys.modules["not_imported_yet"]
     assert len(calls) == 2
-    assert seconds < 0.05
 
 
-def test_code_that_compiles_in_every_call_is_timed_in_the_end() -> None:
-    work, calls = counted(lambda number: nb.njit(lambda n: n + number)(1))
-    _, answer = timed(work)
-    assert (len(calls), answer) == (MOST_CALLS, MOST_CALLS)
+def test_code_that_compiles_in_every_call_is_timed_in_the_end(clock: SlowClock) -> None:
+    # One call may import, the next compile, one is timed, and one is to spare.
+    work, calls = counted(clock, lambda number: nb.njit(lambda n: n + number)(1))
+    assert timed(work) == (103.0, 4)
+    assert len(calls) == 4

@@ -12,9 +12,6 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import (
-    WIDER_CELLS,
-    WINDOW_CELLS,
-    WINDOW_WEIGHT,
     best_labels,
     cell_shape,
     focus_evidence,
@@ -25,10 +22,13 @@ from pcii.evidence.focus_likelihood import (
 from pcii.sections.reconstruction import reconstruct
 
 DISPARITIES = np.arange(1, 9)  # z = 1 / d mm on a unit grid
+WINDOW_CELLS, WIDER_CELLS = 2.0, (4.0, 8.0, 16.0)  # 8 px, and up to 64 px where there are no edges
+# The widths squared, the wider ones weighing as 1 / width: 2 pi 2^2 (1 + 4 / 2 + 8 / 2 + 16 / 2).
+WINDOW_WEIGHT = 2 * math.pi * 4 * 15
 
 
 def spread_of(grid: CameraGrid, disparity: float) -> np.ndarray:
-    return np.array([float(total_disparity_px(grid, 1 / disparity))])
+    return (max(grid.rows, grid.cols) - 1.0) * np.array([disparity])
 
 
 class Twin(NamedTuple):
@@ -66,8 +66,8 @@ def covered(place: int, shift: int, size: int) -> bool:
     return all(0 <= px < size and 0 <= px - shift < size for px in (place // 2 * 2, place // 2 * 2 + 1))
 
 
-def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) -> Twin:
-    """One plane, photon by photon: each prediction adds up all other photons (`itself`: and its own)."""
+def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
+    """One plane, photon by photon: each prediction adds up all other photons."""
     grid = counts.grid
     K, L, H, W = grid.shape_KLHW
     h, w = math.ceil(H / 4), math.ceil(W / 4)
@@ -95,7 +95,7 @@ def focus_twin(counts: PhotonCounts, disparity: float, *, itself: bool = False) 
         for number, (row, col, c, n, inside) in enumerate(photons):
             if inside and colour in (None, c):
                 there = reach(y, row // width, width, rows) * reach(x, col // width, width, cols)
-                total += (n - (number == without and not itself)) * there
+                total += (n - (number == without)) * there
         return total
 
     def samples(scale: int, y: float, x: float) -> float:
@@ -154,7 +154,7 @@ def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin
 @pytest.mark.parametrize("disparity", [2, 3.4])
 def test_predictions_and_gains_are_those_of_all_other_photons(cfa, disparity):
     # Landing 16 px or more from the frame, between the centres of the widest blocks (see the next test).
-    counts = scattered(unit_grid(2, 3, 95, 93), cfa, photons=60, seed=3, margin=20)
+    counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=40, seed=3, margin=20)
     focus, seen = predictions_of(counts, spread_of(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
     np.testing.assert_array_equal(seen.cell[0], twin.cell)
@@ -162,8 +162,6 @@ def test_predictions_and_gains_are_those_of_all_other_photons(cfa, disparity):
     np.testing.assert_allclose(seen.rate[0], twin.rate, rtol=1e-6)
     np.testing.assert_allclose(seen.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
-    # The planted fault, a photon that predicts itself, is nothing that the tolerance would hide.
-    assert np.abs(focus_twin(counts, disparity, itself=True).rate / twin.rate - 1).min() > 1e-3
 
 
 TINY = [((9, 11), 1), ((9, 11), 3), ((9, 11), 7.5), ((1, 1), 1), ((5, 2), 2), ((16, 8), 40), ((33, 34), 4)]
@@ -224,17 +222,6 @@ RATES = [1e-5, 1e-4, 0.01, 0.2, 2.0]  # from one photon in 64 x 64 px of the sec
 def test_a_flat_film_gains_nothing_on_average(rate, cfa):
     totals = flat_gains(rate, scenes=24, cfa=cfa).sum(axis=(1, 2), dtype=np.float64)
     assert totals.mean() < 4 * totals.std() / math.sqrt(totals.size)
-
-
-def test_a_photon_that_predicts_itself_would_gain_on_average():
-    # The planted fault. The twin shares no code with the loops, and gives their answer without the fault.
-    grid = unit_grid(3, 3, 36, 36)
-    films = [np.random.default_rng(seed).poisson(0.008, size=grid.shape_KLHW) for seed in range(6)]
-    counts = [PhotonCounts.from_dense(film, grid) for film in films]
-    honest = np.array([focus_twin(c, 1).gain.sum() for c in counts])
-    faulty = np.array([focus_twin(c, 1, itself=True).gain.sum() for c in counts])
-    assert honest.mean() < 0
-    assert faulty.mean() > 4 * faulty.std() / math.sqrt(faulty.size)
 
 
 def large_gains(gains: np.ndarray) -> float:

@@ -3,7 +3,15 @@ import math
 
 import numpy as np
 import pytest
-from twins import intersection_over_union, unit_grid, voxel_of
+from twins import (
+    bayer_photons,
+    blocky_texture,
+    intersection_over_union,
+    opaque_views,
+    square_mask,
+    unit_grid,
+    voxel_of,
+)
 
 import pcii
 from pcii.core.errors import InputError
@@ -11,7 +19,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
-from pcii.removal.three_step.three_step_method import WINDOW_CELLS, ThreeStep, adaptive_threshold
+from pcii.removal.three_step.three_step_method import ThreeStep, adaptive_threshold
 from pcii.sections.probe_planes import with_probes
 
 NOTHING = ThreeStep(threshold=False, boundary=False, entropy=False)
@@ -95,8 +103,8 @@ def test_a_division_that_cannot_be_is_refused(bad):
 
 
 def threshold_twin(dense, grid, disparity, tolerance, row, col):
-    """Eq. 7 at one voxel with cells of one pixel: mean, variance and T by loops."""
-    reach = range(-(WINDOW_CELLS // 2), WINDOW_CELLS - WINDOW_CELLS // 2)
+    """Eq. 7 at one voxel with cells of one pixel, of which 4 x 4 are pooled: mean, variance, T by loops."""
+    reach = range(-2, 2)
 
     def samples(r, c):
         found = []
@@ -221,13 +229,9 @@ def test_probes_of_the_three_steps_stand_clear_of_the_requested_planes():
 
 def touching(photons: float):
     """Two textured squares side by side at different depths, the nearer one over the border of the other."""
-    from twins import bayer_photons, blocky_texture, patch_views, square_mask
-
-    grid = unit_grid(7, 7, 256, 256)
-    rng = np.random.default_rng(2)
-    near = patch_views(blocky_texture(rng, 80, 80), 90, 50, 7, grid)
-    far = patch_views(blocky_texture(rng, 80, 80), 90, 126, 3, grid)
-    rates = photons * np.where(near.any(axis=-1, keepdims=True), near, far)
+    grid, rng = unit_grid(7, 7, 256, 256), np.random.default_rng(2)
+    near, far = (blocky_texture(rng, 80, 80) for _ in range(2))
+    rates = photons * opaque_views([(far, 90, 126, 3), (near, 90, 50, 7)], grid)
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=3), grid, cfa="GRBG")
     near_mask = square_mask(grid, 90, 50, 80)
     return counts, (1 / 7, 1 / 3), (near_mask, square_mask(grid, 90, 126, 80) & ~near_mask)

@@ -1,0 +1,73 @@
+"""The loops that predict photons from a section: in parts, and where views are hidden."""
+
+import numpy as np
+from twins import unit_grid
+
+from pcii.core.bayer import sites_of_colours
+from pcii.core.photon_counts import PhotonCounts
+from pcii.evidence.prediction_kernels import land, predict, predict_shared
+
+
+def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
+    rate, views = 0.5, 16
+    grid = unit_grid(4, 4, 64, 64)
+    film = np.random.default_rng(5).poisson(rate, grid.shape_KLHW)
+    counts = PhotonCounts.from_dense(film, grid, cfa=None)
+    events = counts.events
+    hidden = ((events.k + events.l) % 2 == 0) & (events.j < 32)
+    # The shifts are 0: of the left half every second view is hidden.
+    seen = np.repeat(np.where(np.arange(16) < 8, 0.5, 1.0)[None], 16, axis=0).astype(np.float32)
+    none = np.zeros(4, np.int32)
+    N = events.n.size
+    cell, own, base = np.zeros(N, np.int32), np.zeros(N, np.float32), np.zeros(N, np.float32)
+    samples, mean, blurred = np.zeros((3, 16, 16), np.float32)
+    where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
+    weight = (~hidden).astype(np.float32)
+    sites = np.array([4.0])
+    land(*where[:4], none, none, (64, 64), cell)
+    section = (none, none, 64, 64, sites, seen, 1.0)
+    predict((*where, weight, cell), section, (own, base, samples, mean, blurred))
+    for part in (np.s_[:, :8], np.s_[:, 8:]):
+        photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
+        assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
+    # A hidden event is predicted, too, and takes no part in it: those beside it are all alike.
+    assert abs(own[hidden].mean() / rate - 1) < 0.02
+
+
+def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
+    K, L, H, W = 4, 5, 96, 128
+    film = np.random.default_rng(3).poisson(0.02, (K, L, H, W))
+    counts = PhotonCounts.from_dense(film, unit_grid(K, L, H, W), cfa="GRBG")
+    events = counts.events
+    N, (h, w), rng = events.n.size, (H // 4, W // 4), np.random.default_rng(4)
+    rows, cols = 19 * np.arange(K, dtype=np.int32) - 30, 2 * np.arange(L, dtype=np.int32) - 5
+    where = events.k, events.l, events.i, events.j
+    cell = np.zeros(N, np.int32)
+    land(*where, rows, cols, (H, W), cell)
+    assert (cell < 0).any()
+    weight, seen = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
+    colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)
+    about = (*where, colours, n, weight, cell), (rows, cols, H, W, sites, seen, 1.0)
+
+    def outputs():
+        return (*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
+
+    whole, by_one = outputs(), outputs()
+    predict_shared(1, np.ones(N, dtype=bool), (0, h), 0, *about, whole)
+    predict(*about, by_one)
+    for found, expected in zip(by_one[:3], whole[:3], strict=True):
+        np.testing.assert_array_equal(found, expected)
+    asked = rng.random(N) < 0.5
+    in_rows = ((np.arange(h) >= 5) & (np.arange(h) < h - 2))[:, None] & np.ones(w, dtype=bool)
+    for parts in (1, 3):
+        rate, base, samples, mean, blurred = told = outputs()
+        predict_shared(parts, asked, (5, h - 2), 0, *about, told)
+        for found, expected in ((rate, whole[0]), (base, whole[1])):
+            np.testing.assert_array_equal(found, np.where(asked, expected, -1))
+        for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
+            np.testing.assert_array_equal(found, np.where(in_rows, expected, -1))
+        # The widest window alone: scale 4, of 2 px << 4.
+        rate, base, samples, mean, blurred = told = outputs()
+        predict_shared(parts, asked, (0, h), 4, *about, told)
+        np.testing.assert_array_equal(base, np.where(asked, whole[1], -1))
+        np.testing.assert_array_equal(blurred, whole[4])

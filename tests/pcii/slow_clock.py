@@ -1,0 +1,16 @@
+"""A clock by which the time of methods is taken, that goes on when it is told to: no test hangs on speed."""
+
+from types import SimpleNamespace
+
+import pytest
+
+
+class SlowClock:
+    """In the place of the clock of `pcii.evaluation.timing` until the test ends."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s = 0.0
+        monkeypatch.setattr("pcii.evaluation.timing.time", SimpleNamespace(perf_counter=lambda: self.now_s))
+
+    def go_on(self, seconds: float) -> None:
+        self.now_s += seconds
