@@ -3,8 +3,6 @@
 Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
 
-from typing import NamedTuple
-
 import numba as nb
 import numpy as np
 
@@ -26,20 +24,10 @@ BASE_SHARE = 0.05
 AT_ONCE = 512
 """Events that are taken through the scales together."""
 
-
-class Scales(NamedTuple):
-    """A section at each scale, smoothed."""
-
-    views: list[np.ndarray]
-    """Views (1, H, W) of blocks, a coarser array for each scale."""
-    photons: list[np.ndarray]
-    """Photons (1, H, W)."""
-    by_colour: list[np.ndarray]
-    """Photons by colour (C, H, W)."""
-    mean_rate: float
-    by_row: np.ndarray
-    """How many camera rows see each row of blocks (2 h,), and `by_col` (2 w,) likewise."""
-    by_col: np.ndarray
+Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
+"""A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
+how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks. No named tuple: parallel loops
+take such only if they are arguments."""
 
 
 @helper
@@ -74,7 +62,7 @@ def _scales(events: PlacedEvents, section: PlaneView, finest: int) -> Scales:
         seen.append(smoothed(views if whole else views[:, :1, :1].copy()))
         light.append(smoothed(totals if whole else totals[:, :1, :1].copy()))
         coloured.append(smoothed(counts if by_colour else counts[:, :1, :1].copy()))
-    return Scales(seen, light, coloured, everywhere, by_row, by_col)
+    return seen, light, coloured, everywhere, by_row, by_col
 
 
 @helper

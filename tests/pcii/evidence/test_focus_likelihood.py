@@ -9,6 +9,7 @@ from scipy.special import gammaln, xlogy
 from twins import bayer_photons, blocky_texture, colour_of, patch_views, unit_grid
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import (
@@ -27,8 +28,8 @@ WINDOW_CELLS, WIDER_CELLS = 2.0, (4.0, 8.0, 16.0)  # 8 px, and up to 64 px where
 WINDOW_WEIGHT = 2 * math.pi * 4 * 15
 
 
-def spread_of(grid: CameraGrid, disparity: float) -> np.ndarray:
-    return (max(grid.rows, grid.cols) - 1.0) * np.array([disparity])
+def plane_at(grid: CameraGrid, disparity: float) -> FocalPlanes:
+    return FocalPlanes.at_total_disparity(grid, (max(grid.rows, grid.cols) - 1.0) * disparity)
 
 
 class Twin(NamedTuple):
@@ -155,7 +156,7 @@ def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin
 def test_predictions_and_gains_are_those_of_all_other_photons(cfa, disparity):
     # Landing 16 px or more from the frame, between the centres of the widest blocks (see the next test).
     counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=40, seed=3, margin=20)
-    focus, seen = predictions_of(counts, spread_of(counts.grid, disparity))
+    focus, seen = predictions_of(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
     np.testing.assert_array_equal(seen.cell[0], twin.cell)
     # Rates are kept in single precision, and sums of gains: a few roundings of 6e-8 each.
@@ -171,7 +172,7 @@ TINY = [((9, 11), 1), ((9, 11), 3), ((9, 11), 7.5), ((1, 1), 1), ((5, 2), 2), ((
 @pytest.mark.parametrize(("size", "disparity"), TINY)
 def test_photons_are_expected_where_the_section_says_up_to_the_frame(cfa, size, disparity):
     counts = scattered(unit_grid(2, 3, *size), cfa, photons=20, seed=1)
-    seen = predictions_of(counts, spread_of(counts.grid, disparity))[1]
+    seen = predictions_of(counts, plane_at(counts.grid, disparity))[1]
     twin = focus_twin(counts, disparity)
     np.testing.assert_array_equal(seen.cell[0], twin.cell)
     np.testing.assert_allclose(seen.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
@@ -181,7 +182,7 @@ def test_photons_are_expected_where_the_section_says_up_to_the_frame(cfa, size, 
 @pytest.mark.parametrize(("size", "disparity"), TINY)
 def test_predictions_at_the_frame_are_those_of_all_other_photons(cfa, size, disparity):
     counts = scattered(unit_grid(2, 3, *size), cfa, photons=20, seed=1)
-    focus, seen = predictions_of(counts, spread_of(counts.grid, disparity))
+    focus, seen = predictions_of(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
     np.testing.assert_allclose(seen.rate[0], twin.rate, rtol=1e-6)
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
@@ -191,7 +192,7 @@ def test_predictions_at_the_frame_are_those_of_all_other_photons(cfa, size, disp
 @pytest.mark.parametrize(("i", "j"), [(48, 48), (40, 61), (0, 0), (0, 50), (95, 3)])
 def test_a_single_photon_is_not_predicted(cfa, i, j):
     one = PhotonCounts.from_events(*np.array([[0, 0, i, j, 1]]).T, unit_grid(2, 2, 96, 96), cfa=cfa)
-    rate = predictions_of(one, np.array([1e-6]))[1].rate
+    rate = predictions_of(one, FocalPlanes.at_total_disparity(one.grid, [1e-6]))[1].rate
     # With no other photon there is no rate at all but the floor of 1e-12, which keeps logarithms finite.
     assert rate.max() <= 1e-12
 
@@ -201,17 +202,15 @@ def test_two_photons_of_different_colour_are_no_evidence():
     counts = PhotonCounts.from_events(*events, unit_grid(2, 2, 128, 128), cfa="GRBG")
     # Two photons beside each other on a film of A samples: chance within r px is pi r^2 / A, so they are
     # worth less than 2 log(A / (pi r^2)) = 2 log(128^2 / (4 pi)) = 14 nats, were all known beforehand.
-    assert focus_evidence(counts, np.array([1e-6])).gain.sum() < 14
+    assert focus_evidence(counts, FocalPlanes.at_total_disparity(counts.grid, [1e-6])).gain.sum() < 14
 
 
 def flat_gains(rate: float, scenes: int, cfa: str | None = "GRBG", size: int = 128) -> np.ndarray:
     """Gain (scenes, h, w) of flat films at one depth."""
     grid = unit_grid(5, 5, size, size)
     drawn = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(scenes)]
-    spread = spread_of(grid, 3)
-    return np.array(
-        [focus_evidence(PhotonCounts.from_dense(d, grid, cfa=cfa), spread).gain[0] for d in drawn]
-    )
+    plane = plane_at(grid, 3)
+    return np.array([focus_evidence(PhotonCounts.from_dense(d, grid, cfa=cfa), plane).gain[0] for d in drawn])
 
 
 RATES = [1e-5, 1e-4, 0.01, 0.2, 2.0]  # from one photon in 64 x 64 px of the section to 50 in each
@@ -248,7 +247,7 @@ def test_photons_in_pairs_are_seen():
         film = np.zeros(grid.shape_KLHW, dtype=int)
         film[:, 0::2], film[:, 1::2, :, :-3] = half, half[..., 3:]  # at the disparity 3
         counts = PhotonCounts.from_dense(film, grid)
-        films.append(focus_evidence(counts, spread_of(grid, 3)).gain[0])
+        films.append(focus_evidence(counts, plane_at(grid, 3)).gain[0])
     assert large_gains(np.array(films)) > 0.9
 
 
@@ -260,7 +259,7 @@ def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
         grid = unit_grid(5, 5, *size)
         films = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(4)]
         gains = np.array(
-            [focus_evidence(PhotonCounts.from_dense(f, grid), spread_of(grid, 3)).gain[0] for f in films]
+            [focus_evidence(PhotonCounts.from_dense(f, grid), plane_at(grid, 3)).gain[0] for f in films]
         )
         # A cell's four finest rates cost half a nat each at most, give or take sqrt(1/2), times the fifth for
         # which their scale counts; coarser scales are fewer, and shared by cells.
@@ -295,13 +294,13 @@ def test_a_textured_plane_scores_highest_at_its_depth(true_disparity, cfa):
         counts = PhotonCounts.from_dense(np.random.default_rng(1).poisson(rates[..., 1]), grid)
     else:
         counts = PhotonCounts.from_dense(bayer_photons(rates, cfa, 1), grid, cfa=cfa)
-    focus = focus_evidence(counts, total_disparity_px(grid, 1 / DISPARITIES))
+    focus = focus_evidence(counts, FocalPlanes.at_depths(grid, 1 / DISPARITIES))
     best = DISPARITIES[np.argmax(windowed(focus.gain, focus.photons), axis=0)]
     assert set(best[6:18, 6:18].ravel()) == {true_disparity}
     # The planted fault, cameras in the wrong order, blurs by twice the disparity and leaves little.
     mirrored = PhotonCounts.from_dense(counts.dense[::-1, ::-1], grid, cfa=cfa)
     right, wrong = (
-        focus_evidence(c, spread_of(grid, true_disparity)).gain[0, 6:18, 6:18].sum()
+        focus_evidence(c, plane_at(grid, true_disparity)).gain[0, 6:18, 6:18].sum()
         for c in (counts, mirrored)
     )
     assert wrong < right / 2
@@ -335,7 +334,7 @@ def test_depths_whose_shifts_are_all_even_do_not_attract_texture():
     texture = np.exp(0.8 * noise / noise.std())[..., None] * np.ones(3)
     rates = 0.05 * patch_views(texture, 0, 0, true_disparity, grid)
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", 1), grid, cfa="GRBG")
-    gain = focus_evidence(counts, total_disparity_px(grid, 1 / DISPARITIES)).gain
+    gain = focus_evidence(counts, FocalPlanes.at_depths(grid, 1 / DISPARITIES)).gain
     middle = gain[:, 12:-12, 12:-12].sum(axis=(1, 2))
     assert DISPARITIES[np.argmax(middle)] == true_disparity
     assert DISPARITIES[np.argmax(per_pixel_scores(counts))] in (2, 4)
@@ -346,7 +345,7 @@ def test_depths_whose_shifts_are_all_even_do_not_attract_texture():
 def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
     grid = unit_grid(2, 2, *size)
     counts = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
-    focus, seen = predictions_of(counts, np.array([1.0, 2.0]))
+    focus, seen = predictions_of(counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0]))
     assert cell_shape(counts) == (math.ceil(size[0] / 4), math.ceil(size[1] / 4))
     assert focus.gain.shape == seen.expected.shape == (2, *cell_shape(counts))
     assert focus.photons.shape == (2, counts.channel_count, *cell_shape(counts))
@@ -360,7 +359,9 @@ def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
 def test_the_largest_counts_have_finite_gains(size):
     grid = unit_grid(3, 3, *size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 1 << 40), grid, cfa="GRBG")
-    focus, seen = predictions_of(counts, np.array([1.0, 2.0, 200.0]))  # at the last some views see nothing
+    focus, seen = predictions_of(
+        counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0, 200.0])
+    )  # at the last some views see nothing
     for values in (focus.gain, seen.rate, seen.expected, windowed(focus.gain, focus.photons)):
         assert np.all(np.isfinite(values))
 
@@ -369,7 +370,9 @@ def test_photons_are_counted_by_colour_and_cell():
     # Two rows of cameras 3 px of parallax apart: camera 0 shifts by floor(-1.5 + 1/2) = -1, camera 1 by 2.
     grid = unit_grid(2, 1, 8, 8)
     events = np.array([[0, 0, 4, 4, 2], [1, 0, 3, 5, 1], [1, 0, 6, 0, 7]]).T
-    focus = focus_evidence(PhotonCounts.from_events(*events, grid, cfa="GRBG"), np.array([3.0]))
+    focus = focus_evidence(
+        PhotonCounts.from_events(*events, grid, cfa="GRBG"), FocalPlanes.at_total_disparity(grid, 3.0)
+    )
     expected = np.zeros((3, 2, 2))
     expected[1, 0, 1] = 2  # green at (4, 4), lands in row 3
     expected[1, 1, 1] = 1  # green at (3, 5), lands in row 5; the last photon leaves the frame for row 8
@@ -378,14 +381,14 @@ def test_photons_are_counted_by_colour_and_cell():
 
 def test_predictions_come_with_the_same_evidence():
     counts = scattered(unit_grid(3, 3, 30, 30), "GRBG", photons=200, seed=5)
-    spread = np.array([2.0, 4.0, 7.0])
-    focus, alone = predictions_of(counts, spread)[0], focus_evidence(counts, spread)
+    planes = FocalPlanes.at_total_disparity(counts.grid, [2.0, 4.0, 7.0])
+    focus, alone = predictions_of(counts, planes)[0], focus_evidence(counts, planes)
     np.testing.assert_array_equal(focus.gain, alone.gain)
     np.testing.assert_array_equal(focus.photons, alone.photons)
-    np.testing.assert_array_equal(alone.spread_px, spread)
+    assert alone.planes is planes
 
 
-def test_a_spread_is_that_of_its_depth():
+def test_a_total_disparity_is_that_of_its_depth():
     grid = unit_grid(3, 5, 8, 8, pitch_mm=(2.0, 7.0))  # 4 x 2 px across, 2 x 7 px down at 1 mm
     np.testing.assert_allclose(
         depth_of_total_disparity_mm(grid, np.array([14.0, 7.0])), [1.0, 2.0], rtol=1e-15

@@ -4,6 +4,7 @@ from twins import bayer_photons, blocky_texture, patch_views, unit_grid
 
 from pcii.core.bayer import colour_cells
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.half_agreement import Halves, halves_of, least_agreement
 
@@ -15,15 +16,15 @@ def at(halves: Halves, plane: int, shape: tuple[int, int]) -> np.ndarray:
     return halves.agreement(np.full(shape, plane), np.ones(shape, dtype=bool))
 
 
-def spreads_of(grid: CameraGrid) -> np.ndarray:
-    return (max(grid.rows, grid.cols) - 1.0) * np.array(DISPARITIES_PX)
+def planes_of(grid: CameraGrid) -> FocalPlanes:
+    return FocalPlanes.at_total_disparity(grid, (max(grid.rows, grid.cols) - 1.0) * np.array(DISPARITIES_PX))
 
 
 def test_a_surface_is_agreed_on_where_it_is():
     grid, rng = unit_grid(5, 7, 128, 160), np.random.default_rng(0)
     rates = patch_views(0.05 * blocky_texture(rng, 64, 64), 32, 48, 3, grid)
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=0), grid, cfa="GRBG")
-    halves = halves_of(counts, spreads_of(grid))
+    halves = halves_of(counts, planes_of(grid))
     least = least_agreement(halves.planes)
     own = at(halves, DISPARITIES_PX.index(3), (32, 40))
     assert own[10:22, 14:26].min() > least
@@ -35,7 +36,7 @@ def test_what_one_camera_alone_shows_is_not_agreed_on():
     grid, rng = unit_grid(3, 3, 96, 96), np.random.default_rng(1)
     film = rng.poisson(0.5, grid.shape_KLHW)
     film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
     least = least_agreement(len(DISPARITIES_PX))
     assert max(at(halves, plane, (24, 24)).max() for plane in range(6)) < least
     assert halves.agreement_over(slice(0, 24), slice(0, 24), np.ones((24, 24), dtype=bool)) < least
@@ -48,7 +49,7 @@ def test_noise_agrees_as_seldom_as_is_said(rate, views):
     above = []
     for seed in range(20):
         film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
-        halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+        halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
         largest = np.max([at(halves, plane, (16, 20)) for plane in range(6)], axis=0)
         above.append((largest > least_agreement(6)).mean())
     assert np.mean(above) <= 1 / 1000  # of places, as is said
@@ -59,7 +60,7 @@ def test_halves_that_are_the_same_agree_on_noise():
     grid = unit_grid(2, 1, 64, 80)
     film = np.repeat(np.random.default_rng(0).poisson(1.0, (1, 1, 64, 80)), 2, axis=0)
     film[1, 0, :-1] = film[1, 0, 1:]  # at the disparity 1
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), spreads_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
     assert (at(halves, 0, (16, 20)) > least_agreement(6)).mean() > 0.9
 
 
@@ -67,7 +68,9 @@ def test_halves_that_are_the_same_agree_on_noise():
 def test_products_are_those_of_the_formula(cfa):
     grid, rng = unit_grid(3, 2, 23, 38), np.random.default_rng(2)
     film = rng.poisson(2.0, grid.shape_KLHW)
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=cfa), np.array([4.0]))
+    halves = halves_of(
+        PhotonCounts.from_dense(film, grid, cfa=cfa), FocalPlanes.at_total_disparity(grid, 4.0)
+    )
     h, w = 6, 10
     for side, products in zip(SIDES_CELLS, halves.products, strict=True):
         expected = np.ones((-(-h // side), -(-w // side)))
@@ -110,7 +113,7 @@ def test_even_light_is_no_light_to_agree_on(count, size):
     grid = unit_grid(2, 3, *size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa="GRBG")
     shape = -(-size[0] // 4), -(-size[1] // 4)
-    assert not at(halves_of(counts, np.array([2.0, 4.0])), 1, shape).any()
+    assert not at(halves_of(counts, FocalPlanes.at_total_disparity(counts.grid, [2.0, 4.0])), 1, shape).any()
 
 
 def test_bayer_colours_do_not_pass_for_light():
@@ -118,5 +121,5 @@ def test_bayer_colours_do_not_pass_for_light():
     colours = np.tile(colour_cells("GRBG"), (32, 32))
     rates = np.array([0.2, 5.0, 40.0])[colours] * np.ones(grid.shape_KLHW)
     film = np.random.default_rng(4).poisson(rates)
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), spreads_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), planes_of(grid))
     assert max(at(halves, plane, (16, 16)).max() for plane in range(6)) < least_agreement(6)

@@ -5,7 +5,9 @@ from twins import unit_grid
 
 from pcii.core.bayer import sites_of_colours
 from pcii.core.photon_counts import PhotonCounts
-from pcii.evidence.prediction_kernels import land, predict, predict_shared
+from pcii.evidence.prediction_kernels import predict, predict_shared
+from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
+from pcii.evidence.projection_kernels import cells_of_events
 
 
 def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
@@ -24,9 +26,9 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
     weight = (~hidden).astype(np.float32)
     sites = np.array([4.0])
-    land(*where[:4], none, none, (64, 64), cell)
-    section = (none, none, 64, 64, sites, seen, 1.0)
-    predict((*where, weight, cell), section, (own, base, samples, mean, blurred))
+    cells_of_events(*where[:4], none, none, (64, 64), cell)
+    section = PlaneView(none, none, 64, 64, sites, seen, 1.0)
+    predict(PlacedEvents(*where, weight, cell), section, Predicted(own, base, samples, mean, blurred))
     for part in (np.s_[:, :8], np.s_[:, 8:]):
         photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
         assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
@@ -43,14 +45,17 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     rows, cols = 19 * np.arange(K, dtype=np.int32) - 30, 2 * np.arange(L, dtype=np.int32) - 5
     where = events.k, events.l, events.i, events.j
     cell = np.zeros(N, np.int32)
-    land(*where, rows, cols, (H, W), cell)
+    cells_of_events(*where, rows, cols, (H, W), cell)
     assert (cell < 0).any()
     weight, seen = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
     colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)
-    about = (*where, colours, n, weight, cell), (rows, cols, H, W, sites, seen, 1.0)
+    about = (
+        PlacedEvents(*where, colours, n, weight, cell),
+        PlaneView(rows, cols, H, W, sites, seen, 1.0),
+    )
 
     def outputs():
-        return (*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
+        return Predicted(*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
 
     whole, by_one = outputs(), outputs()
     predict_shared(1, np.ones(N, dtype=bool), (0, h), 0, *about, whole)
@@ -60,14 +65,14 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     asked = rng.random(N) < 0.5
     in_rows = ((np.arange(h) >= 5) & (np.arange(h) < h - 2))[:, None] & np.ones(w, dtype=bool)
     for parts in (1, 3):
-        rate, base, samples, mean, blurred = told = outputs()
-        predict_shared(parts, asked, (5, h - 2), 0, *about, told)
+        rate, base, samples, mean, blurred = predicted = outputs()
+        predict_shared(parts, asked, (5, h - 2), 0, *about, predicted)
         for found, expected in ((rate, whole[0]), (base, whole[1])):
             np.testing.assert_array_equal(found, np.where(asked, expected, -1))
         for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
             np.testing.assert_array_equal(found, np.where(in_rows, expected, -1))
         # The widest window alone: scale 4, of 2 px << 4.
-        rate, base, samples, mean, blurred = told = outputs()
-        predict_shared(parts, asked, (0, h), 4, *about, told)
+        rate, base, samples, mean, blurred = predicted = outputs()
+        predict_shared(parts, asked, (0, h), 4, *about, predicted)
         np.testing.assert_array_equal(base, np.where(asked, whole[1], -1))
         np.testing.assert_array_equal(blurred, whole[4])

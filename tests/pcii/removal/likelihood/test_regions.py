@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from twins import unit_grid
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import Focus, focus_evidence
 from pcii.evidence.half_agreement import Halves, halves_of
@@ -17,6 +19,7 @@ SURE_NATS = 10.0  # of chance once in e^10 = 20 000 times
 HALO_CELLS = 4  # a blurred outline shows up to 16 px outside
 # Two planes, at 20 and 40 px of spread, among five searched depths.
 SPREAD_PX = np.array([10.0, 20.0, 30.0, 40.0, 60.0])
+SEARCHED = FocalPlanes.at_total_disparity(unit_grid(3, 3, 120, 160), SPREAD_PX)
 PLANES = Planes(
     spread_px=SPREAD_PX,
     nearest=np.array([0, 0, 0, 1, 1]),
@@ -44,7 +47,7 @@ def focus_with(*gains: tuple[int, np.ndarray, float]) -> Focus:
     gain = np.zeros((SPREAD_PX.size, *SHAPE), np.float32)
     for depth, where, nats in gains:
         gain[depth][where] += nats / where.sum()
-    return Focus(SPREAD_PX, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
+    return Focus(SEARCHED, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
 
 
 def test_without_photons_nothing_is_bright():
@@ -249,7 +252,8 @@ def test_noise_alone_is_never_sure(photons_per_px):
         random = np.random.default_rng(seed)
         film = random.poisson(photons_per_px / 100, (10, 10, size, size))
         counts = PhotonCounts.from_dense(film, grid, cfa="GRBG")
-        focus, halves = focus_evidence(counts, spread_px), halves_of(counts, spread_px)
+        searched = FocalPlanes.at_total_disparity(grid, spread_px)
+        focus, halves = focus_evidence(counts, searched), halves_of(counts, searched)
         _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes, halves)
         assert not region.is_there
         assert np.median(focus.gain.sum(axis=(1, 2))) < -50

@@ -37,14 +37,14 @@ def test_without_any_step_all_that_is_lit_stays(two_squares):
 def test_without_entropy_the_other_object_stays_and_with_it_goes(two_squares):
     there = two_squares.masks[1]
     bright = ThreeStep(threshold=False, entropy=False)
-    assert bright(two_squares.counts, np.array(two_squares.z_mm)).in_focus[0][there].mean() > 0.9
+    assert pcii.segment(two_squares.counts, two_squares.z_mm, method=bright).in_focus[0][there].mean() > 0.9
     all_steps = pcii.segment(two_squares.counts, two_squares.z_mm, method="three-step")
     assert all_steps.in_focus[0][there].mean() < 0.05
 
 
 def test_the_threshold_alone_keeps_what_is_sharp_and_removes_what_is_not(two_squares):
     alone = ThreeStep(boundary=False, entropy=False)
-    kept = alone(two_squares.counts, np.array(two_squares.z_mm)).in_focus
+    kept = pcii.segment(two_squares.counts, two_squares.z_mm, method=alone).in_focus
     for plane, own in enumerate(two_squares.masks):
         there = two_squares.masks[1 - plane]
         assert kept[plane][own].mean() > 0.97  # 3 sigma
@@ -53,13 +53,13 @@ def test_the_threshold_alone_keeps_what_is_sharp_and_removes_what_is_not(two_squ
 
 def test_the_planted_fault_of_swapped_depths_is_seen_by_the_threshold(two_squares):
     alone = ThreeStep(boundary=False, entropy=False)
-    kept = alone(two_squares.counts, np.array(two_squares.z_mm[::-1])).in_focus
+    kept = pcii.segment(two_squares.counts, two_squares.z_mm[::-1], method=alone).in_focus
     assert kept[0][two_squares.masks[0]].mean() < 0.7
 
 
 def test_entropy_alone_tells_the_planes_of_square_sub_images(two_squares):
     alone = ThreeStep(threshold=False, boundary=False)
-    focus = alone(two_squares.counts, np.array(two_squares.z_mm))
+    focus = pcii.segment(two_squares.counts, two_squares.z_mm, method=alone)
     for plane, own in enumerate(two_squares.masks):
         assert focus.in_focus[plane][own].mean() > 0.8  # tiles at its border see half of it
         assert focus.in_focus[plane][two_squares.masks[1 - plane]].mean() < 0.2
