@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from benchmarks.drawn import KINDS, TUNING, write_drawn
-from pcii.core.console import Stages
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
+from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate, part_of
 from pcii.evaluation.rows import recipe_of
 from pcii.evaluation.tables import Table, markdown, overview, tables_of

@@ -6,8 +6,8 @@ inside the functions that need them.
 
 __version__ = "0.1.0"
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts

@@ -13,6 +13,7 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 # Each room leans only on those before it; a room within another counts by its own name.
 ROOMS = {
     "pcii": [
+        "base",
         "core",
         "io",
         "imaging",
@@ -44,7 +45,7 @@ ROOMS = {
 }
 # What simgen may share with pcii: types, masks, the file format and how commands behave. Not its geometry
 # or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
-SHARED_ROOMS = {"core", "io"}
+SHARED_ROOMS = {"base", "core", "io"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

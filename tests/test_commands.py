@@ -11,7 +11,7 @@ import zarr
 from PIL import Image
 
 from pcii.app import commands as pcii_cli
-from pcii.core import console
+from pcii.base import command_line
 from pcii.io.dataset_layout import MANIFEST
 from simgen.app import commands as simgen_cli
 
@@ -21,13 +21,13 @@ pytestmark = pytest.mark.renders
 @pytest.fixture(scope="module")
 def results(small_dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("results") / "small"
-    assert console.run(pcii_cli.app, ["run", str(small_dataset), "-o", str(out)]) == 0
+    assert command_line.run(pcii_cli.app, ["run", str(small_dataset), "-o", str(out)]) == 0
     return out
 
 
 def refusal(app: object, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     """The one sentence with which a command refuses bad input."""
-    assert console.run(app, arguments) == 2  # type: ignore[arg-type]
+    assert command_line.run(app, arguments) == 2  # type: ignore[arg-type]
     said = capsys.readouterr().err.strip()
     assert said.startswith("error: ")
     assert "\n" not in said
@@ -85,10 +85,10 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     out, data = str(tmp_path / "steps"), str(small_dataset)
     for method in ("three-step", "likelihood"):
         command = ["segment", data, "--z-mm", "540", "--z-mm", "620", "--method", method, "-o", out]
-        assert console.run(pcii_cli.app, command) == 0
-    assert console.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
-    assert console.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", out]) == 0
-    assert console.run(pcii_cli.app, ["score", data, out]) == 0
+        assert command_line.run(pcii_cli.app, command) == 0
+    assert command_line.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
+    assert command_line.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", out]) == 0
+    assert command_line.run(pcii_cli.app, ["score", data, out]) == 0
     one, other = (json.loads((Path(d) / "score.json").read_text()) for d in (out, results))
     by_name = [
         sorted(s["planes"], key=lambda row: (row["method"], row["z_mm"], row["truth"])) for s in (one, other)
@@ -101,8 +101,8 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
 
 def test_a_depth_map_alone_is_scored(small_dataset: Path, results: Path, tmp_path: Path) -> None:
     out, data = str(tmp_path / "depth"), str(small_dataset)
-    assert console.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
-    assert console.run(pcii_cli.app, ["score", data, out]) == 0
+    assert command_line.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
+    assert command_line.run(pcii_cli.app, ["score", data, out]) == 0
     one, other = (json.loads((Path(d) / "score.json").read_text()) for d in (out, results))
     assert one["planes"] == one["objects"] == []
     assert one["depth"] == other["depth"]
@@ -119,7 +119,7 @@ def test_run_takes_the_methods_it_is_told(
     )
     assert "z_mm" in refusal(pcii_cli.app, ["run", data, "--z-mm", "-1", "-o", str(out)], capsys)
     assert not out.exists()
-    assert console.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
+    assert command_line.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
     rows = json.loads((out / "score.json").read_text())["planes"]
     assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
     assert "shape-from-focus" in (out / "report.html").read_text()
@@ -130,7 +130,7 @@ def test_steps_are_left_out_and_results_named_so(
 ) -> None:
     command = ["segment", str(small_dataset), "--z-mm", "540", "-o", str(tmp_path / "out")]
     steps = [*command, "--method", "three-step", "--without", "entropy", "--without", "threshold"]
-    assert console.run(pcii_cli.app, [*steps, "--subpixel", "2"]) == 0
+    assert command_line.run(pcii_cli.app, [*steps, "--subpixel", "2"]) == 0
     name = "three-step-subpixel-2-without-threshold-without-entropy"
     assert (tmp_path / "out" / f"segmented_{name}.zarr").is_dir()
     assert (tmp_path / "out" / f"in_focus_{name}_540mm.png").is_file()
@@ -145,7 +145,7 @@ def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
     small_dataset: Path, tmp_path: Path
 ) -> None:
     command = ["reconstruct", str(small_dataset), "--z-mm", "580", "--shifts", "even", "-o", str(tmp_path)]
-    assert console.run(pcii_cli.app, command) == 0
+    assert command_line.run(pcii_cli.app, command) == 0
     group = zarr.open_group(tmp_path / "sections.zarr", mode="r")
     assert group.attrs["cfa"] == "GRBG"
     counts = np.asarray(group["counts"])
@@ -208,13 +208,13 @@ def test_results_and_datasets_are_verified_by_one_command(
     small_dataset: Path, results: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     for app, folder in itertools.product((simgen_cli.app, pcii_cli.app), (small_dataset, results)):
-        assert console.run(app, ["verify", str(folder)]) == 0
+        assert command_line.run(app, ["verify", str(folder)]) == 0
         assert "files match the manifest" in capsys.readouterr().out
     broken = tmp_path / "broken"
     shutil.copytree(results, broken)
     (broken / "report.html").write_text("<p>better figures</p>")
     for app in (simgen_cli.app, pcii_cli.app):
-        assert console.run(app, ["verify", str(broken)]) == 2
+        assert command_line.run(app, ["verify", str(broken)]) == 2
         last = capsys.readouterr().err.splitlines()[-1]  # progress comes before
         assert last.startswith(f"error: {broken / 'report.html'}: truncated or changed")
     assert "no such" in refusal(pcii_cli.app, ["verify", str(tmp_path / "nowhere")], capsys)
@@ -236,14 +236,14 @@ def test_a_smaller_budget_is_asked_for_by_option(
     for budget in ("400", "120", "30"):
         out = tmp_path / budget
         command = ["reconstruct", data, "--z-mm", "580", "-o", str(out)]
-        assert console.run(pcii_cli.app, [*command, "--budget", budget]) == 0
+        assert command_line.run(pcii_cli.app, [*command, "--budget", budget]) == 0
         group = zarr.open_group(out / "sections.zarr", mode="r")
         totals.append(int(np.asarray(group["counts"]).sum()))
     # Of 6 views of 64 x 60 pixels with 0.01 dark counts each; at 580 mm some fall beside the section.
     full = [6 * budget + 6 * 64 * 60 * 0.01 for budget in (400, 120, 30)]
     assert all(0.6 * expected < found < 1.1 * expected for found, expected in zip(totals, full, strict=True))
     whole = tmp_path / "whole"
-    assert console.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", str(whole)]) == 0
+    assert command_line.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", str(whole)]) == 0
     group = zarr.open_group(whole / "sections.zarr", mode="r")
     assert int(np.asarray(group["counts"]).sum()) == totals[0]
 
@@ -253,10 +253,10 @@ def test_every_command_takes_a_smaller_budget(
 ) -> None:
     data, out = str(nested_dataset), str(tmp_path / "out")
     small = ["--budget", "120"]
-    assert console.run(pcii_cli.app, ["run", data, "--z-mm", "540", "-o", out, *small]) == 0
-    assert console.run(pcii_cli.app, ["segment", data, "--z-mm", "540", "-o", out, *small]) == 0
-    assert console.run(pcii_cli.app, ["depth", data, "-o", out, *small]) == 0
-    assert console.run(pcii_cli.app, ["score", data, out, *small]) == 0
+    assert command_line.run(pcii_cli.app, ["run", data, "--z-mm", "540", "-o", out, *small]) == 0
+    assert command_line.run(pcii_cli.app, ["segment", data, "--z-mm", "540", "-o", out, *small]) == 0
+    assert command_line.run(pcii_cli.app, ["depth", data, "-o", out, *small]) == 0
+    assert command_line.run(pcii_cli.app, ["score", data, out, *small]) == 0
     capsys.readouterr()
     for command in (["score", data, out], ["depth", data, "-o", out, "--budget", "30"]):
         assert "of another dataset or photon budget" in refusal(pcii_cli.app, command, capsys)
@@ -279,7 +279,7 @@ def test_a_failure_is_one_line_and_exit_code_1(
 
     monkeypatch.setattr("pcii.app.results.Results.save_sections", full_disk)
     command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
-    assert console.run(pcii_cli.app, command) == 1
+    assert command_line.run(pcii_cli.app, command) == 1
     assert "No space left" in capsys.readouterr().err
 
 
@@ -287,17 +287,17 @@ def test_help_of_every_command_has_an_example(capsys: pytest.CaptureFixture[str]
     for app in (simgen_cli.app, pcii_cli.app):
         for command in app:
             if not command.startswith("-"):
-                assert console.run(app, [command, "--help"]) == 0
+                assert command_line.run(app, [command, "--help"]) == 0
                 assert "Example" in capsys.readouterr().out, command
 
 
 def test_doctor_and_scenes_and_schema_speak(capsys: pytest.CaptureFixture[str]) -> None:
-    assert console.run(simgen_cli.app, ["doctor"]) == 0
+    assert command_line.run(simgen_cli.app, ["doctor"]) == 0
     assert "Rendering will run with" in capsys.readouterr().out
-    assert console.run(simgen_cli.app, ["scenes"]) == 0
+    assert command_line.run(simgen_cli.app, ["scenes"]) == 0
     assert "two_objects" in capsys.readouterr().out
     for what in ("scene", "recipe"):
-        assert console.run(simgen_cli.app, ["schema", what]) == 0
+        assert command_line.run(simgen_cli.app, ["schema", what]) == 0
         schema = json.loads(capsys.readouterr().out)
         assert schema["additionalProperties"] is False
 
@@ -306,5 +306,5 @@ def test_preview_writes_a_picture(tmp_path: Path) -> None:
     from PIL import Image
 
     out = tmp_path / "look.png"
-    assert console.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
+    assert command_line.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
     assert np.asarray(Image.open(out)).std() > 10

@@ -14,7 +14,7 @@ import pytest
 from cyclopts import App
 
 from pcii.app import commands as pcii_cli
-from pcii.core import console
+from pcii.base import command_line
 from pcii.io.dataset_layout import MARKER
 from simgen.app import commands as simgen_cli
 
@@ -76,7 +76,7 @@ def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> N
     assert "Traceback" not in said
     assert (out / MARKER).exists()
     assert subprocess.run(generating(out, 4), capture_output=True, check=False).returncode == 0
-    assert console.run(simgen_cli.app, ["verify", str(out)]) == 0
+    assert command_line.run(simgen_cli.app, ["verify", str(out)]) == 0
 
 
 @pytest.mark.renders
@@ -120,12 +120,12 @@ def test_a_stop_is_told_whatever_becomes_of_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)  # for it to be put back
-    monkeypatch.setattr(console, "STOP_AGAIN_S", 0.1)
+    monkeypatch.setattr(command_line, "STOP_AGAIN_S", 0.1)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     app = App()
     app.command(stop, name="work")
     try:
-        assert console.run(app, ["work"], resuming=resuming) == 130
+        assert command_line.run(app, ["work"], resuming=resuming) == 130
         assert not went_on
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
         assert signal.getitimer(signal.ITIMER_REAL)[0] == 0
@@ -150,13 +150,13 @@ def test_of_an_unfinished_dataset_the_way_on_is_told(
     app = simgen_cli.app if verb in ("verify", "sheet") else pcii_cli.app
     named = begun.parent if inside and verb == "evaluate" else begun
     more = {"verify": [], "score": [out]}.get(verb, ["-o", out])
-    assert console.run(app, [verb, str(named), *more]) == 2
+    assert command_line.run(app, [verb, str(named), *more]) == 2
     assert capsys.readouterr().err == f"error: {begun}: {UNFINISHED}\n"
     assert not Path(out).exists()
 
 
 LOOPS = """
-from pcii.core.compiled_loops import helper
+from pcii.base.compiled_loops import helper
 
 @helper
 def double(number):
@@ -165,17 +165,17 @@ def double(number):
 WORKS = """
 import sys
 from cyclopts import App
-from pcii.core import console
+from pcii.base import command_line, progress
 
 app = App()
 
 @app.command
 def work(*, bars: bool) -> None:
     import loops
-    with console.Stages() if bars else __import__("contextlib").nullcontext():
+    with progress.Stages() if bars else __import__("contextlib").nullcontext():
         print(loops.double(4))
 
-sys.exit(console.run(app) if len(sys.argv) > 1 else work(bars=False))
+sys.exit(command_line.run(app) if len(sys.argv) > 1 else work(bars=False))
 """
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.drawn import KINDS, write_drawn
 from benchmarks.removal import Entry, by_half_and_kind, drawn_corpus, load_corpus, report, work_list
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import load_scene
 

@@ -7,8 +7,9 @@ from typing import Annotated, Literal
 from cyclopts import App, Parameter
 
 from pcii.app.results import Results
-from pcii.core import console
-from pcii.core.console import Stages, say
+from pcii.base import command_line
+from pcii.base.command_line import say
+from pcii.base.progress import Stages
 from pcii.io.dataset import Dataset, open_dataset
 
 app = App(
@@ -21,7 +22,7 @@ Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
 
 
-Subpixel = Annotated[int, Parameter(converter=console.whole)]
+Subpixel = Annotated[int, Parameter(converter=command_line.whole)]
 Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
 Budget = Annotated[
     float | None,
@@ -169,7 +170,7 @@ def segment(
     subpixel
         Find the outlines of the three steps on this many voxels per pixel and axis.
     """
-    from pcii.core.errors import InputError
+    from pcii.base.errors import InputError
     from pcii.imaging.pictures import mask_image, write_png
     from pcii.io.suggested_depths import planes_of
     from pcii.removal.methods import find_method
@@ -206,7 +207,7 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
     """
     from pcii.app.pipeline import full_light_sections
-    from pcii.core.errors import InputError
+    from pcii.base.errors import InputError
     from pcii.core.focal_planes import FocalPlanes
     from pcii.metrics.scoring import score as compare
 
@@ -296,4 +297,4 @@ def verify(folder: Path) -> None:
 
 def main() -> int:
     """Entry point of the `pcii` command."""
-    return console.run(app, resuming=("evaluate",))
+    return command_line.run(app, resuming=("evaluate",))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pcii.core.console import Report, silent
+from pcii.base.progress import Report, silent
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import ArrayLike5D, Views

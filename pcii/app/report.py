@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.core.safe_files import write_bytes_safely
+from pcii.base.safe_files import write_bytes_safely
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.evaluation.pages import page

@@ -19,9 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.safe_files import (
+from pcii.base.errors import InputError
+from pcii.base.safe_files import (
     locked,
     replace_folder,
     sweep_temporaries,
@@ -29,6 +28,7 @@ from pcii.core.safe_files import (
     temporary_folder,
     write_json_safely,
 )
+from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.section_stack import Sections
 from pcii.io.dataset import Dataset
 from pcii.io.dataset_layout import MAP_AXES, lists_part

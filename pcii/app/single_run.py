@@ -6,7 +6,7 @@ from pathlib import Path
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.app.results import Results
-from pcii.core.console import Report, silent
+from pcii.base.progress import Report, silent
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import planes_of
 from pcii.removal.methods import DEFAULT_METHODS, find_method

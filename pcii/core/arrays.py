@@ -6,7 +6,7 @@ Lengths are millimetres and carry `_mm`; `z` is planar depth from the camera pla
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

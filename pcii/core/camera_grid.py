@@ -6,7 +6,7 @@ from typing import TypeGuard
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 
 
 def _check_size(name: str, value: object) -> None:

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, listed, span, table, times
 from pcii.core.arrays import read_only
-from pcii.core.errors import InputError
 from pcii.core.section_stack import Sections
-from pcii.core.short_form import Brief, listed, span, table, times
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -10,12 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, listed
 from pcii.core.arrays import check_z_mm, read_only
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
 from pcii.core.photon_counts import PhotonEvents
-from pcii.core.short_form import Brief, listed
 from pcii.core.truth import PhotonTruth
 
 

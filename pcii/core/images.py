@@ -5,11 +5,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, times
 from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
-from pcii.core.short_form import Brief, times
 
 
 class ArrayLike5D(Protocol):

@@ -6,11 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, times
 from pcii.core.arrays import read_only
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
-from pcii.core.short_form import Brief, times
 
 LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40

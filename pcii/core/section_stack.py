@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, listed, times
 from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.short_form import Brief, listed, times
 
 Normalisation = Literal["overlap", "views"]
 Shifts = Literal["nearest", "bilinear", "even"]

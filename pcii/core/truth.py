@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, listed, span, times
 from pcii.core.arrays import read_only
-from pcii.core.errors import InputError
-from pcii.core.short_form import Brief, listed, span, times
 
 
 @dataclass(frozen=True, repr=False)

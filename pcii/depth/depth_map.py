@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.arrays import check_z_mm
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px

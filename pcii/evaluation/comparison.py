@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pcii.core.console import Report, silent
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.rows import (

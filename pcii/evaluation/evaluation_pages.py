@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pcii.core.plain_text import in_markdown
-from pcii.core.safe_files import write_bytes_safely, write_json_safely
+from pcii.base.plain_text import in_markdown
+from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.tables import budget_name, markdown, overview, tables_of, told

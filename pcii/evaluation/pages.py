@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pcii.core.plain_text import visible
+from pcii.base.plain_text import visible
 
 
 def page(template: str, content: dict[str, Any]) -> bytes:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 
 CONFIDENCE = 0.95
 EXACT_UP_TO = 14

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pcii.core.errors import InputError
-from pcii.core.safe_files import locked
+from pcii.base.errors import InputError
+from pcii.base.safe_files import locked
 from pcii.io.dataset import Dataset
 
 ROWS = "rows.jsonl"

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pcii.core.plain_text import in_markdown
+from pcii.base.plain_text import in_markdown
 
 COLUMNS = (
     ("IoU", "object", "iou"),

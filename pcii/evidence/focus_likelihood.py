@@ -82,7 +82,7 @@ def predictions_of(counts: PhotonCounts, planes: FocalPlanes) -> tuple[Focus, Pr
 
 
 def _look(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[Focus, Predictions]:
-    from pcii.core.compiled_loops import threads
+    from pcii.base.compiled_loops import threads
     from pcii.evidence import focus_kernels as kernels
     from pcii.evidence.prediction_kernels import predict
     from pcii.evidence.projection_kernels import cells_of_events

@@ -98,7 +98,7 @@ def least_agreement(planes: int) -> float:
 
 def halves_of(counts: PhotonCounts, planes: FocalPlanes) -> Halves:
     """What the halves show in the sections at these planes."""
-    from pcii.core.compiled_loops import threads
+    from pcii.base.compiled_loops import threads
 
     grid, events = counts.grid, counts.events
     rows, cols = planes.whole_shifts_px

@@ -8,7 +8,7 @@ import math
 import numba as nb
 import numpy as np
 
-from pcii.core.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper
 
 
 @helper

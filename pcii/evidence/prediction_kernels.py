@@ -6,7 +6,7 @@ Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 import numba as nb
 import numpy as np
 
-from pcii.core.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 from pcii.evidence.projection_kernels import BLOCK_PX, views_of_blocks
 from pcii.evidence.smoothing_kernels import CENTRE, centres_around, halved, linear_at, smoothed
@@ -26,8 +26,8 @@ AT_ONCE = 512
 
 Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
 """A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
-how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks. No named tuple: parallel loops
-take such only if they are arguments."""
+how many camera rows (2 h,) and columns (2 w,) see each row and column of blocks. Not a named tuple: of such
+parallel loops take only their arguments."""
 
 
 @helper

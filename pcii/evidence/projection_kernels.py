@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.core.compiled_loops import helper
+from pcii.base.compiled_loops import helper
 from pcii.evidence.cells import CELL_PX
 
 BLOCK_PX = 2

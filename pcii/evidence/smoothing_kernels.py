@@ -5,7 +5,7 @@ Axes: C colours, (H, W) cells.
 
 import numpy as np
 
-from pcii.core.compiled_loops import helper
+from pcii.base.compiled_loops import helper
 
 # Smoothing is by the binomial weights 1/4, 1/2, 1/4 along both axes, then linear between centres.
 CENTRE, SIDE = 0.5, 0.25

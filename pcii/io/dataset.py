@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, listed, times
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.short_form import Brief, listed, times
 from pcii.core.truth import PhotonTruth, Truth
 from pcii.io.dataset_layout import (
     COUNTS,

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
-from pcii.core.safe_files import sync_folder
+from pcii.base.errors import InputError
+from pcii.base.safe_files import sync_folder
 from pcii.io.sealed_json import read_sealed, write_sealed
 from pcii.io.zarr_groups import Label
 

@@ -10,10 +10,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
-from pcii.core.plain_text import visible
 
 MOST_FILE_BYTES = 1 << 50
 MOST_PHOTONS = 1 << 62

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.sealed_json import read_sealed, write_sealed
 
 RESULTS = "results.json"

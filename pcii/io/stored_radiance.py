@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset_layout import read_exr
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
 from pcii.io.dataset import Dataset
 

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from pcii.core.console import Report, silent
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
 from pcii.io.dataset_layout import MANIFEST, REMEDY, read_manifest
 from pcii.io.results_list import RESULTS, read_results
 from pcii.io.sealed_json import check_file, strays

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
-from pcii.core.plain_text import visible
-from pcii.core.safe_files import new_folder_safely
+from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
+from pcii.base.safe_files import new_folder_safely
 from pcii.io.sealed_json import check_file, parse_json, read_small
 
 CHUNK_ELEMENTS = 1 << 20

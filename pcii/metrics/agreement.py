@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px
 from pcii.core.truth import PhotonTruth, Truth

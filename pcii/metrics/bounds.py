@@ -9,8 +9,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
 from pcii.core.section_stack import Sections

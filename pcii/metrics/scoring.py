@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.geometry import blur_half_extent_px
 from pcii.core.section_stack import Sections

@@ -1,6 +1,6 @@
 """Removal of defocused points: which points of each section are in focus there."""
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts, check_depth_counts
 from pcii.removal import plugins

@@ -11,8 +11,8 @@ from importlib import import_module
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import check_cfa, colour_cells
-from pcii.core.errors import InputError
 
 
 def demosaic(

@@ -3,7 +3,7 @@
 import numba as nb
 import numpy as np
 
-from pcii.core.compiled_loops import compiled
+from pcii.base.compiled_loops import compiled
 from pcii.sections.image_moves import Groups, Moves, Running
 from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import colour_cells
-from pcii.core.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts

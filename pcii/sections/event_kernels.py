@@ -3,7 +3,7 @@
 import numba as nb
 import numpy as np
 
-from pcii.core.compiled_loops import compiled
+from pcii.base.compiled_loops import compiled
 
 
 @compiled

@@ -118,7 +118,7 @@ def view_samples(
     out of focus they see different pieces, and the variance grows. A window of an even number of
     pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
     """
-    from pcii.core.compiled_loops import threads
+    from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
 
     grid, events = counts.grid, counts.events

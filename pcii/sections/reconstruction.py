@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import colour_cells
-from pcii.core.errors import InputError
 from pcii.core.focal_planes import FocalPlanes, planes_at
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
@@ -132,7 +132,7 @@ def _scatter(
     cols: np.ndarray,
 ) -> np.ndarray:
     """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
-    from pcii.core.compiled_loops import threads
+    from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
 
     events = data.events

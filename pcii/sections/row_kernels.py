@@ -5,7 +5,7 @@
 
 import numpy as np
 
-from pcii.core.compiled_loops import helper
+from pcii.base.compiled_loops import helper
 
 
 @helper

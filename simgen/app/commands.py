@@ -8,8 +8,9 @@ from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
-from pcii.core import console
-from pcii.core.console import Stages, say
+from pcii.base import command_line
+from pcii.base.command_line import say
+from pcii.base.progress import Stages
 
 app = App(
     name="simgen",
@@ -154,7 +155,7 @@ def generate(
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    seeds: Annotated[int | None, Parameter(converter=console.whole)] = None,
+    seeds: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
 ) -> None:
     """Make the dataset of a recipe; run again to resume.
 
@@ -238,4 +239,4 @@ def verify(dataset: Path) -> None:
 
 def main() -> int:
     """Entry point of the `simgen` command."""
-    return console.run(app, resuming=("generate",))
+    return command_line.run(app, resuming=("generate",))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.console import Report, silent
-from pcii.core.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import PhotonTruth, Truth
 from simgen.base import random_streams

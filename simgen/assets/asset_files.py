@@ -14,7 +14,7 @@ from typing import IO, Any
 import numpy as np
 from pydantic import BaseModel
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets.asset_worker import SECONDS
 from simgen.assets.triangles import Triangles
 from simgen.base.asset_names import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files

@@ -7,7 +7,7 @@ from typing import Any, Self
 from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 
 LONGEST_NAME = 200
 LARGEST_FILE_BYTES = 1 << 28

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationError
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80

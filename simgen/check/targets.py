@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import read_toml, suggestion
 from simgen.dataset.prepared import Prepared, prepare

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.console import Report, silent
-from pcii.core.errors import InputError
-from pcii.core.safe_files import locked, sweep_temporaries
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
+from pcii.base.safe_files import locked, sweep_temporaries
 from pcii.io.dataset_layout import (
     COUNTS,
     FORMAT_VERSION,

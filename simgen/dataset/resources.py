@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from simgen.photons.majorant import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.photons.photon_counting import Plan
 from simgen.spec.camera_grid import Grid

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset_layout import MANIFEST, MARKER
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import SEED_LIMIT, Recipe

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
-from pcii.core.safe_files import write_bytes_safely
+from pcii.base.errors import InputError
+from pcii.base.safe_files import write_bytes_safely
 
 SUFFIXES = (".png", ".jpg", ".jpeg")
 EMPTY = "0.93"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.figures.picture_parts import (

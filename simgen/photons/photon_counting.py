@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
 from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.console import Report, silent
-from pcii.core.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, PHOTON_TRUTH, PHOTON_TRUTH_LABELS, nested_name
 from pcii.io.zarr_groups import write_arrays_safely

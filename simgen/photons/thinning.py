@@ -23,8 +23,8 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.progress import Report, silent
 from pcii.core.bayer import colour_cells
-from pcii.core.console import Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, PhotonPaths, Setup, paths_of
 from simgen.photons.majorant import Majorant

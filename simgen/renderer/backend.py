@@ -25,8 +25,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
-from pcii.core.errors import InputError
-from pcii.core.safe_files import write_json_safely
+from pcii.base.errors import InputError
+from pcii.base.safe_files import write_json_safely
 
 Kind = Literal["cuda", "llvm", "scalar"]
 KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")

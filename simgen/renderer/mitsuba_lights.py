@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.srgb import LUMINANCE
 from simgen.renderer.mitsuba_colours import radiance_plugin
 from simgen.spec.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight

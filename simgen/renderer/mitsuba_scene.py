@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
 from simgen.renderer.backend import shape_numbers
 from simgen.renderer.mitsuba_colours import reflectance_plugin

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.solids import box, cylinder
 from simgen.assets.triangles import Triangles

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
 from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count, colour_index, mosaic
-from pcii.core.errors import InputError
 from simgen.base.srgb import LUMINANCE
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spectral.spectra import sensitivity

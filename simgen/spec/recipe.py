@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS
-from pcii.core.errors import InputError
 from simgen.base.locations import find, recipe_roots
 from simgen.base.strict_models import (
     Count,

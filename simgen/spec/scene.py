@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.asset_names import AssetName, asset, named_files
 from simgen.base.locations import find, scene_roots
 from simgen.base.strict_models import (

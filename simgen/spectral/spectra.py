@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.srgb import FROM_XYZ, LUMINANCE
 from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.console import Report
+from pcii.base.progress import Report
 from pcii.io.dataset_layout import TRUTH, TRUTH_LABELS
 from pcii.io.zarr_groups import new_array, new_group_safely
 from simgen.cameras.rig import Rig, centre_camera, rig_of

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.core.console import Report, silent
+from pcii.base.progress import Report, silent
 from simgen.cameras.rig import Cameras, Rig, as_rig, centre_camera
 from simgen.renderer.intersection import blocked
 from simgen.renderer.mitsuba_scene import RenderScene

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, RADIANCE, TRUTH, write_manifest
 from pcii.io.sealed_json import list_files

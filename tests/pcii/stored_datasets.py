@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset_layout import (
     COUNTS,
     COUNTS_LABELS,

@@ -11,7 +11,7 @@ import OpenEXR
 import pytest
 from hostile_files import BOMB, animation, binary_ply, chunk, obj, picture, ply, png, scene_toml
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets import asset_files as assets
 from simgen.assets import asset_worker
 from simgen.assets.asset_files import read_assets, read_environment

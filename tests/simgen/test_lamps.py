@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.renderer import backend
 

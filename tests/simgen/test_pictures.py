@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 from tiny import TINY_RECIPE
 
-from pcii.core import console
+from pcii.base import command_line
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
@@ -44,14 +44,14 @@ def test_a_preview_of_a_recipe(tmp_path: Path) -> None:
     out = tmp_path / "recipe.jpg"
     title = ["--set", r"title=between 5 $ and \6 $"]  # no formula
     command = ["preview", "small", "-o", str(out), "--samples-per-pixel", "2"]
-    assert console.run(cli.app, [*command, *title]) == 0
+    assert command_line.run(cli.app, [*command, *title]) == 0
     assert_shows_something(out)
 
 
 @pytest.mark.renders
 def test_a_sheet_of_a_dataset(small_dataset: Path, tmp_path: Path) -> None:
     out = tmp_path / "sheet.png"
-    assert console.run(cli.app, ["sheet", str(small_dataset), "-o", str(out)]) == 0
+    assert command_line.run(cli.app, ["sheet", str(small_dataset), "-o", str(out)]) == 0
     assert_shows_something(out)
 
 
@@ -60,7 +60,7 @@ def test_a_sheet_of_a_dataset_without_products(tmp_path: Path) -> None:
     recipe = TINY_RECIPE | {"products": {"counts": False, "truth": False}, "title": r"5 $ and \6 $"}
     generate(Recipe.model_validate(recipe), Path(), tmp_path / "bare")
     out = tmp_path / "bare.png"
-    assert console.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(out)]) == 0
+    assert command_line.run(cli.app, ["sheet", str(tmp_path / "bare"), "-o", str(out)]) == 0
     assert min(picture(out).shape[:2]) > 300
 
 
@@ -76,12 +76,12 @@ def test_pictures_are_refused_in_one_sentence(
     }
     for command in (["preview", "two_objects"], ["sheet", str(nested_dataset)]):
         for name, words in cases.items():
-            assert console.run(cli.app, [*command, "-o", str(tmp_path / name)]) == 2
+            assert command_line.run(cli.app, [*command, "-o", str(tmp_path / name)]) == 2
             said = capsys.readouterr().err
             assert words in said
             assert said.count("\n") == 1
     assert not (tmp_path / "no").exists()
-    assert console.run(cli.app, ["sheet", str(tmp_path), "-o", str(tmp_path / "x.png")]) == 2
+    assert command_line.run(cli.app, ["sheet", str(tmp_path), "-o", str(tmp_path / "x.png")]) == 2
     assert "not a finished dataset" in capsys.readouterr().err
 
 
@@ -94,7 +94,7 @@ def test_a_folder_that_may_not_be_written_is_told(
 
     monkeypatch.setattr("simgen.figures.picture_parts.write_bytes_safely", refuse)
     out = str(tmp_path / "x.png")
-    assert console.run(cli.app, ["preview", "two_objects", "-o", out, "--samples-per-pixel", "1"]) == 2
+    assert command_line.run(cli.app, ["preview", "two_objects", "-o", out, "--samples-per-pixel", "1"]) == 2
     assert "cannot be written here (Permission denied)" in capsys.readouterr().err
 
 

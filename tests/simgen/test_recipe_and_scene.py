@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Recipe, load_recipe
 from simgen.spec.scene import Scene, load_scene, scene_names

@@ -9,7 +9,7 @@ import pytest
 from lit_scenes import ball
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.renderer import backend
 from simgen.renderer import path_tracing as paths

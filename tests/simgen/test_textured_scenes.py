@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.assets.texture_pixels import paint
 from simgen.base.strict_models import validate
 from simgen.dataset.generation import generate

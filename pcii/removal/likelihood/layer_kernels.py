@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from pcii.core.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper
 from pcii.evidence.cells import CELL_PX
 
 PARTS = CELL_PX * CELL_PX

@@ -278,7 +278,7 @@ class Layers:
         Rates are wanted of the events that are `asked` for (N,), light of the cells in `asked_rows`, the
         first and the last + 1; of all if not given. If `blurred`, by the widest window alone.
         """
-        from pcii.core.compiled_loops import threads
+        from pcii.base.compiled_loops import threads
         from pcii.evidence.prediction_kernels import BASE_SCALE, predict_shared
 
         self._look(layer)

@@ -141,7 +141,7 @@ def _outlines(
 
     What is `inner` (h, w) stays as it is: an outline parts a thing from the dark around it.
     """
-    from pcii.core.compiled_loops import threads
+    from pcii.base.compiled_loops import threads
 
     grid = counts.grid
     inner = _on_pixels(inner, grid)

@@ -10,7 +10,7 @@ from stored_datasets import flip_a_bit, largest_file, one_sentence
 from twins import unit_grid
 
 from pcii.app.results import LOCK, Results
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import Dataset

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import colour_of
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS, channel_count, check_cfa, colour_cells, colour_index, mosaic
-from pcii.core.errors import InputError
 
 R, G, B = 0, 1, 2
 

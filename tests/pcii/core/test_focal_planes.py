@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import paper_grid, unit_grid, voxel_of
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.focal_planes import FocalPlanes, planes_at
 from pcii.core.geometry import disparity_px, project_px
 

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import unit_grid
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.reconstruction import reconstruct
 

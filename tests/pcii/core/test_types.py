@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
+from pcii.base.errors import InputError
 from pcii.core.arrays import check_z_mm
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, unit_grid
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_map import estimate_depth

@@ -15,8 +15,8 @@ from slow_clock import SlowClock
 from tiny_datasets import NESTED, OWN, as_told, two_rows, write_dataset
 
 from pcii.app import commands as cli
-from pcii.core import console
-from pcii.core.errors import InputError
+from pcii.base import command_line
+from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.evaluation.comparison import evaluate, find_datasets
 from pcii.evaluation.rows import ROWS, all_rows, append_row, claim_rows
@@ -364,7 +364,7 @@ def test_the_command_and_its_page(
 ) -> None:
     out = tmp_path / "out"
     command = ["evaluate", str(series), "-o", str(out), "--method", "as told", "--method", "two rows"]
-    assert console.run(cli.app, command) == 0
+    assert command_line.run(cli.app, command) == 0
     assert "evaluation.html" in capsys.readouterr().out
     page = (out / "evaluation.html").read_text()
     assert page.count("data:image/png;base64,") == 1
@@ -375,9 +375,9 @@ def test_the_command_and_its_page(
     assert "IoU of as told is worse with 50 photons than with 20" in page
     assert len(rows_of(out)) == 12
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
-    assert console.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
+    assert command_line.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
     assert len(rows_of(out)) == 14
-    assert console.run(cli.app, [*command, "--part", "1:2"]) == 2
+    assert command_line.run(cli.app, [*command, "--part", "1:2"]) == 2
     assert "expected i/n such as 1/2" in capsys.readouterr().err
 
 

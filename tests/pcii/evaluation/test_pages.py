@@ -15,8 +15,8 @@ from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
+from pcii.base.plain_text import in_markdown, visible
 from pcii.core.estimates import Segmented
-from pcii.core.plain_text import in_markdown, visible
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.pages import page

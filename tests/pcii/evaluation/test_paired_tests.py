@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.evaluation.paired_tests import (
     EXACT_UP_TO,
     FLIPS,

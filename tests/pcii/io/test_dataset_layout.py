@@ -15,8 +15,8 @@ from stored_datasets import (
     one_sentence,
 )
 
+from pcii.base.safe_files import write_bytes_safely
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.safe_files import write_bytes_safely
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import (
     COUNTS,

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from stored_datasets import flip_a_bit, one_sentence
 
-from pcii.core.safe_files import write_bytes_safely
+from pcii.base.safe_files import write_bytes_safely
 from pcii.io.sealed_json import list_files, read_sealed, strays, write_sealed
 
 

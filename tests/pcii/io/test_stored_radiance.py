@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiny_datasets import GRID
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.images import Views
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import RADIANCE, radiance_name, write_exr_safely, write_manifest

@@ -9,7 +9,7 @@ import pytest
 from stored_datasets import flip_a_bit, make_dataset
 
 from pcii.app.results import Results
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.io.dataset import open_dataset
 from pcii.io.verification import verify

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections

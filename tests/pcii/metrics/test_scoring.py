@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.geometry import blur_half_extent_px
 from pcii.core.photon_counts import PhotonCounts

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from twins import intersection_over_union, opaque_views, photons_of, unit_grid
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
 from pcii.removal.methods import METHODS, removal_methods, segment
 

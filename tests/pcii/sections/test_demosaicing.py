@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import demosaic_twin
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS, colour_index, mosaic
-from pcii.core.errors import InputError
 from pcii.sections.demosaicing import demosaic
 
 RED, GREEN, BLUE = 0, 1, 2

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import colour_of, unit_grid, voxel_of
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import mosaic
-from pcii.core.errors import InputError
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic

@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from twins import bayer_photons, blocky_texture, section_twin, unit_grid
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS, mosaic
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.errors import InputError
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.reconstruction import reconstruct, reconstruct_each

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lit_scenes import ball
 
-from pcii.core import console
+from pcii.base import command_line
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
@@ -429,12 +429,12 @@ def test_a_coarser_film_has_the_same_field_of_view() -> None:
 
 @pytest.mark.renders
 def test_the_small_recipe_passes(capsys: pytest.CaptureFixture[str]) -> None:
-    assert console.run(cli.app, ["check", "small", "--set", "seed=3", "--json"]) == 0
+    assert command_line.run(cli.app, ["check", "small", "--set", "seed=3", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     # Its shifts at 540 mm are multiples of 12 px but for rounding: -30, -18, -6, 6, 18, 30.
     assert {row["subject"] for row in told if row["verdict"] != "ok"} == {"colours"}
     assert any("ball (5" in row["text"] and "7.6" in row["text"] for row in told)
-    assert console.run(cli.app, ["check", "two_objects"]) == 0
+    assert command_line.run(cli.app, ["check", "two_objects"]) == 0
     assert "10 x 10 views" in capsys.readouterr().out
 
 
@@ -454,15 +454,15 @@ luminance_cd_m2 = 10
 """
     file.write_text(text)
     for target in (tmp_path, file):
-        assert console.run(cli.app, ["check", str(target)]) == 1
+        assert command_line.run(cli.app, ["check", str(target)]) == 1
         said = capsys.readouterr()
         assert "no camera sees lost -> it is behind the cameras" in said.out
         assert said.err == ""
     file.write_text(text.replace("radius_mm", "radius"))
-    assert console.run(cli.app, ["check", str(tmp_path)]) == 2
+    assert command_line.run(cli.app, ["check", str(tmp_path)]) == 2
     assert "radius" in capsys.readouterr().err
     for wrong in ("nowhere", str(tmp_path / "no.toml")):
-        assert console.run(cli.app, ["check", wrong]) == 2
+        assert command_line.run(cli.app, ["check", wrong]) == 2
         assert "there is no scene or recipe" in capsys.readouterr().err
-    assert console.run(cli.app, ["check", "two_objects", "--set", "seed=1"]) == 2
+    assert command_line.run(cli.app, ["check", "two_objects", "--set", "seed=1"]) == 2
     assert "name a recipe" in capsys.readouterr().err

@@ -11,7 +11,7 @@ import pytest
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, RADIANCE, TRUTH
 from pcii.io.verification import verify

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.core import console
-from pcii.core.errors import InputError
+from pcii.base import command_line
+from pcii.base.errors import InputError
 from simgen.app import commands as cli
 from simgen.dataset import resources
 from simgen.dataset.resources import check_resources, shortage, tile_count
@@ -135,10 +135,10 @@ def test_commands_refuse_before_any_work(
     setting: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     field = setting.split("=")[0]
-    assert console.run(cli.app, ["check", "paper", "--set", setting]) == 1
+    assert command_line.run(cli.app, ["check", "paper", "--set", setting]) == 1
     (told,) = (line for line in capsys.readouterr().out.splitlines() if line.startswith("bad   memory"))
     out = tmp_path / "out"
-    assert console.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
+    assert command_line.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
     said = capsys.readouterr().err
     for text in (told.removeprefix("bad   memory       "), said.removeprefix("error: ")):
         assert text.startswith(f"{field}: 1e")

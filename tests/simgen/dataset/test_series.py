@@ -7,8 +7,8 @@ import pytest
 from test_generation import digest
 from tiny import TINY_RECIPE
 
-from pcii.core import console
-from pcii.core.errors import InputError
+from pcii.base import command_line
+from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST
 from simgen.app import commands as cli
@@ -48,7 +48,7 @@ def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def series(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("series") / "three"
-    assert console.run(cli.app, ["generate", str(recipe_file), "-o", str(out), "--seeds", "3"]) == 0
+    assert command_line.run(cli.app, ["generate", str(recipe_file), "-o", str(out), "--seeds", "3"]) == 0
     return out
 
 
@@ -108,7 +108,7 @@ def test_half_a_seed_is_refused(
     recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     command = ["generate", str(recipe_file), "-o", str(tmp_path / "out"), "--seeds", "2.5"]
-    assert console.run(cli.app, command) == 2
+    assert command_line.run(cli.app, command) == 2
     assert "expected a whole number, got '2.5'" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -10,9 +10,9 @@ import pytest
 import zarr
 from scipy import stats
 
+from pcii.base.errors import InputError
+from pcii.base.progress import silent
 from pcii.core.bayer import colour_index
-from pcii.core.console import silent
-from pcii.core.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.renderer import backend
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pcii.base.progress import silent
 from pcii.core.bayer import colour_index
-from pcii.core.console import silent
 from simgen.photons.photon_counting import Plan, absolute_gain, draw_from_views, plan, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.scene import Scene
 from simgen.spectral.filters import CELLS, Filters, filters_for

@@ -8,7 +8,7 @@ import xarray
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import TRUTH
 from pcii.metrics.scoring import pixel_masks

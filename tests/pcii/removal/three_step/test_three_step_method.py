@@ -14,7 +14,7 @@ from twins import (
 )
 
 import pcii
-from pcii.core.errors import InputError
+from pcii.base.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges

@@ -7,7 +7,7 @@ import threading
 import pytest
 from stored_datasets import DENSE, make_dataset
 
-from pcii.core.safe_files import (
+from pcii.base.safe_files import (
     locked,
     new_folder_safely,
     replace_folder,

@@ -8,11 +8,11 @@ import pytest
 from hostile_names import NAMES
 from tiny_datasets import NESTED, OWN, as_told, write_dataset
 
+from pcii.base.plain_text import visible
+from pcii.base.short_form import listed
 from pcii.core.estimates import DepthMap
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.plain_text import visible
-from pcii.core.short_form import listed
 from pcii.core.truth import PhotonTruth, Truth
 from pcii.io.dataset import open_dataset
 from pcii.metrics.scoring import score

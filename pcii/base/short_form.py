@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pcii.core.plain_text import in_html, visible
+from pcii.base.plain_text import in_html, visible
 
 LONGEST = 119
 """Characters of the line: it fits where one of code would."""

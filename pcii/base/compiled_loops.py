@@ -3,7 +3,7 @@
 Modules of loops are imported where a loop is about to run and not with the package: loading the compiler
 takes longer than all else. Compiled code is kept beside these files, or in the user's cache where that is
 not writable, so each loop is compiled once per machine. That takes a minute and more for all, so commands
-say it (`console`).
+report it (`progress`).
 """
 
 import os
@@ -15,15 +15,15 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 import numba as nb
 from numba.core import event
 
-from pcii.core.console import tell_of_compiling
+from pcii.base.progress import report_compiling
 
 compiled = nb.njit(parallel=True, nogil=True, cache=True)
 helper = nb.njit(nogil=True, cache=True)
 """For what compiled loops call: one thread's part."""
 
 
-class _Teller(event.Listener):
-    """Told by Numba of each loop that it compiles, not of those that it finds compiled."""
+class _CompilingListener(event.Listener):
+    """Numba calls it for each loop that it compiles, not for those that it finds compiled."""
 
     def __init__(self) -> None:
         self.loops, self.nested = 0, 0
@@ -32,15 +32,15 @@ class _Teller(event.Listener):
         self.nested += 1
         if self.nested == 1:  # else it is part of another
             self.loops += 1
-            tell_of_compiling(self.loops, running=True)
+            report_compiling(self.loops, running=True)
 
     def on_end(self, event: event.Event) -> None:
         self.nested -= 1
         if self.nested == 0:
-            tell_of_compiling(self.loops, running=False)
+            report_compiling(self.loops, running=False)
 
 
-event.register("numba:compile", _Teller())
+event.register("numba:compile", _CompilingListener())
 
 
 def threads() -> int:

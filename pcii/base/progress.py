@@ -1,0 +1,123 @@
+"""Progress of long work: bars with time left on a terminal, plain lines in a log, "compiling" where it is."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
+LOG_EVERY_S = 10.0
+
+
+class Stages(AbstractContextManager["Stages"]):
+    """Progress of named stages: bars with time left on a terminal, else a line now and then.
+
+    Call it as stages(name, done, total); a stage ends when done reaches total.
+    """
+
+    def __init__(self) -> None:
+        self._rich: Progress | None = None
+        self._tasks: dict[str, TaskID] = {}
+        self._started: dict[str, float] = {}
+        self._logged: dict[str, float] = {}
+        self._shown = ExitStack()
+
+    def __enter__(self) -> "Stages":
+        self._shown.enter_context(shown_by(self))
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import (
+                BarColumn,
+                MofNCompleteColumn,
+                Progress,
+                TextColumn,
+                TimeElapsedColumn,
+                TimeRemainingColumn,
+            )
+
+            self._rich = Progress(
+                TextColumn("{task.description}"),
+                BarColumn(),
+                MofNCompleteColumn(),
+                TimeElapsedColumn(),
+                TextColumn("left"),
+                TimeRemainingColumn(),
+                console=Console(stderr=True),
+            )
+            self._rich.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._shown.close()
+        if self._rich is not None:
+            self._rich.stop()
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        if self._rich is not None:
+            if stage not in self._tasks:
+                self._tasks[stage] = self._rich.add_task(stage, total=total)
+            self._rich.update(self._tasks[stage], completed=done, total=total)
+            return
+        now = time.monotonic()
+        start = self._started.setdefault(stage, now)
+        last = self._logged.get(stage, start)
+        if done == total or now - last >= LOG_EVERY_S:
+            self._logged[stage] = now
+            elapsed = now - start
+            left = f", {elapsed / done * (total - done):.0f} s left" if 0 < done < total else ""
+            print(f"{stage}: {done}/{total}, {elapsed:.1f} s{left}", file=sys.stderr, flush=True)
+
+    def compiling(self, loops: int, running: bool) -> None:
+        """Report loops compiled up to now, the last maybe still `running`; nobody knows how many follow."""
+        if self._rich is not None:
+            if COMPILING not in self._tasks:
+                self._tasks[COMPILING] = self._rich.add_task(COMPILING, total=None)
+            done, total = (loops - 1, None) if running else (loops, loops)
+            self._rich.update(self._tasks[COMPILING], completed=done, total=total)
+            return
+        now = time.monotonic()
+        if COMPILING not in self._logged:
+            print(COMPILING, file=sys.stderr, flush=True)
+        elif not running and now - self._logged[COMPILING] >= LOG_EVERY_S:
+            print(f"{COMPILING}: {loops} so far", file=sys.stderr, flush=True)
+        else:
+            return
+        self._logged[COMPILING] = now
+
+
+COMPILING = "compiling (once per machine)"
+_showing: list[Stages] = []
+"""Progress that is shown now; compiling is reported to the last. Empty where `pcii` is used as a library."""
+
+
+@contextmanager
+def shown_by(stages: Stages) -> Iterator[None]:
+    """Compiling is reported by `stages` for the length of the block."""
+    _showing.append(stages)
+    try:
+        yield
+    finally:
+        _showing.remove(stages)
+
+
+def report_compiling(loops: int, *, running: bool) -> None:
+    """Report to whoever runs a command that a loop is being compiled, or has been; `loops` counts them."""
+    for stages in _showing[-1:]:
+        stages.compiling(loops, running)
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """The progress of whoever does not want any."""
+
+
+Report = Callable[[str, int, int], None]
+"""Called as report(stage, done, total) by whatever takes long."""
