@@ -2,7 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from twins import bayer_photons, blocky_texture, unit_grid
+from twins import bayer_photons, blocky_texture, even_light, unit_grid
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
@@ -87,8 +87,7 @@ def flat_share(rate: float, films: int) -> float:
     grid = unit_grid(7, 7, 96, 96)
     answered = []
     for seed in range(films):
-        flat = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
-        depth = estimate_depth(PhotonCounts.from_dense(flat, grid, cfa="GRBG"), RANGE_MM)
+        depth = estimate_depth(even_light(grid, rate, seed, "GRBG"), RANGE_MM)
         answered.append(np.isfinite(depth.z_mm).mean())
     return float(np.mean(answered))
 

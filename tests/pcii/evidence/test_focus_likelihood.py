@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 from scipy.special import gammaln, xlogy
-from twins import bayer_photons, blocky_texture, colour_of, patch_views, unit_grid
+from twins import bayer_photons, blocky_texture, colour_of, even_light, patch_views, unit_grid
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
@@ -209,8 +209,7 @@ def test_two_photons_of_different_colour_are_no_evidence():
 def flat_gain(rate: float, seed: int, cfa: str | None, size: int) -> np.ndarray:
     """Gain (h, w) of a flat film at one depth."""
     grid = unit_grid(5, 5, size, size)
-    film = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
-    return focus_evidence(PhotonCounts.from_dense(film, grid, cfa=cfa), spread_of(grid, 3)).gain[0]
+    return focus_evidence(even_light(grid, rate, seed, cfa), spread_of(grid, 3)).gain[0]
 
 
 def flat_gains(rate: float, scenes: int, cfa: str | None = "GRBG", size: int = 128) -> np.ndarray:
@@ -262,10 +261,8 @@ def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
     # gained or lost by the share by which the two differ, and chance would grow as the root of the photons.
     for rate in (0.1, 10.0, 1e3):
         grid = unit_grid(5, 5, *size)
-        films = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(4)]
-        gains = np.array(
-            [focus_evidence(PhotonCounts.from_dense(f, grid), spread_of(grid, 3)).gain[0] for f in films]
-        )
+        films = [even_light(grid, rate, seed) for seed in range(4)]
+        gains = np.array([focus_evidence(film, spread_of(grid, 3)).gain[0] for film in films])
         # A cell's four finest rates cost half a nat each at most, give or take sqrt(1/2), times the fifth for
         # which their scale counts; coarser scales are fewer, and shared by cells.
         assert gains.std() < 0.6
