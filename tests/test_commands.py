@@ -12,7 +12,6 @@ from PIL import Image
 
 from pcii.app import commands as pcii_cli
 from pcii.base import command_line
-from pcii.io.dataset_layout import MANIFEST
 from simgen.app import commands as simgen_cli
 
 pytestmark = pytest.mark.renders
@@ -194,7 +193,7 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     shutil.copytree(small_dataset, broken)
     (broken / "counts.zarr" / "n" / "c" / "0").write_bytes(b"")
     assert "truncated" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
-    (broken / MANIFEST).write_text("{")
+    (broken / "manifest.json").write_text("{")
     assert "manifest.json: damaged" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "notes.txt").touch()

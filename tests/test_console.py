@@ -121,6 +121,7 @@ def test_a_stop_is_told_whatever_becomes_of_it(
 ) -> None:
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)  # for it to be put back
     monkeypatch.setattr(command_line, "STOP_AGAIN_S", 0.1)
+    went_on.clear()
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     app = App()
     app.command(stop, name="work")

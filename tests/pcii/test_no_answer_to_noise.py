@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from twins import even_light
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_counts import PhotonCounts
@@ -37,9 +38,7 @@ def answered(counts: PhotonCounts) -> tuple[float, float]:
 def noise(
     views: tuple[int, int], size: tuple[int, int], rate: float, cfa: str | None, seed: int
 ) -> PhotonCounts:
-    grid = grid_of(views, size)
-    film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
-    return PhotonCounts.from_dense(film, grid, cfa=cfa)
+    return even_light(grid_of(views, size), rate, seed, cfa)
 
 
 def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, seed: int) -> PhotonCounts:

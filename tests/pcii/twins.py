@@ -30,9 +30,10 @@ def unit_grid(
     )
 
 
-def paper_grid() -> CameraGrid:
+def paper_grid(height: int = 1024, width: int = 1024) -> CameraGrid:
+    """The paper's cameras, on a film of as many of its pixels."""
     return CameraGrid(
-        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=1024, width=1024
+        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=height, width=width
     )
 
 
@@ -159,6 +160,12 @@ def photons_of(
     rates = views + dark
     rates *= 3 * per_view * grid.view_count / rates.sum()  # a pixel sees one colour of three
     return PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed), grid, cfa="GRBG")
+
+
+def even_light(grid: CameraGrid, rate: float, seed: int, cfa: str | None = None) -> PhotonCounts:
+    """So many photons per pixel of every view, and nothing to see."""
+    film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
+    return PhotonCounts.from_dense(film, grid, cfa=cfa)
 
 
 def bayer_photons(rates: np.ndarray, cfa: str, seed: int) -> np.ndarray:

@@ -2,7 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from twins import bayer_photons, blocky_texture, unit_grid
+from twins import bayer_photons, blocky_texture, even_light, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
@@ -68,13 +68,26 @@ def test_confidence_is_zero_exactly_where_the_method_abstains(depth):
     assert 0.5 <= depth.confidence[depth.confidence > 0].min() <= depth.confidence.max() <= 1 + 1e-12
 
 
+def test_what_less_than_half_of_the_evidence_is_for_is_not_answered():
+    # A pattern that repeats every 3 px looks alike at the disparities 2, 5 and 8.
+    tile = np.random.default_rng(2).choice([0.1, 1.0], size=(3, 3))
+    views = [
+        [np.roll(np.tile(tile, (32, 32)), (-2 * (k - 3), -2 * (l - 3)), (0, 1)) for l in range(7)]
+        for k in range(7)
+    ]
+    for seed in (3, 4, 5):
+        film = np.random.default_rng(seed).poisson(0.1 * np.array(views))
+        counts = PhotonCounts.from_dense(film, unit_grid(7, 7, 96, 96))
+        confidence = estimate_depth(counts, RANGE_MM).confidence
+        assert confidence[confidence > 0].min() >= 0.5
+
+
 def flat_share(rate: float, films: int) -> float:
     """Share of flat films for which a depth is answered."""
     grid = unit_grid(7, 7, 96, 96)
     answered = []
     for seed in range(films):
-        flat = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
-        depth = estimate_depth(PhotonCounts.from_dense(flat, grid, cfa="GRBG"), RANGE_MM)
+        depth = estimate_depth(even_light(grid, rate, seed, "GRBG"), RANGE_MM)
         answered.append(np.isfinite(depth.z_mm).mean())
     return float(np.mean(answered))
 

@@ -1,12 +1,13 @@
 import itertools
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 from scipy.special import gammaln, xlogy
-from twins import bayer_photons, blocky_texture, colour_of, patch_views, unit_grid
+from twins import bayer_photons, blocky_texture, colour_of, even_light, patch_views, unit_grid
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
@@ -205,12 +206,16 @@ def test_two_photons_of_different_colour_are_no_evidence():
     assert focus_evidence(counts, FocalPlanes.at_total_disparity(counts.grid, [1e-6])).gain.sum() < 14
 
 
+@cache
+def flat_gain(rate: float, seed: int, cfa: str | None, size: int) -> np.ndarray:
+    """Gain (h, w) of a flat film at one depth."""
+    grid = unit_grid(5, 5, size, size)
+    return focus_evidence(even_light(grid, rate, seed, cfa), plane_at(grid, 3)).gain[0]
+
+
 def flat_gains(rate: float, scenes: int, cfa: str | None = "GRBG", size: int = 128) -> np.ndarray:
     """Gain (scenes, h, w) of flat films at one depth."""
-    grid = unit_grid(5, 5, size, size)
-    drawn = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(scenes)]
-    plane = plane_at(grid, 3)
-    return np.array([focus_evidence(PhotonCounts.from_dense(d, grid, cfa=cfa), plane).gain[0] for d in drawn])
+    return np.array([flat_gain(rate, seed, cfa, size) for seed in range(scenes)])
 
 
 RATES = [1e-5, 1e-4, 0.01, 0.2, 2.0]  # from one photon in 64 x 64 px of the section to 50 in each
@@ -257,10 +262,8 @@ def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
     # gained or lost by the share by which the two differ, and chance would grow as the root of the photons.
     for rate in (0.1, 10.0, 1e3):
         grid = unit_grid(5, 5, *size)
-        films = [np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW) for seed in range(4)]
-        gains = np.array(
-            [focus_evidence(PhotonCounts.from_dense(f, grid), plane_at(grid, 3)).gain[0] for f in films]
-        )
+        films = [even_light(grid, rate, seed) for seed in range(4)]
+        gains = np.array([focus_evidence(film, plane_at(grid, 3)).gain[0] for film in films])
         # A cell's four finest rates cost half a nat each at most, give or take sqrt(1/2), times the fifth for
         # which their scale counts; coarser scales are fewer, and shared by cells.
         assert gains.std() < 0.6
@@ -268,13 +271,11 @@ def test_gains_of_a_flat_film_are_the_same_in_any_light_and_on_any_film(size):
         assert abs(totals.mean()) < 0.05 * gains[0].size + 4 * 0.6 * math.sqrt(gains[0].size / 4)
 
 
-FRAMES = [(0.01, "GRBG"), (2.0, "GRBG"), (10.0, "GRBG"), (0.01, None), (2.0, None), (10.0, None)]
-
-
-@pytest.mark.parametrize(("rate", "cfa"), FRAMES)
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+@pytest.mark.parametrize("rate", [0.01, 10.0])
 def test_no_bias_at_the_frame_of_a_flat_film(rate, cfa):
     # Views leave the frame there: blocks are covered by fewer views, and unequally.
-    gains = flat_gains(rate, scenes=40, cfa=cfa, size=96)
+    gains = flat_gains(rate, scenes=24, cfa=cfa, size=96)
     edge = np.ones(gains.shape[1:], dtype=bool)
     edge[2:-2, 2:-2] = False  # 8 px, to which the farthest view shifts by 6
     for frame in (edge, ~edge):

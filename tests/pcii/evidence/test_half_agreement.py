@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from twins import bayer_photons, blocky_texture, patch_views, unit_grid
+from twins import bayer_photons, blocky_texture, even_light, patch_views, unit_grid
 
 from pcii.core.bayer import colour_cells
 from pcii.core.camera_grid import CameraGrid
@@ -48,8 +48,7 @@ def test_noise_agrees_as_seldom_as_is_said(rate, views):
     grid = unit_grid(*views, 64, 80)
     above = []
     for seed in range(20):
-        film = np.random.default_rng(seed).poisson(rate, grid.shape_KLHW)
-        halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
+        halves = halves_of(even_light(grid, rate, seed), planes_of(grid))
         largest = np.max([at(halves, plane, (16, 20)) for plane in range(6)], axis=0)
         above.append((largest > least_agreement(6)).mean())
     assert np.mean(above) <= 1 / 1000  # of places, as is said

@@ -1,10 +1,9 @@
 """The loops that predict photons from a section: in parts, and where views are hidden."""
 
 import numpy as np
-from twins import unit_grid
+from twins import even_light, unit_grid
 
 from pcii.core.bayer import sites_of_colours
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.prediction_kernels import predict, predict_shared
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 from pcii.evidence.projection_kernels import cells_of_events
@@ -13,8 +12,7 @@ from pcii.evidence.projection_kernels import cells_of_events
 def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     rate, views = 0.5, 16
     grid = unit_grid(4, 4, 64, 64)
-    film = np.random.default_rng(5).poisson(rate, grid.shape_KLHW)
-    counts = PhotonCounts.from_dense(film, grid, cfa=None)
+    counts = even_light(grid, rate, seed=5)
     events = counts.events
     hidden = ((events.k + events.l) % 2 == 0) & (events.j < 32)
     # The shifts are 0: of the left half every second view is hidden.
@@ -38,8 +36,7 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
 
 def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     K, L, H, W = 4, 5, 96, 128
-    film = np.random.default_rng(3).poisson(0.02, (K, L, H, W))
-    counts = PhotonCounts.from_dense(film, unit_grid(K, L, H, W), cfa="GRBG")
+    counts = even_light(unit_grid(K, L, H, W), 0.02, seed=3, cfa="GRBG")
     events = counts.events
     N, (h, w), rng = events.n.size, (H // 4, W // 4), np.random.default_rng(4)
     rows, cols = 19 * np.arange(K, dtype=np.int32) - 30, 2 * np.arange(L, dtype=np.int32) - 5

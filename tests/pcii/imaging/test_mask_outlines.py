@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from twins import paper_grid
 
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
@@ -71,9 +71,7 @@ def test_masks_without_an_outline_and_films_of_one_pixel() -> None:
 
 
 def test_the_score_uses_the_coverage_if_there_is_one() -> None:
-    grid = CameraGrid(
-        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=20, width=30
-    )
+    grid = paper_grid(20, 30)
     mask, ids, coverage = seen(half_plane(10.45))
     z = np.where(mask, 540.0, np.inf)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=np.int64), grid)

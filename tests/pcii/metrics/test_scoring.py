@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from twins import paper_grid
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.geometry import blur_half_extent_px
 from pcii.core.photon_counts import PhotonCounts
@@ -12,7 +12,7 @@ from pcii.core.truth import PhotonTruth, Truth
 from pcii.metrics.scoring import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
 from pcii.sections.reconstruction import reconstruct
 
-GRID = CameraGrid(rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=24, width=32)
+GRID = paper_grid(24, 32)
 Z = np.array([540.0, 620.0])
 
 
@@ -169,7 +169,7 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
     that a picture of 200 px is needed to see all of them land.
     """
-    wide = CameraGrid(**{**vars(GRID), "height": 200, "width": 200})
+    wide = paper_grid(200, 200)
     i, j, n = np.array([100, 110, 120, 199]), np.array([100, 100, 100, 30]), np.array([3, 1, 2, 1])
     zero = np.zeros(4, dtype=int)
     counts = PhotonCounts.from_events(zero, zero, i, j, n, wide)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from twins import intersection_over_union, opaque_views, photons_of, unit_grid
+from twins import even_light, intersection_over_union, opaque_views, photons_of, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.focal_planes import FocalPlanes
@@ -161,8 +161,7 @@ def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
 def test_a_flat_film_is_never_claimed(rate):
     grid = unit_grid(7, 7, 160, 144)
     for seed in range(2):
-        film = np.random.default_rng(seed).poisson(rate, size=grid.shape_KLHW)
-        focus = segment(PhotonCounts.from_dense(film, grid, cfa="GRBG"), [1 / 2, 1 / 5], method="likelihood")
+        focus = segment(even_light(grid, rate, seed, "GRBG"), [1 / 2, 1 / 5], method="likelihood")
         assert not focus.in_focus.any()
 
 

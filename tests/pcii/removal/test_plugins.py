@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from twins import unit_grid
+from twins import even_light, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
@@ -53,8 +53,7 @@ def install(folder: Path, monkeypatch: pytest.MonkeyPatch, **points: str) -> Non
 
 
 def counts() -> PhotonCounts:
-    grid = unit_grid(2, 2, 5, 6)
-    return PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.5, grid.shape_KLHW), grid)
+    return even_light(unit_grid(2, 2, 5, 6), 0.5, seed=1)
 
 
 def test_a_method_of_another_package_is_found_by_name(tmp_path, monkeypatch):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from twins import intersection_over_union, unit_grid
+from twins import even_light, intersection_over_union, unit_grid
 
 from pcii.core.photon_counts import PhotonCounts
 from pcii.removal.methods import segment
@@ -32,7 +32,7 @@ def test_brightness_keeps_what_is_bright_in_focus_or_not(two_squares):
 
 def test_brightness_claims_nothing_of_an_even_dark():
     grid = unit_grid(4, 4, 96, 96)
-    dark = PhotonCounts.from_dense(np.random.default_rng(5).poisson(0.05, grid.shape_KLHW), grid)
+    dark = even_light(grid, 0.05, seed=5)
     assert not segment(dark, [0.5], method="brightness").in_focus.any()
 
 

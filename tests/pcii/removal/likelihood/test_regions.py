@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
-from twins import unit_grid
+from twins import even_light, paper_grid, unit_grid
 
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import Focus, focus_evidence
 from pcii.evidence.half_agreement import Halves, halves_of
 from pcii.removal.likelihood.regions import (
@@ -245,14 +243,10 @@ def test_noise_alone_is_never_sure(photons_per_px):
     away = np.abs(spread_px - 100)
     planes = Planes(spread_px, np.zeros(away.size, np.int64), away, near_px=4.5, far_px=10.0)
     everything = np.ones((size // 4, size // 4), dtype=bool)
-    grid = CameraGrid(
-        rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=size, width=size
-    )
+    grid = paper_grid(size, size)
     for seed in range(5):
-        random = np.random.default_rng(seed)
-        film = random.poisson(photons_per_px / 100, (10, 10, size, size))
-        counts = PhotonCounts.from_dense(film, grid, cfa="GRBG")
-        searched = FocalPlanes.at_total_disparity(grid, spread_px)
+        counts = even_light(grid, photons_per_px / 100, seed, "GRBG")
+        searched = FocalPlanes.at_total_disparity(counts.grid, spread_px)
         focus, halves = focus_evidence(counts, searched), halves_of(counts, searched)
         _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes, halves)
         assert not region.is_there
