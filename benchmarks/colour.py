@@ -206,7 +206,7 @@ def _times() -> Iterator[str]:
     for spectral in ([], [f"sensor.camera={CAMERAS[0]}"]):
         setup = setup_of(load_recipe("paper", view + spectral)[0])
         dense, _ = timed(
-            lambda seed, s=setup: render_view(s.built, s.grid, 0, 0, samples_per_pixel=16, seed=seed)
+            lambda seed, s=setup: render_view(s.render_scene, s.grid, 0, 0, samples_per_pixel=16, seed=seed)
         )
         photons, drawn = thinned(load_recipe("paper", spectral)[0])
         seconds.append((dense, photons, drawn.log["kept_share"]))

@@ -47,7 +47,7 @@ def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
         drawing = 0.0
         for view in range(DENSE_VIEWS):
             image = render_view(
-                setup.built, setup.grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed
+                setup.render_scene, setup.grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed
             )
             start = time.perf_counter()
             raw = sense(image, recipe.cfa)

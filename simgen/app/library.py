@@ -123,25 +123,27 @@ def draw_photons(
         "photons": {"budget": budget},
     }
     recipe = validate(Recipe, values, "draw_photons")
-    built = Prepared(recipe, scene.scene, scene.folder, None).built()
-    made = plan(recipe, built, backend.choose().kind)
+    render_scene = Prepared(recipe, scene.scene, scene.folder, None).render_scene()
+    made = plan(recipe, render_scene, backend.choose().kind)
     check_resources(recipe, made, Path())
     rig = rig_of(recipe)
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:
         own = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
-        return sense(render_view(built, rig, k, l, samples_per_pixel=made.samples, seed=own), recipe.cfa)
+        return sense(
+            render_view(render_scene, rig, k, l, samples_per_pixel=made.samples, seed=own), recipe.cfa
+        )
 
     if made.thins:
-        arrivals, _ = thin(recipe, built, made, report)
+        arrivals, _ = thin(recipe, render_scene, made, report)
     else:
         arrivals, _ = draw_from_views(recipe, mosaic_of, made, report)
     counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
     )
-    centre = first_hits_at_centre(built, grid)
+    centre = first_hits_at_centre(render_scene, grid)
     photons = None
     origins = origins_of(counted, grid)
     if origins is not None:
@@ -150,9 +152,9 @@ def draw_photons(
     truth = Truth(
         z_mm=centre.z_mm,
         object_id=centre.object_id,
-        names=built.names,
+        names=render_scene.names,
         photons=photons,
         normal=centre.normal,
-        coverage=coverage(built, centre_camera(grid), centre.object_id),
+        coverage=coverage(render_scene, centre_camera(grid), centre.object_id),
     )
     return counts, truth

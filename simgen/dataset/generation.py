@@ -86,10 +86,10 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     engine = backend.describe(spectral=recipe.is_spectral)
     clock, made = _Clock(), None
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
-        built = prepared.built()
+        render_scene = prepared.render_scene()
     if recipe.products.counts:  # likewise: too much light
         with clock.stage("plan"):
-            made = plan(recipe, built, engine["kind"])
+            made = plan(recipe, render_scene, engine["kind"])
             check_resources(recipe, made, out)
     with _claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
@@ -99,14 +99,14 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
         products, photons = recipe.products, None
         if products.truth or products.view_truth:
             with clock.stage("truth"):
-                write_truth(recipe, built, out, report)
+                write_truth(recipe, render_scene, out, report)
         if made is not None and made.thins:
             with clock.stage("photons"):
-                arrivals, photons = thin(recipe, built, made, report)
+                arrivals, photons = thin(recipe, render_scene, made, report)
                 photons |= write_counts(recipe, arrivals, out)
         if products.radiance != "none" or (made is not None and not made.thins):
             with clock.stage("radiance"):
-                _render_views(recipe, built, made, out, report)
+                _render_views(recipe, render_scene, made, out, report)
         if made is not None and not made.thins:
             with clock.stage("counts"):
                 arrivals, photons = draw_from_views(recipe, _stored_mosaic(recipe, out), made, report)
@@ -116,7 +116,7 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
             budgets = (None, *recipe.photons.nested)
             parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
             files = list_files(out, [TRUTH, *parts, RADIANCE])
-        manifest = _manifest(recipe, scene, built, engine, identity) | {
+        manifest = _manifest(recipe, scene, render_scene, engine, identity) | {
             "photons": photons,
             "skipped": _skipped(recipe, made, photons, traced_for_visibility(out)),
             "timings_s": clock.seconds,
@@ -202,7 +202,9 @@ def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any
         )
 
 
-def _render_views(recipe: Recipe, built: RenderScene, made: Plan | None, out: Path, report: Report) -> None:
+def _render_views(
+    recipe: Recipe, render_scene: RenderScene, made: Plan | None, out: Path, report: Report
+) -> None:
     """Radiance of every view that is not on disk yet."""
     rig, light = rig_of(recipe), recipe.sensor.full_light
     grid = rig.grid
@@ -211,7 +213,7 @@ def _render_views(recipe: Recipe, built: RenderScene, made: Plan | None, out: Pa
         number, rendered = k * grid.cols + l, out / _rendered_name(recipe, k, l)
         if not rendered.is_file():
             image = render_view(
-                built,
+                render_scene,
                 rig,
                 k,
                 l,
@@ -283,12 +285,12 @@ def _skipped(
 def _manifest(
     recipe: Recipe,
     scene: Scene,
-    built: RenderScene,
+    render_scene: RenderScene,
     engine: dict[str, Any],
     identity: str,
 ) -> dict[str, Any]:
     """What the manifest says of the recipe, the scene and the software."""
-    channels = 3 if built.filters is None else len(built.filters.sensitivity)
+    channels = 3 if render_scene.filters is None else len(render_scene.filters.sensitivity)
     return {
         "identity": identity,
         "title": recipe.title or scene.title,
@@ -296,7 +298,7 @@ def _manifest(
         "cfa": recipe.cfa,
         "radiance_channels": {"none": None, "mosaic": 1, "rgb": channels}[recipe.products.radiance],
         "radiance_unit": SPECTRAL_UNIT if recipe.is_spectral else RGB_UNIT,
-        "objects": {str(number): name for number, name in built.names.items()},
+        "objects": {str(number): name for number, name in render_scene.names.items()},
         "analysis": recipe.analysis.model_dump(mode="json"),
         "recipe": recipe.model_dump(mode="json"),
         "scene": scene.model_dump(mode="json"),

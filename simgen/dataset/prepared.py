@@ -21,7 +21,7 @@ class Prepared:
     folder: Path
     curves: np.ndarray | None
 
-    def built(self) -> RenderScene:
+    def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
         mi = backend.load(spectral=self.recipe.is_spectral)
         return build(mi, self.scene, self.folder, self.recipe.render.max_depth, self.curves)

@@ -51,9 +51,9 @@ def write_preview(
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
-    built = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
-    picture = render_view(built, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
-    hits = first_hits_at_centre(built, grid)
+    render_scene = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
+    picture = render_view(render_scene, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
+    hits = first_hits_at_centre(render_scene, grid)
     things = hits.object_id > 0
     white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
     box = part_of_interest(things, MARGIN * max(things.shape))
@@ -66,6 +66,6 @@ def write_preview(
     if things.any() and box[0].stop - box[0].start < grid.height:
         frame_part(axes[0], box)
     draw_depth(figure, axes[1], hits.z_mm[box], things[box])
-    draw_objects(axes[2], hits.object_id[box], built.names)
+    draw_objects(axes[2], hits.object_id[box], render_scene.names)
     figure.suptitle(recipe.title or target.scene.title, parse_math=False)
     save_figure(figure, out, dots_per_inch)

@@ -20,7 +20,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 class Setup:
     """What is looked at, by which cameras, through which filters, along how long paths."""
 
-    built: RenderScene
+    render_scene: RenderScene
     cameras: Cameras
     cfa: str | None
     max_depth: int

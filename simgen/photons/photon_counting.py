@@ -53,7 +53,7 @@ class Plan:
     """Some of the depths that the corner cameras see, if photons are thinned."""
 
 
-def plan(recipe: Recipe, built: RenderScene, kind: str) -> Plan:
+def plan(recipe: Recipe, render_scene: RenderScene, kind: str) -> Plan:
     """Thin, or render densely, whichever takes less time for counts without rendering noise.
 
     Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
@@ -62,7 +62,7 @@ def plan(recipe: Recipe, built: RenderScene, kind: str) -> Plan:
     """
     grid = recipe.grid.camera_grid()
     pixels = grid.height * grid.width
-    seen = probe(built, grid, recipe.cfa, PROBE_SEED)
+    seen = probe(render_scene, grid, recipe.cfa, PROBE_SEED)
     per_view, gain = _photons(recipe, seen)
     scope_pixels = _scope_pixels(recipe)
     samples = seen.samples_for(gain, scope_pixels)
@@ -88,16 +88,16 @@ def plan(recipe: Recipe, built: RenderScene, kind: str) -> Plan:
         photons_per_view=per_view,
         noise=noise,
         normaliser_error=0.0 if scope_pixels is None else seen.light_error(samples * scope_pixels),
-        depths_mm=depths_seen(built, grid) if thins else (),
+        depths_mm=depths_seen(render_scene, grid) if thins else (),
     )
 
 
 def thin(
-    recipe: Recipe, built: RenderScene, made: Plan, report: Report = silent
+    recipe: Recipe, render_scene: RenderScene, made: Plan, report: Report = silent
 ) -> tuple[Arrivals, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them."""
     grid = recipe.grid.camera_grid()
-    setup = Setup(built, rig_of(recipe), recipe.cfa, recipe.render.max_depth)
+    setup = Setup(render_scene, rig_of(recipe), recipe.cfa, recipe.render.max_depth)
     gain = absolute_gain(recipe)
     drawn = thin_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
     names = ("k", "l", "i", "j", "scope", "rank")

@@ -25,8 +25,8 @@ def surroundings(setup: Setup) -> np.ndarray:
     """What pixels see of what shines from all around (C,), where candidates are guessed at; else zeros."""
     if _is_scalar(setup):
         return np.zeros(setup.channels)
-    return surrounding_radiance(setup.built, light_of(setup.built, setup.cfa))
+    return surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
 
 
 def _is_scalar(setup: Setup) -> bool:
-    return setup.built.mi.variant().startswith("scalar")
+    return setup.render_scene.mi.variant().startswith("scalar")

@@ -96,7 +96,7 @@ class SinglePool:
 
     def _looks(self, rays: _Rays) -> Iterator[_Rays]:
         """The rays as often as they must be followed to tell of all colours."""
-        if self.setup.built.filters is None:
+        if self.setup.render_scene.filters is None:
             yield rays
             return
         for colour in range(self.setup.channels):
@@ -136,9 +136,9 @@ class SinglePool:
 
     def _first_hits(self, rays: _Rays) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
-        built, intersect = self.setup.built, self.setup.built.scene.ray_intersect
-        numbers = zip(built.scene.shapes(), shape_numbers(built.scene), strict=True)
-        ids = {shape.id(): built.object_of_shape[number] for shape, number in numbers}
+        render_scene, intersect = self.setup.render_scene, self.setup.render_scene.scene.ray_intersect
+        numbers = zip(render_scene.scene.shapes(), shape_numbers(render_scene.scene), strict=True)
+        ids = {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
         object_id, z_mm = np.zeros(rays.k.size, np.int16), np.full(rays.k.size, np.inf, np.float32)
         for number, ray in enumerate(self._traced(rays)):
             hit = intersect(ray)
@@ -148,17 +148,17 @@ class SinglePool:
 
     def _follow(self, rays: _Rays, rng: np.random.Generator, seed: int) -> np.ndarray:
         """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0."""
-        built = self.setup.built
-        sampler = built.mi.load_dict({"type": "independent"})
+        render_scene = self.setup.render_scene
+        sampler = render_scene.mi.load_dict({"type": "independent"})
         sampler.seed(seed, 1)
-        sample, scene = built.scene.integrator().sample, built.scene
-        if built.filters is None:
+        sample, scene = render_scene.scene.integrator().sample, render_scene.scene
+        if render_scene.filters is None:
             rgb = np.empty((rays.k.size, 3))
             for number, ray in enumerate(self._traced(rays)):
                 rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
             rgb /= PATHS
             return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
-        chosen_nm, weight = built.filters.draw(rays.colour, rng.random(rays.k.size))
+        chosen_nm, weight = render_scene.filters.draw(rays.colour, rng.random(rays.k.size))
         seen = np.zeros((rays.k.size, self.setup.channels))
         for number, ray in enumerate(self._traced(rays)):
             ray.wavelengths = chosen_nm[number].tolist()
@@ -168,7 +168,7 @@ class SinglePool:
 
     def _traced(self, rays: _Rays) -> Iterator[Any]:
         """The renderer's rays."""
-        mi, lens_point = self.setup.built.mi, np.stack([rays.lens_x_mm, rays.lens_y_mm])
+        mi, lens_point = self.setup.render_scene.mi, np.stack([rays.lens_x_mm, rays.lens_y_mm])
         origins, directions = self.setup.rig.rays(rays.k, rays.l, rays.row_px, rays.col_px, lens_point)
         columns = np.concatenate([origins, directions], axis=1)
         # Python's numbers take several times the memory of NumPy's, so there are never many at once.

@@ -50,8 +50,8 @@ class LanePool:
         self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
     ) -> None:
         self.setup, self.majorant = setup, majorant
-        self.light = light_of(setup.built, setup.cfa)
-        mi, frame = setup.built.mi, majorant.frame
+        self.light = light_of(setup.render_scene, setup.cfa)
+        mi, frame = setup.render_scene.mi, majorant.frame
         of_groups = [chances(setup, majorant, cells) for cells in groups]
         sizes = np.array([own.running.size for own in of_groups])
         ends = np.cumsum(sizes)
@@ -88,7 +88,7 @@ class LanePool:
         setup = self.setup
         if group.size == 0:
             return nothing(setup.channels)
-        mi, dr = setup.built.mi, load_drjit()
+        mi, dr = setup.render_scene.mi, load_drjit()
         sampler = _sampler(mi, seed, group.size)
         lanes, first = self._first_seen(sampler, _unsigned(mi, group), view)
         where = lanes.entry * setup.channels + lanes.colour
@@ -124,7 +124,7 @@ class LanePool:
             j=np.array(photon.col).astype(np.int64),
             row_px=np.array(photon.row_px),
             col_px=np.array(photon.col_px),
-            object_id=setup.built.object_of_shape[np.array(hit.shape)],
+            object_id=setup.render_scene.object_of_shape[np.array(hit.shape)],
             z_mm=np.array(hit.z_mm),
             multiplicity=np.array(multiplicity).astype(np.int64),
             over=self._exceeding(lanes, first, light, over) if len(over) else nothing(setup.channels).over,
@@ -134,7 +134,7 @@ class LanePool:
     def look_around(self, number: int, follow: int, seed: int) -> Samples:
         """See `candidates`."""
         setup = self.setup
-        mi, dr = setup.built.mi, load_drjit()
+        mi, dr = setup.render_scene.mi, load_drjit()
         sampler = _sampler(mi, seed, number)
         lanes = self._draw(sampler, dr.zeros(mi.UInt32, number), _views(setup, sampler, None))
         dr.eval(vars(lanes))
@@ -163,19 +163,19 @@ class LanePool:
 
     def _hit_first(self, lanes: _Lanes) -> FirstHits:
         ambient = self.light.spread(self.ambient, lanes.colour, lanes.wavelength_sample)
-        return hit_first(self.setup.built, self._rays(lanes), lanes.inside, ambient)
+        return hit_first(self.setup.render_scene, self._rays(lanes), lanes.inside, ambient)
 
     def _rays(self, lanes: _Lanes) -> Any:
         at = lanes.k, lanes.l, lanes.row_px, lanes.col_px, lanes.lens_point
-        ray = film_rays(self.setup.built, self.setup.rig, *at)
+        ray = film_rays(self.setup.render_scene, self.setup.rig, *at)
         return self.light.aim(ray, lanes.colour, lanes.wavelength_sample)
 
     def _follow(self, lanes: _Lanes, first: FirstHits, seed: int) -> Any:
         """Radiance along one path from each first hit, as rays carry it."""
         # Another sampler than the candidates', whose numbers decided which lanes are here.
-        sampler = _sampler(self.setup.built.mi, seed ^ 0x9E3779B9, len(lanes.k))
+        sampler = _sampler(self.setup.render_scene.mi, seed ^ 0x9E3779B9, len(lanes.k))
         return radiance_along(
-            self.setup.built, self._rays(lanes), first.record, sampler, self.setup.max_depth
+            self.setup.render_scene, self._rays(lanes), first.record, sampler, self.setup.max_depth
         )
 
     def _seen(self, radiance: Any, lanes: _Lanes) -> Any:
@@ -194,7 +194,7 @@ class LanePool:
 
     def _draw(self, sampler: Any, group: Any, view: Any) -> _Lanes:
         """One candidate for each lane's group and view: tile and cell by the bound, the rest evenly."""
-        mi, dr = self.setup.built.mi, load_drjit()
+        mi, dr = self.setup.render_scene.mi, load_drjit()
         grid = self.setup.grid
         # Two draws make one fine enough for tiles that are chosen once in a hundred million.
         fine = dr.floor(sampler.next_1d() * 2**22) + mi.Float64(sampler.next_1d())
@@ -232,7 +232,7 @@ class LanePool:
 
     def _owner(self, lanes: _Lanes, z_mm: Any) -> Any:
         """The entry that each lane's path belongs to (see `majorant`)."""
-        mi, dr, frame = self.setup.built.mi, load_drjit(), self.majorant.frame
+        mi, dr, frame = self.setup.render_scene.mi, load_drjit(), self.majorant.frame
         nearness = dr.minimum(self.nearness_mm / z_mm, self.last_step)
         own = dr.gather(mi.Int32, self.layer_at, mi.UInt32(dr.round(nearness)))
         coarse_px, across = self.majorant.coarse_px, self.majorant.coarse_cols
@@ -247,7 +247,7 @@ class LanePool:
 
     def _shifts(self, layer: Any, k: Any, l: Any, active: Any = True) -> tuple[Any, Any]:
         """Rows and columns by which a layer's tiles are moved in each lane's view."""
-        mi, dr, grid = self.setup.built.mi, load_drjit(), self.setup.grid
+        mi, dr, grid = self.setup.render_scene.mi, load_drjit(), self.setup.grid
         down = _at(dr, self.row_shift, layer * grid.rows + mi.Int32(k), active)
         return down, _at(dr, self.col_shift, layer * grid.cols + mi.Int32(l), active)
 
@@ -260,7 +260,7 @@ def _sampler(mi: Any, seed: int, size: int) -> Any:
 
 def _views(setup: Setup, sampler: Any, view: np.ndarray | None) -> Any:
     """The lanes' views, drawn evenly if they are not given."""
-    mi, count = setup.built.mi, setup.grid.view_count
+    mi, count = setup.render_scene.mi, setup.grid.view_count
     if view is not None:
         return _unsigned(mi, view)
     return load_drjit().minimum(mi.UInt32(sampler.next_1d() * count), count - 1)

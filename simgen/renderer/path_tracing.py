@@ -45,10 +45,10 @@ class FirstHits:
 
 
 def film_rays(
-    built: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
+    render_scene: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
 ) -> Any:
     """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`."""
-    mi, dr, grid = built.mi, load_drjit(), rig.grid
+    mi, dr, grid = render_scene.mi, load_drjit(), rig.grid
     camera = k * grid.cols + l
 
     def own(values: np.ndarray) -> Any:
@@ -82,17 +82,17 @@ def _is_zero(factor: Any) -> bool:
     return isinstance(factor, float) and factor == 0
 
 
-def hit_first(built: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
+def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
     """What each active ray hits first; `ambient` is the radiance that is guessed to come from all around."""
-    mi, dr = built.mi, load_drjit()
-    record = built.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    mi, dr = render_scene.mi, load_drjit()
+    record = render_scene.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
     found = active & hit.is_valid()
     shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
     z_mm = dr.select(found, hit.p.z, dr.inf)
-    guess = hit.emitter(built.scene, active).eval(hit, active)
+    guess = hit.emitter(render_scene.scene, active).eval(hit, active)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
-    for lamp in _lamps(built.scene):
+    for lamp in _lamps(render_scene.scene):
         towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
         scattered = bsdf.eval(context, hit, hit.to_local(towards.d), found)
         guess += dr.select(found & (towards.pdf > 0), scattered * weight, 0)
@@ -101,10 +101,10 @@ def hit_first(built: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstH
     return FirstHits(record, shape, z_mm, guess)
 
 
-def surrounding_radiance(built: RenderScene, light: Light) -> np.ndarray:
+def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
-    mi, dr = built.mi, load_drjit()
-    around = built.scene.environment()
+    mi, dr = render_scene.mi, load_drjit()
+    around = render_scene.scene.environment()
     number = dr.arange(mi.Float, 256) + 0.5
     # Evenly spread directions (a Fibonacci lattice).
     up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
@@ -137,27 +137,32 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
     return [around] if varies else []
 
 
-def radiance_along(built: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
+def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
     The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
     `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
     """
-    mi = built.mi
-    tracer = _Tracer(built, sampler)
+    mi = render_scene.mi
+    tracer = _Tracer(render_scene, sampler)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    radiance = hit.emitter(built.scene).eval(hit)
+    radiance = hit.emitter(render_scene.scene).eval(hit)
     return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
 
 
 class _Tracer:
     """The two halves of path tracing, which call each other: what leaves a hit, what arrives there."""
 
-    def __init__(self, built: RenderScene, sampler: Any) -> None:
-        self.mi, self.dr, self.scene, self.sampler = built.mi, load_drjit(), built.scene, sampler
+    def __init__(self, render_scene: RenderScene, sampler: Any) -> None:
+        self.mi, self.dr, self.scene, self.sampler = (
+            render_scene.mi,
+            load_drjit(),
+            render_scene.scene,
+            sampler,
+        )
         self.context = self.mi.BSDFContext()
-        around = _surroundings(built.mi, built.scene)
-        self.lamps, self.aims_around = _lamps(built.scene) + around, bool(around)
+        around = _surroundings(render_scene.mi, render_scene.scene)
+        self.lamps, self.aims_around = _lamps(render_scene.scene) + around, bool(around)
 
     def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
         """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""

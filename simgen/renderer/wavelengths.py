@@ -134,11 +134,11 @@ class Wavelengths:
         return dr.lerp(low, high, place - mi.Float(cell))
 
 
-def light_of(built: RenderScene, cfa: str | None) -> Light:
+def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     """How rays carry light in this scene's variant."""
-    if built.filters is None:
-        return Colours(built.mi, cfa)
-    return Wavelengths(built.mi, built.filters)
+    if render_scene.filters is None:
+        return Colours(render_scene.mi, cfa)
+    return Wavelengths(render_scene.mi, render_scene.filters)
 
 
 def of_colour(values: Any, colour: Any) -> Any:

@@ -112,7 +112,7 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
 
 
 def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module.Prepared, "built", lambda _: pytest.fail("rendered again"))
+    monkeypatch.setattr(module.Prepared, "render_scene", lambda _: pytest.fail("rendered again"))
     before = (made / MANIFEST).stat().st_mtime_ns
     generate(recipe(), Path(), made)
     assert (made / MANIFEST).stat().st_mtime_ns == before
