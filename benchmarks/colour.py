@@ -208,8 +208,8 @@ def _times() -> Iterator[str]:
         dense, _ = timed(
             lambda seed, s=setup: render_view(s.render_scene, s.grid, 0, 0, samples_per_pixel=16, seed=seed)
         )
-        photons, drawn = thinned(load_recipe("paper", spectral)[0])
-        seconds.append((dense, photons, drawn.log["kept_share"]))
+        photons, log = thinned(load_recipe("paper", spectral)[0])
+        seconds.append((dense, photons, log["kept_share"]))
     plain, own = seconds
     yield "| time | RGB mode | spectral mode | ratio |"
     yield "|---|---|---|---|"

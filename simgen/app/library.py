@@ -20,7 +20,7 @@ from simgen.dataset import generation
 from simgen.dataset.prepared import Prepared
 from simgen.dataset.resources import check_resources
 from simgen.figures.preview_picture import write_preview
-from simgen.photons.photon_counting import draw_from_views, origins_of, plan, thin
+from simgen.photons.photon_counting import draw_from_views, plan, thin
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.sensor.detector import detect
@@ -139,16 +139,15 @@ def draw_photons(
         arrivals, _ = thin(recipe, render_scene, made, report)
     else:
         arrivals, _ = draw_from_views(recipe, mosaic_of, made, report)
-    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed)
+    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed).by_pixel(grid)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
     )
     centre = first_hits_at_centre(render_scene, grid)
     photons = None
-    origins = origins_of(counted, grid)
-    if origins is not None:
-        events = counts.events
-        photons = PhotonTruth(**{name: getattr(events, name).repeat(events.n) for name in "klij"}, **origins)
+    if counted.object_id is not None and counted.z_mm is not None:
+        origins = counted.one_by_one().columns()
+        photons = PhotonTruth(**{name: origins[name] for name in (*"klij", "object_id", "z_mm")})
     truth = Truth(
         z_mm=centre.z_mm,
         object_id=centre.object_id,

@@ -14,6 +14,7 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Cameras, Rig, as_rig
 from simgen.photons.majorant import Majorant, Samples
 from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.sensor.photon_table import PhotonTable, no_photons
 
 
 @dataclass(frozen=True)
@@ -41,30 +42,16 @@ class Setup:
         return channel_count(self.cfa)
 
 
-@dataclass(frozen=True)
-class PhotonPaths:
-    """Paths (N,) of photons: camera (k, l), pixel (i, j), film point, first hit's `object_id` and `z_mm`."""
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """The `photons` that candidates gave: a row for each that gave any, n of them, and its first hit.
 
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    row_px: np.ndarray
-    col_px: np.ndarray
-    object_id: np.ndarray
-    z_mm: np.ndarray
-
-
-@dataclass(frozen=True)
-class Accepted(PhotonPaths):
-    """Paths that gave photons, the number of the `candidate` of each, and how many it gave (`multiplicity`).
-
-    `ratio` (F,) is radiance by limit of all paths that were followed beyond their first hit, `over`
-    those that exceeded it.
+    `candidate` (rows,) is the number of each. `ratio` (F,) is radiance by limit of all paths that were
+    followed beyond their first hit, `over` those that exceeded it.
     """
 
+    photons: PhotonTable
     candidate: np.ndarray
-    multiplicity: np.ndarray
     ratio: np.ndarray
     over: Samples
 
@@ -134,6 +121,4 @@ def chances(setup: Setup, majorant: Majorant, cells: np.ndarray) -> Chances:
 def nothing(channels: int) -> Accepted:
     """No photons."""
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
-    over = Samples(whole, whole, whole, whole, real, colours, colours)
-    object_id = np.zeros(0, np.int16)
-    return Accepted(whole, whole, whole, whole, real, real, object_id, real, whole, whole, real, over)
+    return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))

@@ -1,14 +1,13 @@
 """The photon counts of a dataset: which way they are made, what the sensor does to them, where they go."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pcii.core.bayer import channel_count
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.console import Report, silent
 from pcii.core.errors import InputError
 from pcii.core.photon_counts import PhotonCounts
@@ -20,9 +19,10 @@ from simgen.photons.candidates import Setup
 from simgen.photons.rendering_noise import NOISE_SHARE, Probe, depths_seen, probe
 from simgen.photons.thinning import places, thin_photons
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.detector import Arrivals, detect, nested_subset, saturate
+from simgen.sensor.detector import detect, nested_subset, saturate
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import draw_counts, fixed_totals, photon_rates, scope_energies
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PATHS, MOST_PHOTONS, Recipe
 
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
@@ -94,20 +94,15 @@ def plan(recipe: Recipe, render_scene: RenderScene, kind: str) -> Plan:
 
 def thin(
     recipe: Recipe, render_scene: RenderScene, made: Plan, report: Report = silent
-) -> tuple[Arrivals, dict[str, Any]]:
+) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them."""
     grid = recipe.grid.camera_grid()
     setup = Setup(render_scene, rig_of(recipe), recipe.cfa, recipe.render.max_depth)
     gain = absolute_gain(recipe)
-    drawn = thin_photons(setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report)
-    names = ("k", "l", "i", "j", "scope", "rank")
-    arrivals = Arrivals(
-        **{name: getattr(drawn, name).astype(np.int64) for name in names},
-        n=np.ones(drawn.k.size, dtype=np.int64),
-        object_id=drawn.object_id,
-        z_mm=drawn.z_mm,
+    photons, log = thin_photons(
+        setup, recipe.photons, seed=recipe.seed, photons_per_radiance=gain, report=report
     )
-    return arrivals, drawn.log | {
+    return photons, log | {
         "dense_paths_instead": made.samples * grid.view_count * grid.height * grid.width,
         "normaliser_standard_error": 0.0,
     }
@@ -115,7 +110,7 @@ def thin(
 
 def draw_from_views(
     recipe: Recipe, mosaic_of: Callable[[int, int], np.ndarray], made: Plan, report: Report
-) -> tuple[Arrivals, dict[str, Any]]:
+) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn from rendered ones, (H, W) each; and what the manifest says of them."""
     grid, cfa, photons = recipe.grid.camera_grid(), recipe.cfa, recipe.photons
     views = list(np.ndindex(grid.rows, grid.cols))
@@ -141,8 +136,7 @@ def draw_from_views(
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", number + 1, len(views))
     k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))
-    nobody = np.full(k.size, -1)
-    arrivals = Arrivals(k, l, i, j, n, nobody, nobody)
+    arrivals = PhotonTable(k, l, i, j, n)
     if photons.nested:
         arrivals = _one_by_one(arrivals, recipe)
     return arrivals, {
@@ -155,7 +149,7 @@ def draw_from_views(
     }
 
 
-def write_counts(recipe: Recipe, arrivals: Arrivals, out: Path) -> dict[str, Any]:
+def write_counts(recipe: Recipe, arrivals: PhotonTable, out: Path) -> dict[str, Any]:
     """What the sensor counts of the arrivals, written; for the budget and for each that is nested in it."""
     grid, cfa, photons, sensor = recipe.grid.camera_grid(), recipe.cfa, recipe.photons, recipe.sensor
     counts = detect(arrivals, grid, cfa, sensor, recipe.seed)
@@ -166,10 +160,11 @@ def write_counts(recipe: Recipe, arrivals: Arrivals, out: Path) -> dict[str, Any
             own = counts.take(nested_subset(counts, arrivals, photons, budget, recipe.seed))
         if sensor.counter_bits is not None:
             own = saturate(own, grid, sensor.counter_bits, recipe.seed)
+        own = own.by_pixel(grid)
         events = PhotonCounts.from_events(own.k, own.l, own.i, own.j, own.n, grid, cfa=cfa)
         _write_events(out / nested_name(COUNTS, budget), events)
-        origins = origins_of(own, grid) if recipe.products.truth else None
-        if origins is not None:
+        if recipe.products.truth and own.object_id is not None and own.z_mm is not None:
+            origins = {"object_id": own.object_id.repeat(own.n), "z_mm": own.z_mm.repeat(own.n)}
             write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
         told = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
@@ -210,11 +205,11 @@ def _scope_pixels(recipe: Recipe) -> int | None:
     return scopes.get(recipe.photons.scope)
 
 
-def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:
+def _one_by_one(arrivals: PhotonTable, recipe: Recipe) -> PhotonTable:
     """A row for each photon, with its scope and a random rank there, so that budgets can be nested."""
     total = int(arrivals.n.sum())
     grid = recipe.grid.camera_grid()
-    rows = arrivals.take(np.arange(arrivals.k.size).repeat(arrivals.n))
+    rows = arrivals.one_by_one()
     scope = rows.k * grid.cols + rows.l
     if recipe.photons.scope == "scene":
         scope = np.zeros_like(scope)
@@ -223,26 +218,10 @@ def _one_by_one(arrivals: Arrivals, recipe: Recipe) -> Arrivals:
     order = np.lexsort((seeds.generator(recipe.seed, view=1, stage="nested").random(total), scope))
     rank = np.empty(total, dtype=np.int64)
     rank[order] = places(scope[order])
-    return Arrivals(rows.k, rows.l, rows.i, rows.j, np.ones(total, dtype=np.int64), scope, rank)
+    return replace(rows, scope=scope, rank=rank)
 
 
 def _write_events(path: Path, counts: PhotonCounts) -> None:
     index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
     small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
     write_arrays_safely(path, {**small, "n": counts.events.n}, COUNTS_LABELS)
-
-
-def origins_of(counts: Arrivals, grid: CameraGrid) -> dict[str, np.ndarray] | None:
-    """`object_id` (int16) and `z_mm` (float32) of the first hit of every photon, (photons,).
-
-    In the order of the events: by view and pixel. None if not known.
-    """
-    if counts.object_id is None or counts.z_mm is None:
-        return None
-    pixel = np.ravel_multi_index((counts.k, counts.l, counts.i, counts.j), grid.shape_KLHW)
-    order = np.argsort(pixel, kind="stable")
-    order = order.repeat(counts.n[order])
-    return {
-        "object_id": counts.object_id[order].astype(np.int16),
-        "z_mm": counts.z_mm[order].astype(np.float32),
-    }

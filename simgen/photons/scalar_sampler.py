@@ -14,6 +14,7 @@ from simgen.base.srgb import LUMINANCE
 from simgen.photons.candidates import Accepted, Setup, chances
 from simgen.photons.majorant import Majorant, Samples
 from simgen.renderer.backend import shape_numbers
+from simgen.sensor.photon_table import PhotonTable
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""
@@ -71,16 +72,16 @@ class SinglePool:
         kept, over = np.flatnonzero(multiplicity), np.flatnonzero(ratio > 1)
         photon = rays.take(kept)
         return Accepted(
-            k=photon.k,
-            l=photon.l,
-            i=photon.row,
-            j=photon.col,
-            row_px=photon.row_px,
-            col_px=photon.col_px,
-            object_id=object_id[kept],
-            z_mm=z_mm[kept],
+            photons=PhotonTable(
+                k=photon.k,
+                l=photon.l,
+                i=photon.row,
+                j=photon.col,
+                n=multiplicity[kept],
+                object_id=object_id[kept],
+                z_mm=z_mm[kept],
+            ),
             candidate=candidate[kept],
-            multiplicity=multiplicity[kept],
             ratio=ratio,
             over=self._samples(rays.take(over), z_mm[over], light[over]),
         )

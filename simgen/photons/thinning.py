@@ -18,7 +18,7 @@ the majorant as it is by then.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,11 @@ import numpy as np
 from pcii.core.bayer import colour_cells
 from pcii.core.console import Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, PhotonPaths, Setup, paths_of
+from simgen.photons.candidates import CandidateSampler, Setup, paths_of
 from simgen.photons.majorant import Majorant
 from simgen.photons.pilot import explore
 from simgen.photons.samplers import sampler_for
+from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
 OVERSHOOT_SHARE = 1e-4
@@ -45,26 +46,6 @@ LIKELY_SHARE = 0.3
 LEAST_SHARE = 1e-4
 WAVEFRONT = 1 << 21
 """Candidates traced at once at most."""
-KINDS = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int32) | {
-    "row_px": np.float32,
-    "col_px": np.float32,
-    "object_id": np.int16,
-    "z_mm": np.float32,
-}
-"""How the columns of a list of photons are kept."""
-
-
-@dataclass(frozen=True)
-class PhotonList(PhotonPaths):
-    """One path for each photon (N,), ordered by view and pixel.
-
-    `scope` is the number of the scope that each was drawn for and `rank` its place there: the first n
-    of a scope are themselves an exact draw of n photons. `log` says how they came about.
-    """
-
-    scope: np.ndarray
-    rank: np.ndarray
-    log: dict[str, Any]
 
 
 @dataclass
@@ -108,8 +89,10 @@ def thin_photons(
     seed: int,
     photons_per_radiance: float | None = None,
     report: Report = silent,
-) -> PhotonList:
-    """All photons of all views; the same for the same setup, settings and seed.
+) -> tuple[PhotonTable, dict[str, Any]]:
+    """All photons of all views, ordered by view and pixel, and a log of how they came about.
+
+    One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     """
@@ -133,10 +116,10 @@ class _Drawing:
         self.share = LIKELY_SHARE
         self.attempt = 0
 
-    def run(self) -> PhotonList:
+    def run(self) -> tuple[PhotonTable, dict[str, Any]]:
         """Warm up and draw, anew if too many photons came in clumps."""
         paths = self.pilot.paths
-        drawn: list[dict[str, np.ndarray]] = []
+        drawn: list[PhotonTable] = []
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
@@ -160,7 +143,7 @@ class _Drawing:
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        return _joined(self.setup, drawn, log)
+        return joined([no_photons(), *drawn]).by_pixel(self.setup.grid), log
 
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""
@@ -200,7 +183,7 @@ class _Drawing:
             found = pool.try_candidates(group, None, path_seed)
             paths += paths_of(pool, number, found.ratio.size)
             factor = _factor(found.ratio)
-            self.share = max(found.multiplicity.sum() / number / factor, LEAST_SHARE)
+            self.share = max(found.photons.n.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
             majorant.lift(found.over)
         return paths
@@ -212,7 +195,7 @@ class _Drawing:
     def _pool(self) -> CandidateSampler:
         return sampler_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
 
-    def _budgeted(self) -> Iterator[dict[str, np.ndarray]]:
+    def _budgeted(self) -> Iterator[PhotonTable]:
         """Rounds of candidates until every scope has its photons, or is dark."""
         for number, block in enumerate(_blocks(self.scopes.wanted)):
             round_number = 0
@@ -225,7 +208,7 @@ class _Drawing:
                 got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
                 self.report(self._stage("photons"), got, wanted)
 
-    def _exposed(self) -> Iterator[dict[str, np.ndarray]]:
+    def _exposed(self) -> Iterator[PhotonTable]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
         assert self.gain is not None
         views = np.arange(self.setup.grid.view_count)
@@ -244,7 +227,7 @@ class _Drawing:
 
     def _round(
         self, scopes: np.ndarray, candidates: np.ndarray, pool: CandidateSampler, number: int, part: int
-    ) -> dict[str, np.ndarray]:
+    ) -> PhotonTable:
         """Photons of one round: so many candidates for each of these scopes."""
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
@@ -252,7 +235,7 @@ class _Drawing:
         found = pool.try_candidates(self.scopes.group[owner], views, path_seed)
         # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
         pool.majorant.lift(found.over, reach=1 + self.attempt)
-        path = np.arange(found.k.size).repeat(found.multiplicity)
+        path = np.arange(found.candidate.size).repeat(found.photons.n)
         scope = owner[found.candidate[path]]
         rank = places(scope) + self.scopes.got[scope]
         taken = rank < self.scopes.wanted[scope]
@@ -264,10 +247,9 @@ class _Drawing:
         self.tally.paths += paths_of(pool, owner.size, found.ratio.size)
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
-        self.share = max(found.multiplicity.sum() / max(owner.size, 1), LEAST_SHARE)
-        own = {field.name: getattr(found, field.name) for field in fields(PhotonPaths)}
-        columns = {name: column[path] for name, column in own.items()} | {"scope": scope, "rank": rank}
-        return {name: column.astype(KINDS[name]) for name, column in columns.items()}
+        self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)
+        photons = found.photons.take(path)
+        return replace(photons, n=np.ones_like(photons.n), scope=scope, rank=rank)
 
 
 def _factor(ratio: np.ndarray) -> float:
@@ -301,16 +283,3 @@ def places(scope: np.ndarray) -> np.ndarray:
     number = np.bincount(scope)
     first = np.cumsum(number) - number
     return np.arange(scope.size) - first[scope]
-
-
-def _joined(setup: Setup, drawn: list[dict[str, np.ndarray]], log: dict[str, Any]) -> PhotonList:
-    """All batches as one list, ordered by view and pixel, those of one pixel as they were drawn."""
-    drawn = [{name: np.zeros(0, kind) for name, kind in KINDS.items()}, *drawn]
-    pixel = np.concatenate(
-        [np.ravel_multi_index([b[n] for n in "klij"], setup.grid.shape_KLHW) for b in drawn]
-    )
-    # With the place in the list as a last digit no two are equal, and any sort will do.
-    order = np.argsort(pixel * pixel.size + np.arange(pixel.size))
-    # A column leaves its batches when it is joined: there may be tens of millions of photons.
-    columns = {name: np.concatenate([batch.pop(name) for batch in drawn])[order] for name in KINDS}
-    return PhotonList(**columns, log=log)

@@ -12,6 +12,7 @@ from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
 from simgen.renderer.wavelengths import light_of, of_colour
+from simgen.sensor.photon_table import PhotonTable
 
 LEAST_GUESS = 1e-30
 
@@ -117,18 +118,18 @@ class LanePool:
         candidate, multiplicity = dr.gather(mi.UInt32, rest, kept), dr.gather(mi.UInt32, multiplicity, kept)
         dr.eval(vars(photon), hit.shape, hit.z_mm, candidate, multiplicity)
         return Accepted(
+            photons=PhotonTable(
+                k=np.array(photon.k),
+                l=np.array(photon.l),
+                i=np.array(photon.row),
+                j=np.array(photon.col),
+                n=np.array(multiplicity),
+                object_id=setup.render_scene.object_of_shape[np.array(hit.shape)],
+                z_mm=np.array(hit.z_mm),
+            ),
             candidate=np.array(candidate),
-            k=np.array(photon.k).astype(np.int64),
-            l=np.array(photon.l).astype(np.int64),
-            i=np.array(photon.row).astype(np.int64),
-            j=np.array(photon.col).astype(np.int64),
-            row_px=np.array(photon.row_px),
-            col_px=np.array(photon.col_px),
-            object_id=setup.render_scene.object_of_shape[np.array(hit.shape)],
-            z_mm=np.array(hit.z_mm),
-            multiplicity=np.array(multiplicity).astype(np.int64),
-            over=self._exceeding(lanes, first, light, over) if len(over) else nothing(setup.channels).over,
             ratio=np.array(ratio),
+            over=self._exceeding(lanes, first, light, over) if len(over) else nothing(setup.channels).over,
         )
 
     def look_around(self, number: int, follow: int, seed: int) -> Samples:

@@ -82,7 +82,7 @@ def one_by_one(folder: Path) -> np.ndarray:
     built = made(
         [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
     )
-    photons = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
+    photons, _ = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
     found = np.zeros((VIEWS, SIDE, SIDE))
     np.add.at(found, (10 * photons.k + photons.l, photons.i, photons.j), 1)
     return found

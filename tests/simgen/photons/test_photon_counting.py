@@ -22,7 +22,8 @@ from simgen.photons.photon_counting import PROBE_SEED, Plan, draw_from_views, pl
 from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.detector import Arrivals, nested_subset
+from simgen.sensor.detector import nested_subset
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PATHS, Recipe
 from simgen.spec.scene import Scene, load_scene
 
@@ -49,7 +50,7 @@ def mosaic_of(k: int, l: int) -> np.ndarray:
     return (1 + 2 * k + l) * ((7 * np.arange(HEIGHT * WIDTH)) % 23.0).reshape(HEIGHT, WIDTH)
 
 
-def dense(made: Recipe) -> Arrivals:
+def dense(made: Recipe) -> PhotonTable:
     return draw_from_views(made, mosaic_of, PLAN, silent)[0]
 
 
@@ -59,14 +60,14 @@ def two_objects() -> RenderScene:
     return build(backend.load(), found, folder, 3)
 
 
-def counted(counts: Arrivals, made: Recipe) -> np.ndarray:
+def counted(counts: PhotonTable, made: Recipe) -> np.ndarray:
     """Counts per pixel, (V, H, W)."""
     found = np.zeros(made.grid.camera_grid().shape_KLHW, dtype=np.int64)
     np.add.at(found, (counts.k, counts.l, counts.i, counts.j), counts.n)
     return found.reshape(-1, HEIGHT, WIDTH)
 
 
-def subset(arrivals: Arrivals, made: Recipe, budget: float) -> Arrivals:
+def subset(arrivals: PhotonTable, made: Recipe, budget: float) -> PhotonTable:
     if budget == made.photons.budget:
         return arrivals
     return arrivals.take(nested_subset(arrivals, arrivals, made.photons, budget, made.seed))
@@ -164,6 +165,7 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
         arrivals = dense(made)
         found += counted(subset(arrivals, made, 8), made)
         in_order = np.arange(arrivals.k.size)
+        assert arrivals.scope is not None
         start = np.searchsorted(arrivals.scope, np.arange(4))
         first_rows += counted(arrivals.take(in_order - start[arrivals.scope] < 8), made)
     lit = expected > 0
@@ -267,14 +269,14 @@ def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
 
 
-def from_known_places(made: Recipe) -> Arrivals:
+def from_known_places(made: Recipe) -> PhotonTable:
     """Photons in random order; each of an object and from a depth that tell its pixel."""
     rng = np.random.default_rng(1)
     shape = made.grid.camera_grid().shape_KLHW
     flat = rng.integers(0, np.prod(shape), 900)
     ones = np.ones(flat.size, dtype=np.int64)
     k, l, i, j = np.unravel_index(flat, shape)
-    return Arrivals(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
+    return PhotonTable(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
 
 
 @pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"counter_bits": 2}])

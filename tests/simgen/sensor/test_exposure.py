@@ -13,9 +13,9 @@ from simgen.photons.photon_counting import Plan, absolute_gain, draw_from_views,
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import Arrivals
 from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
 from simgen.sensor.mosaic import sense
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Exposure, Recipe
 from simgen.spec.scene import Scene
 from simgen.spectral.filters import filters_for
@@ -24,7 +24,7 @@ from simgen.spectral.spectra import illuminant, integral, observer, patch, sensi
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
 """Photons per pixel: 16 of 555 nm. The 4.09e15 in a lumen second are rounded to 1 in 1000."""
-Draw = Callable[[Recipe, RenderScene], Arrivals]
+Draw = Callable[[Recipe, RenderScene], PhotonTable]
 
 
 def recipe(**changes: object) -> Recipe:
@@ -49,11 +49,11 @@ def planned(thins: bool) -> Plan:
     return Plan(thins=thins, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 
 
-def thinned(made: Recipe, built: RenderScene) -> Arrivals:
+def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
     return thin(made, built, planned(True))[0]
 
 
-def dense(made: Recipe, built: RenderScene) -> Arrivals:
+def dense(made: Recipe, built: RenderScene) -> PhotonTable:
     grid = made.grid.camera_grid()
 
     def mosaic_of(k: int, l: int) -> np.ndarray:
@@ -63,7 +63,7 @@ def dense(made: Recipe, built: RenderScene) -> Arrivals:
     return draw_from_views(made, mosaic_of, planned(False), silent)[0]
 
 
-def counted(arrivals: Arrivals) -> np.ndarray:
+def counted(arrivals: PhotonTable) -> np.ndarray:
     counts = np.zeros((2, 64, 80), dtype=np.int64)
     np.add.at(counts, (arrivals.l, arrivals.i, arrivals.j), arrivals.n)
     return counts
