@@ -27,7 +27,7 @@ DENSE_VIEWS = 4
 def setup_of(recipe: Recipe) -> Setup:
     """The recipe's scene and cameras, ready to draw from."""
     scene, folder = load_scene(recipe.scene)
-    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe, Path())
+    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
     built = build(mi, scene, folder, recipe.render.max_depth, curves)
     return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
 
@@ -89,7 +89,7 @@ def table() -> Iterator[str]:
 
 
 def _costs(recipe: Recipe, per_photon: float, dense_s: dict[int, float]) -> Iterator[str]:
-    """What `simgen.photons.photon_counting` chooses by."""
+    """What `simgen.photons.counting_plan` chooses by."""
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
     yield "| cost | microseconds |"

@@ -53,10 +53,16 @@ LONGER = {
     "pcii.evidence.prediction_kernels",
     "pcii.removal.likelihood.layers",
     "pcii.sections.dense_kernels",
-    "simgen.dataset.generation",
     "simgen.photons.majorant",
     "simgen.photons.thinning",
     "simgen.photons.wavefront_sampler",
+}
+# Where a whole recipe is known, beside the commands: everything else takes parts of it.
+KNOW_RECIPE = {
+    "simgen.check.targets",
+    "simgen.dataset.generation",
+    "simgen.dataset.prepared",
+    "simgen.dataset.series",
 }
 SMALL_ROOMS = {"depth", "removal.three_step", "app", "spectral", "cameras"}
 
@@ -140,6 +146,12 @@ def test_rooms_lean_on_those_before_them(package: str) -> None:
             if here and there != here:
                 assert there, f"{name} imports the root"
                 assert rank[there] < rank[here], f"{name} imports {other}"
+
+
+def test_stages_take_the_parts_of_a_recipe_that_they_need() -> None:
+    for name, tree in modules("simgen").items():
+        if "simgen.spec.recipe.Recipe" in all_imports(tree):
+            assert name in KNOW_RECIPE or room_of(name) == "app", name
 
 
 @pytest.mark.parametrize("package", ROOMS)

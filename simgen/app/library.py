@@ -15,12 +15,13 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import PhotonTruth, Truth
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
-from simgen.cameras.rig import centre_camera, rig_of
+from simgen.cameras.rig import centre_camera
 from simgen.dataset import generation
-from simgen.dataset.prepared import Prepared
+from simgen.dataset.prepared import Prepared, capture_of, needs_of
 from simgen.dataset.resources import check_resources
 from simgen.figures.preview_picture import write_preview
-from simgen.photons.photon_counting import draw_from_views, plan, thin
+from simgen.photons.counting_plan import plan
+from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.sensor.detector import detect
@@ -124,21 +125,20 @@ def draw_photons(
     }
     recipe = validate(Recipe, values, "draw_photons")
     render_scene = Prepared(recipe, scene.scene, scene.folder, None).render_scene()
-    made = plan(recipe, render_scene, backend.choose().kind)
-    check_resources(recipe, made, Path())
-    rig = rig_of(recipe)
+    capture = capture_of(recipe)
+    made = plan(capture, render_scene, backend.choose().kind)
+    check_resources(needs_of(recipe), made, Path())
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:
         own = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
-        return sense(
-            render_view(render_scene, rig, k, l, samples_per_pixel=made.samples, seed=own), recipe.cfa
-        )
+        image = render_view(render_scene, capture.rig, k, l, samples_per_pixel=made.samples, seed=own)
+        return sense(image, recipe.cfa)
 
     if made.thins:
-        arrivals, _ = thin(recipe, render_scene, made, report)
+        arrivals, _ = thin(capture, render_scene, recipe.render.max_depth, made, report)
     else:
-        arrivals, _ = draw_from_views(recipe, mosaic_of, made, report)
+        arrivals, _ = draw_from_views(capture, mosaic_of, made, report)
     counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed).by_pixel(grid)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa

@@ -12,8 +12,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
-from simgen.spec.camera_grid import CalibrationErrors, Lens
-from simgen.spec.recipe import Recipe
+from simgen.spec.camera_grid import CalibrationErrors, Grid, Lens
 
 # The pinhole is the origin of every ray, so nothing nearer than this is ever cut away in practice.
 NEAR_CLIP_MM = 0.01
@@ -115,14 +114,13 @@ Cameras = CameraGrid | Rig
 """A bare grid stands for pinholes exactly where they ought to be."""
 
 
-def rig_of(recipe: Recipe) -> Rig:
-    """The cameras of a recipe, with their errors and lens; the same for the same recipe and seed."""
-    grid, errors = recipe.grid.camera_grid(), recipe.grid.errors
-    perfect = as_rig(grid)
+def rig_of(grid: Grid, seed: int) -> Rig:
+    """The cameras that a recipe's grid describes, with their errors and lens; the same for the same seed."""
+    perfect = as_rig(grid.camera_grid())
     position_mm, rotation = perfect.position_mm, perfect.rotation
-    if errors is not None:
-        position_mm, rotation = _put_wrong(position_mm, errors, recipe.seed)
-    return Rig(grid, position_mm, rotation, recipe.grid.lens)
+    if grid.errors is not None:
+        position_mm, rotation = _put_wrong(position_mm, grid.errors, seed)
+    return Rig(perfect.grid, position_mm, rotation, grid.lens)
 
 
 def as_rig(cameras: Cameras) -> Rig:

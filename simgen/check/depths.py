@@ -121,7 +121,7 @@ def focus_findings(facts: Facts) -> list[Finding]:
         remedy = f"add {round(thing.middle_mm)} to analysis.z_mm"
         poor = share < LEAST_FOCUS_SHARE
         found.append(Finding("warn" if poor else "ok", "focus", text, remedy if poor else ""))
-    for z in facts.recipe.analysis.z_mm:
+    for z in facts.analysis.z_mm:
         if z not in used:
             text = f"no object is in focus at the plane {z:g} mm"
             found.append(Finding("warn", "focus", text, "take it from analysis.z_mm or move an object there"))
@@ -134,7 +134,7 @@ def focus_share(facts: Facts, thing: ObjectFacts, z_mm: float) -> float:
 
 
 def _range_findings(facts: Facts) -> list[Finding]:
-    limits = facts.recipe.analysis.z_range_mm
+    limits = facts.analysis.z_range_mm
     if limits is None or not facts.seen:
         return []
     outside = [t.name for t in facts.seen if t.z_mm.min() < limits[0] or t.z_mm.max() > limits[1]]
@@ -162,7 +162,7 @@ def overlap_findings(facts: Facts) -> list[Finding]:
 
 def alias_findings(facts: Facts) -> list[Finding]:
     """Planes at which the cameras' shifts leave voxels without one of the colours of the Bayer pattern."""
-    grid, cfa = facts.grid, facts.recipe.cfa
+    grid, cfa = facts.grid, facts.sensor.bayer
     if cfa is None or not facts.planes_mm:
         return []
     found = []

@@ -16,16 +16,15 @@ from simgen.base import random_streams as seeds
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
 from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, seen_alone
-from simgen.dataset.prepared import Prepared
+from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes
-from simgen.photons.photon_counting import plan
+from simgen.photons.counting_plan import plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.sensor.mosaic import sense
 from simgen.spec.lights import AreaLight
 from simgen.spec.materials import Glass
-from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
 
@@ -42,9 +41,11 @@ def probe_scene(target: Prepared) -> Facts:
     compiled = kind != "scalar"
     render_scene = target.render_scene()
     grid = recipe.grid.camera_grid()
-    made = plan(recipe, render_scene, kind) if recipe.products.counts else None
+    made = None
+    if recipe.products.counts:
+        made = plan(capture_of(recipe), render_scene, kind, least_samples(recipe))
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
-    image, path_s = _picture(render_scene, small, recipe)
+    image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, small)
     rows, cols = {0, grid.rows - 1}, {0, grid.cols - 1}
     begun = time.perf_counter()
@@ -62,7 +63,12 @@ def probe_scene(target: Prepared) -> Facts:
         for number, name in render_scene.names.items()
     ]
     return Facts(
-        recipe=recipe,
+        grid=grid,
+        sensor=recipe.sensor,
+        photons=recipe.photons,
+        render=recipe.render,
+        analysis=recipe.analysis,
+        needs=needs_of(recipe),
         objects=tuple(
             replace(
                 thing,
@@ -100,16 +106,18 @@ def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
     return with_larger_pixels(grid, max(1.0, max(grid.height, grid.width) / side_px), least_px=1)
 
 
-def _picture(render_scene: RenderScene, grid: CameraGrid, recipe: Recipe) -> tuple[np.ndarray, float]:
+def _picture(
+    render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int
+) -> tuple[np.ndarray, float]:
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
     total, spent = np.zeros((grid.height, grid.width, 1)), 0.0
     for part in (2, 3):  # 0 and 1 are those of the plan; the first here compiles, the second is timed
-        seed = seeds.integer(recipe.seed, view=0, stage="probe", part=part)
+        path_seed = seeds.integer(seed, view=0, stage="probe", part=part)
         begun = time.perf_counter()
-        total = total + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=seed) / 2
+        total = total + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
         spent = time.perf_counter() - begun
-    image = total if recipe.cfa is not None else sense(total, None)[..., None]
+    image = total if cfa is not None else sense(total, None)[..., None]
     return image, spent / (SAMPLES * grid.height * grid.width)
 
 

@@ -113,7 +113,7 @@ def _in_millimetres(z_mm: float) -> str:
 
 
 def _glass_findings(facts: Facts) -> list[Finding]:
-    depth = facts.recipe.render.max_depth
+    depth = facts.render.max_depth
     if not facts.glass or depth >= LEAST_GLASS_DEPTH:
         return []
     text = f"{listed(list(facts.glass))}: paths of {depth} segments end inside glass, which looks dark"
@@ -151,7 +151,7 @@ def _lamp_findings(facts: Facts) -> list[Finding]:
         remedy = "point a lamp at the objects, or add a light of type 'uniform'"
         found.append(Finding("bad", "lights", "nothing that the cameras see is lit", remedy))
     elif not found:
-        unit = "cd/m^2, as the camera's pixels see it" if facts.recipe.is_spectral else "cd/m^2"
+        unit = "cd/m^2, as the camera's pixels see it" if facts.sensor.is_spectral else "cd/m^2"
         text = f"the picture's mean luminance is {facts.luminance:.3g} {unit}"
         found.append(Finding("ok", "lights", text))
     return found

@@ -1,9 +1,11 @@
 """Photon counts: by thinning a majorant, or from rendered views, and which of the two.
 
 candidates         Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
+counting_plan      How photon counts will be made: thinned one by one or drawn from rendered views, and
+                   what led to it.
 majorant           How bright it can get where: the majorant from which photon candidates are drawn.
-photon_counting    The photon counts of a dataset: which way they are made, what the sensor does to them,
-                   where they go.
+photon_counting    The photon counts of a dataset: thinned or drawn from views, counted by the sensor,
+                   written.
 pilot              The pilot: a few paths that find where there is light, and from them the first
                    majorant.
 rendering_noise    How many samples a dense rendering needs for its noise not to show in the photon

@@ -83,6 +83,16 @@ class Sensor(Strict):
     full_light: FullLight | None = None
     """Makes the full-light images those of a camera instead of exact radiance."""
 
+    @property
+    def bayer(self) -> str | None:
+        """Bayer pattern, None for a monochrome sensor."""
+        return None if self.cfa == "none" else self.cfa
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether light is traced as spectra."""
+        return self.camera is not None
+
 
 class Photons(Strict):
     """How much light there is."""
@@ -221,12 +231,12 @@ class Recipe(Strict):
     @property
     def is_spectral(self) -> bool:
         """Whether light is traced as spectra."""
-        return self.sensor.camera is not None
+        return self.sensor.is_spectral
 
     @property
     def cfa(self) -> str | None:
         """Bayer pattern, None for a monochrome sensor."""
-        return None if self.sensor.cfa == "none" else self.sensor.cfa
+        return self.sensor.bayer
 
 
 def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path]:

@@ -1,6 +1,7 @@
 """The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,9 @@ import numpy as np
 from pcii.core.console import Report
 from pcii.io.dataset_layout import TRUTH, TRUTH_LABELS
 from pcii.io.zarr_groups import new_array, new_group_safely
-from simgen.cameras.rig import Rig, centre_camera, rig_of
+from simgen.cameras.rig import Rig, centre_camera
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.spec.recipe import Recipe, ViewPass
+from simgen.spec.recipe import Products, ViewPass
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
 from simgen.truth.pixel_coverage import coverage
 from simgen.truth.visibility import visible_views
@@ -19,12 +20,22 @@ from simgen.truth.visibility import visible_views
 RAYS = "visibility_rays"
 
 
-def write_truth(recipe: Recipe, render_scene: RenderScene, out: Path, report: Report) -> None:
-    """Write what the recipe asks for, unless it is there already; one view in memory at a time."""
+@dataclass(frozen=True)
+class TruthRequest:
+    """What is wanted of the truth: products, planes of which to say what is in focus, poses of cameras."""
+
+    products: Products
+    planes_mm: tuple[float, ...]
+    camera_poses: bool
+
+
+def write_truth(
+    request: TruthRequest, render_scene: RenderScene, rig: Rig, out: Path, report: Report
+) -> None:
+    """Write what is asked for, unless it is there already; one view in memory at a time."""
     if (out / TRUTH).is_dir():
         return
-    rig, products, planes = rig_of(recipe), recipe.products, recipe.analysis.z_mm
-    grid = rig.grid
+    grid, products, planes = rig.grid, request.products, request.planes_mm
     with new_group_safely(out / TRUTH, {}) as group:
         if products.truth:
             centre = first_hits_at_centre(render_scene, grid)
@@ -34,7 +45,7 @@ def write_truth(recipe: Recipe, render_scene: RenderScene, out: Path, report: Re
             if planes:
                 _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
                 group.attrs["in_focus_z_mm"] = list(planes)
-            if recipe.grid.errors is not None:
+            if request.camera_poses:
                 _store(group, "camera_position_mm", rig.position_mm)
                 _store(group, "camera_rotation", rig.rotation)
             if products.visibility:

@@ -58,7 +58,7 @@ def made(
     if spectral:
         grid = {"rows": 1, "cols": 1, "height": 2, "width": 2}
         recipe = Recipe.model_validate({"scene": "-", "grid": grid, "sensor": {"camera": CAMERA}})
-        curves = sensitivities(recipe, Path())
+        curves = sensitivities(recipe.sensor, Path())
     return build(mi, Scene.model_validate(values), folder, max_depth, curves)
 
 

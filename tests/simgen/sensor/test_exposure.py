@@ -9,7 +9,9 @@ import pytest
 
 from pcii.core.bayer import colour_index
 from pcii.core.console import silent
-from simgen.photons.photon_counting import Plan, absolute_gain, draw_from_views, plan, thin
+from simgen.dataset.prepared import capture_of
+from simgen.photons.counting_plan import Plan, plan
+from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
@@ -50,7 +52,7 @@ def planned(thins: bool) -> Plan:
 
 
 def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
-    return thin(made, built, planned(True))[0]
+    return thin(capture_of(made), built, made.render.max_depth, planned(True))[0]
 
 
 def dense(made: Recipe, built: RenderScene) -> PhotonTable:
@@ -60,7 +62,7 @@ def dense(made: Recipe, built: RenderScene) -> PhotonTable:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
         return sense(image, made.cfa)
 
-    return draw_from_views(made, mosaic_of, planned(False), silent)[0]
+    return draw_from_views(capture_of(made), mosaic_of, planned(False), silent)[0]
 
 
 def counted(arrivals: PhotonTable) -> np.ndarray:
@@ -133,12 +135,12 @@ def test_a_longer_exposure_gives_more_photons(lit_evenly: RenderScene, draw: Dra
 
 @pytest.mark.renders
 def test_the_plan_expects_the_photons_by_hand(lit_evenly: RenderScene) -> None:
-    made = plan(recipe(), lit_evenly, "llvm")
+    made = plan(capture_of(recipe()), lit_evenly, "llvm")
     assert made.photons_per_view == pytest.approx(64 * 80 * BY_HAND, rel=1e-3)
     assert made.noise == pytest.approx(0, abs=1e-6)  # single precision: an even light has no noise
     assert made.samples == 1
 
 
 def test_a_budget_knows_no_exposure() -> None:
-    assert absolute_gain(recipe(photons={"budget": 10.0})) is None
-    assert absolute_gain(recipe()) == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)
+    assert capture_of(recipe(photons={"budget": 10.0})).photons_per_radiance is None
+    assert capture_of(recipe()).photons_per_radiance == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)
