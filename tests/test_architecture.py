@@ -64,7 +64,7 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.dataset.series",
 }
-SMALL_ROOMS = {"depth", "removal.three_step", "app", "spectral", "cameras"}
+SMALL_ROOMS = {"depth", "removal.three_step", "app", "spectral"}
 
 
 def modules(package: str) -> dict[str, ast.Module]:

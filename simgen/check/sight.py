@@ -1,7 +1,7 @@
 """Findings on what the cameras see: objects hidden, cut or never seen, cameras inside things, lamps."""
 
-from simgen.cameras.rig import NEAR_CLIP_MM
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts, listed
+from simgen.renderer.mitsuba_camera import NEAR_CLIP_MM
 
 MOST_HIDDEN = 0.5
 MOST_MAGNIFIED = 10.0

@@ -68,7 +68,7 @@ def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
     rig, centre = as_rig(grid), centre_camera(grid)
     ends = [rig.camera(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
     corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
-    across, down = np.ptp(_projected(corners, centre), axis=0).tolist()
+    across, down = np.ptp(centre.film_px(corners), axis=0).tolist()
     return OnFilm((across, down), any(_meets(corners, one) for one in (centre, *ends)))
 
 
@@ -104,14 +104,7 @@ def _lamps_at(scene: Scene, points: np.ndarray) -> Counter[str]:
     return Counter(names[nearest] for nearest in np.argmin(list(away.values()), axis=0).tolist())
 
 
-def _projected(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Columns and rows (N, 2) of points before a camera, in px from the film's middle."""
-    x, y, z = ((points - camera.position_mm) @ camera.rotation).T
-    scale_px = camera.grid.focal_mm / camera.grid.pixel_mm
-    return np.stack([x / z * scale_px + camera.shift_px[0], y / z * scale_px + camera.shift_px[1]], axis=1)
-
-
 def _meets(points: np.ndarray, camera: Camera) -> bool:
     """Whether the outline of points reaches onto the film."""
-    px, half = _projected(points, camera), np.array([camera.grid.width, camera.grid.height]) / 2
+    px, half = camera.film_px(points), np.array([camera.grid.width, camera.grid.height]) / 2
     return bool(np.all(px.min(axis=0) < half) and np.all(px.max(axis=0) > -half))

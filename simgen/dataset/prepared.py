@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simgen.cameras.rig import rig_of
+from simgen.cameras.calibration import rig_of
 from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Capture
 from simgen.renderer import backend

@@ -10,7 +10,8 @@ from pcii.core.bayer import colour_cells
 from simgen.photons.candidates import Accepted, Setup, chances, nothing
 from simgen.photons.majorant import NEXT_LAYERS, Majorant, Samples
 from simgen.renderer.backend import load_drjit
-from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
+from simgen.renderer.mitsuba_camera import film_rays
+from simgen.renderer.path_tracing import FirstHits, hit_first, radiance_along
 from simgen.renderer.wavelengths import light_of, of_colour
 from simgen.sensor.photon_table import PhotonTable
 

@@ -7,13 +7,11 @@ varies, the fewer candidates are needed. Everything here stays on the renderer's
 of one lane a ray. Needs a compiled backend.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from simgen.cameras.rig import Rig
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.wavelengths import Light
@@ -42,44 +40,6 @@ class FirstHits:
     shape: Any
     z_mm: Any
     guess: Any
-
-
-def film_rays(
-    render_scene: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
-) -> Any:
-    """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`."""
-    mi, dr, grid = render_scene.mi, load_drjit(), rig.grid
-    camera = k * grid.cols + l
-
-    def own(values: np.ndarray) -> Any:
-        if (values == values.flat[0]).all():
-            return float(values.flat[0])  # what all cameras share needs no look-up
-        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
-
-    def turned(*vector: Any) -> list[Any]:
-        columns = range(len(vector))
-        return [_dot([own(rig.rotation[..., row, col]) for col in columns], vector) for row in range(3)]
-
-    per_px = grid.pixel_mm / grid.focal_mm
-    x = (col_px - own((grid.width - 1) / 2 + rig.shift_px[..., 0])) * per_px
-    y = (row_px - own((grid.height - 1) / 2 + rig.shift_px[..., 1])) * per_px
-    origin = mi.Point3f(*(own(rig.position_mm[..., axis]) for axis in range(3)))
-    if rig.lens is not None:
-        x, y = x - lens_point.x / rig.lens.focus_mm, y - lens_point.y / rig.lens.focus_mm
-        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
-    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
-    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
-
-
-def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
-    """Sum of products, but for what is multiplied by a plain 0 or 1."""
-    parts = zip(row, vector, strict=True)
-    terms = [part if isinstance(f, float) and f == 1 else f * part for f, part in parts if not _is_zero(f)]
-    return sum(terms[1:], terms[0]) if terms else 0
-
-
-def _is_zero(factor: Any) -> bool:
-    return isinstance(factor, float) and factor == 0
 
 
 def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:

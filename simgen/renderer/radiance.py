@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from simgen.cameras.rig import Cameras, as_rig, sensor_plugin
+from simgen.cameras.rig import Cameras, as_rig
+from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_colours import spectrum_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral.filters import Filters

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.cameras.rig import Camera, Cameras, as_rig, centre_camera, sensor_plugin
+from simgen.cameras.rig import Camera, Cameras, as_rig, centre_camera
+from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
 
 IN_FOCUS_PX = 1.0

@@ -15,12 +15,13 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from pcii.core.geometry import project_px
 from simgen.base.strict_models import validate
-from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
+from simgen.cameras.calibration import rig_of, turn
+from simgen.cameras.rig import Cameras, Rig, as_rig
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
+from simgen.renderer.mitsuba_camera import film_rays
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.path_tracing import film_rays
 from simgen.renderer.radiance import render_view
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import Lens

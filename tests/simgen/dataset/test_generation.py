@@ -15,7 +15,7 @@ from pcii.core.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
 from pcii.io.verification import verify
-from simgen.cameras.rig import rig_of
+from simgen.cameras.calibration import rig_of
 from simgen.dataset import rendered_views
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import Prepared
