@@ -53,9 +53,6 @@ LONGER = {
     "pcii.evidence.prediction_kernels",
     "pcii.removal.likelihood.layers",
     "pcii.sections.dense_kernels",
-    "simgen.photons.majorant",
-    "simgen.photons.thinning",
-    "simgen.photons.wavefront_sampler",
 }
 # Where a whole recipe is known, beside the commands: everything else takes parts of it.
 KNOW_RECIPE = {

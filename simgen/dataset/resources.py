@@ -16,7 +16,7 @@ import numpy as np
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.errors import InputError
 from simgen.photons.counting_plan import Plan
-from simgen.photons.majorant import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
+from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.spec.camera_grid import Grid
 from simgen.spec.recipe import Exposure, Photons, Products, Sensor
 

@@ -12,7 +12,8 @@ import numpy as np
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Cameras, Rig, as_rig
-from simgen.photons.majorant import Majorant, Samples
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.majorant import Majorant
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.photon_table import PhotonTable, no_photons
 
@@ -85,7 +86,7 @@ class CandidateSampler(Protocol):
         """
         ...
 
-    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
         """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
 
         Those that fall beside the film are left out. How much the others tell depends on the backend.

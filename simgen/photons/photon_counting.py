@@ -15,8 +15,9 @@ from pcii.io.zarr_groups import write_arrays_safely
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan
+from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
-from simgen.photons.thinning import places, thin_photons
+from simgen.photons.thinning import thin_photons
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import detect, nested_subset, saturate
 from simgen.sensor.mosaic import draw_counts, fixed_totals, photon_rates, scope_energies

@@ -7,15 +7,8 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup, paths_of
-from simgen.photons.majorant import (
-    COARSE_TILES,
-    DIM_SHARE,
-    Majorant,
-    Samples,
-    fit,
-    frame_for,
-    tile_px_for,
-)
+from simgen.photons.disparity_layers import Samples, frame_for, tile_px_for
+from simgen.photons.majorant import COARSE_TILES, DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
 
 EVEN_PATHS = 1 << 15
@@ -65,7 +58,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
     looks = int(np.clip(expected(mean), *AIMED_LOOKS))
     followed = int(FOLLOWED_SHARE * looks)
-    aimed = pool.look_around(looks, followed, seed_of_part)
+    aimed = pool.trace_pilot(looks, followed, seed_of_part)
     known = even.join(aimed)
     majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)
     return Pilot(majorant, mean, ambient, paths + paths_of(pool, looks, followed), pool.max_dark_candidates)
@@ -78,7 +71,7 @@ def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples,
     part, paths, spent = 0, EVEN_PATHS, 0
     while True:
         number = seeds.integer(seed, view=1, stage="pilot", part=part)
-        even = pool.look_around(paths, paths, number)
+        even = pool.trace_pilot(paths, paths, number)
         spent += paths_of(pool, paths, paths)
         if even.light.any() or paths >= pool.max_dark_candidates:
             return even, spent

@@ -6,8 +6,8 @@ import numpy as np
 
 from simgen.photons.candidates import CandidateSampler, Setup
 from simgen.photons.majorant import Majorant
-from simgen.photons.scalar_sampler import SinglePool
-from simgen.photons.wavefront_sampler import LanePool
+from simgen.photons.scalar_sampler import ScalarSampler
+from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.renderer.path_tracing import surrounding_radiance
 from simgen.renderer.wavelengths import light_of
 
@@ -17,8 +17,8 @@ def sampler_for(
 ) -> CandidateSampler:
     """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
     if _is_scalar(setup):
-        return SinglePool(setup, majorant, groups)
-    return LanePool(setup, majorant, groups, ambient)
+        return ScalarSampler(setup, majorant, groups)
+    return WavefrontSampler(setup, majorant, groups, ambient)
 
 
 def surroundings(setup: Setup) -> np.ndarray:

@@ -12,7 +12,8 @@ import numpy as np
 from pcii.core.bayer import colour_cells
 from simgen.base.srgb import LUMINANCE
 from simgen.photons.candidates import Accepted, Setup, chances
-from simgen.photons.majorant import Majorant, Samples
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.majorant import Majorant
 from simgen.renderer.backend import shape_numbers
 from simgen.sensor.photon_table import PhotonTable
 
@@ -45,7 +46,7 @@ class _Rays:
         return _Rays(**{name: column[which] for name, column in vars(self).items()})
 
 
-class SinglePool:
+class ScalarSampler:
     """The `CandidateSampler` of scalar mode."""
 
     paths_each, max_dark_candidates = PATHS, 1 << 17
@@ -86,7 +87,7 @@ class SinglePool:
             over=self._samples(rays.take(over), z_mm[over], light[over]),
         )
 
-    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
         """See `candidates`; only those that are followed tell anything."""
         rng = np.random.default_rng(seed)
         rays = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)

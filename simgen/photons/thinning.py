@@ -28,6 +28,7 @@ from pcii.core.console import Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Setup, paths_of
 from simgen.photons.majorant import Majorant
+from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, photon_scopes, places
 from simgen.photons.pilot import explore
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
@@ -44,33 +45,6 @@ EXCESS_SHARE = 5e-5
 LIKELY_SHARE = 0.3
 """Share of the candidates that are kept, until it is known."""
 LEAST_SHARE = 1e-4
-WAVEFRONT = 1 << 21
-"""Candidates traced at once at most."""
-
-
-@dataclass
-class _Scopes:
-    """What photons are counted over, (S,): view (-1: all together), group of cells, and progress."""
-
-    view: np.ndarray
-    group: np.ndarray
-    wanted: np.ndarray
-
-    def __post_init__(self) -> None:
-        self.start()
-
-    def start(self) -> None:
-        """Nothing is drawn yet."""
-        self.got = np.zeros(self.view.size, dtype=np.int64)
-        self.tried = np.zeros(self.view.size, dtype=np.int64)
-
-    def open(self, max_dark_candidates: int) -> np.ndarray:
-        """Numbers of those that still want photons and are not dark.
-
-        Dark are those of which `max_dark_candidates` found nothing.
-        """
-        dark = (self.got == 0) & (self.tried >= max_dark_candidates)
-        return np.flatnonzero((self.got < self.wanted) & ~dark)
 
 
 @dataclass
@@ -107,11 +81,9 @@ class _Drawing:
     ) -> None:
         self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
         self.gain = photons_per_radiance
-        self.groups = [np.arange(4)]
-        if photons.scope == "channel":
-            cells = colour_cells(setup.cfa).ravel()
-            self.groups = [np.flatnonzero(cells == colour) for colour in range(setup.channels)]
-        self.scopes, self.tally = self._scopes(), _Tally()
+        self.groups = cell_groups(photons.scope, setup.cfa)
+        self.scopes = photon_scopes(photons, setup.grid.view_count, len(self.groups), seed)
+        self.tally = _Tally()
         self.pilot = explore(setup, self._expected, seed)
         self.share = LIKELY_SHARE
         self.attempt = 0
@@ -152,22 +124,6 @@ class _Drawing:
         grid, cells = self.setup.grid, colour_cells(self.setup.cfa).ravel()
         return float(self.gain * mean[cells].mean() * grid.view_count * grid.height * grid.width)
 
-    def _scopes(self) -> _Scopes:
-        """The scopes; how many photons each gets of a budget is part of the experiment."""
-        photons, views = self.photons, np.arange(self.setup.grid.view_count)
-        if photons.scope == "scene":
-            views = np.array([-1])
-        groups = np.arange(len(self.groups))
-        view, group = views.repeat(groups.size), np.tile(groups, views.size)
-        if self.gain is not None:
-            wanted = np.full(view.size, np.iinfo(np.int64).max)
-        elif photons.statistics == "multinomial":
-            wanted = np.full(view.size, round(photons.budget))
-        else:
-            totals = seeds.generator(self.seed, view=0, stage="totals")
-            wanted = totals.poisson(photons.budget, view.size)
-        return _Scopes(view, group, wanted)
-
     def _warm_up(self) -> int:
         """Draw candidates for nothing but to lift the majorant where it is exceeded; how many paths it took.
 
@@ -197,11 +153,11 @@ class _Drawing:
 
     def _budgeted(self) -> Iterator[PhotonTable]:
         """Rounds of candidates until every scope has its photons, or is dark."""
-        for number, block in enumerate(_blocks(self.scopes.wanted)):
+        for number, block in enumerate(self.scopes.blocks()):
             round_number = 0
             while (wanting := np.intersect1d(self.scopes.open(self.pilot.max_dark_candidates), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
-                candidates = _candidates_needed(missing, round_number, self.share)
+                candidates = candidates_needed(missing, round_number, self.share)
                 part = self.attempt << 16 | round_number
                 yield self._round(wanting, candidates, self._pool(), number, part)
                 round_number += 1
@@ -261,25 +217,3 @@ def _factor(ratio: np.ndarray) -> float:
     if allowed <= 0:
         return 1.0
     return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))
-
-
-def _blocks(wanted: np.ndarray) -> Iterator[np.ndarray]:
-    """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""
-    block = (np.cumsum(wanted) - 1) // (WAVEFRONT // 4)
-    yield from np.split(np.arange(wanted.size), np.flatnonzero(np.diff(block)) + 1)
-
-
-def _candidates_needed(missing: np.ndarray, round_number: int, share: float) -> np.ndarray:
-    """How many to draw for each scope: about what is missing at first, then enough to be done.
-
-    Together never more than fit a wavefront.
-    """
-    aim = missing if round_number == 0 else missing + 3.5 * np.sqrt(missing) + 4
-    return np.clip(aim / share, 16, max(WAVEFRONT // missing.size, 16)).astype(np.int64)
-
-
-def places(scope: np.ndarray) -> np.ndarray:
-    """Place (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
-    number = np.bincount(scope)
-    first = np.cumsum(number) - number
-    return np.arange(scope.size) - first[scope]

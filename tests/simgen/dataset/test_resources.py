@@ -14,7 +14,7 @@ from simgen.dataset import resources
 from simgen.dataset.prepared import needs_of
 from simgen.dataset.resources import Needs, check_resources, shortage, tile_count
 from simgen.photons.counting_plan import Plan
-from simgen.photons.majorant import frame_for, tile_px_for
+from simgen.photons.disparity_layers import frame_for, tile_px_for
 from simgen.spec.recipe import Recipe
 
 ROOM = 8e9
