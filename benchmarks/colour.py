@@ -18,7 +18,8 @@ from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import Scene
-from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names, sensitivity
+from simgen.spectral.camera_curves import sensitivity
+from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 LAMPS = ("D65", "A")

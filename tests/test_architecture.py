@@ -61,7 +61,7 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.dataset.series",
 }
-SMALL_ROOMS = {"depth", "removal.three_step", "app", "spectral"}
+SMALL_ROOMS = {"depth", "removal.three_step"}
 
 
 def modules(package: str) -> dict[str, ast.Module]:

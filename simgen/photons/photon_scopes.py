@@ -43,7 +43,7 @@ class PhotonScopes:
         yield from np.split(np.arange(self.wanted.size), np.flatnonzero(np.diff(block)) + 1)
 
 
-def photon_scopes(photons: Photons, view_count: int, group_count: int, seed: int) -> PhotonScopes:
+def scopes_for(photons: Photons, view_count: int, group_count: int, seed: int) -> PhotonScopes:
     """The scopes of so many views and groups of cells; how many photons each gets of a budget is random.
 
     An exposure has no budget: its scopes, one a view, take as many as come.

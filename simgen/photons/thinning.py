@@ -28,7 +28,7 @@ from pcii.core.console import Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Setup, paths_of
 from simgen.photons.majorant import Majorant
-from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, photon_scopes, places
+from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, places, scopes_for
 from simgen.photons.pilot import explore
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
@@ -82,7 +82,7 @@ class _Drawing:
         self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
         self.gain = photons_per_radiance
         self.groups = cell_groups(photons.scope, setup.cfa)
-        self.scopes = photon_scopes(photons, setup.grid.view_count, len(self.groups), seed)
+        self.scopes = scopes_for(photons, setup.grid.view_count, len(self.groups), seed)
         self.tally = _Tally()
         self.pilot = explore(setup, self._expected, seed)
         self.share = LIKELY_SHARE

@@ -13,7 +13,7 @@ from pcii.core.bayer import channel_count, colour_index, mosaic
 from pcii.core.errors import InputError
 from simgen.base.srgb import LUMINANCE
 from simgen.spec.recipe import Photons, Sensor
-from simgen.spectral.spectra import sensitivity
+from simgen.spectral.camera_curves import sensitivity
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:

@@ -20,8 +20,9 @@ from simgen.sensor.mosaic import sense
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Exposure, Recipe
 from simgen.spec.scene import Scene
+from simgen.spectral.camera_curves import sensitivity
 from simgen.spectral.filters import filters_for
-from simgen.spectral.spectra import illuminant, integral, observer, patch, sensitivity
+from simgen.spectral.spectra import illuminant, integral, observer, patch
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
