@@ -1,4 +1,4 @@
-"""`simgen check`: what a scene or recipe will give, told without rendering it, but for one coarse probe."""
+"""`simgen check`: what a scene or recipe will give, found without rendering it, but for one coarse probe."""
 
 from collections.abc import Sequence
 

@@ -12,9 +12,9 @@ LEAST_GLASS_DEPTH = 6
 
 def sight_findings(facts: Facts) -> list[Finding]:
     """All findings of this file."""
-    told = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
-    found = [finding for own in told.values() for finding in own]
-    whole = [name for name, own in told.items() if not own]
+    findings_of = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
+    found = [finding for found_here in findings_of.values() for finding in found_here]
+    whole = [name for name, found_here in findings_of.items() if not found_here]
     if whole:
         text = f"the virtual centre and the corner cameras see all of {listed(whole)}"
         found.insert(0, Finding("ok", "objects", text))

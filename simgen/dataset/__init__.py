@@ -7,7 +7,7 @@ manifest_entries  What the manifest says of a dataset: recipe, scene, software, 
 prepared          A recipe with all that it names, and the parts of it that each stage of the work takes.
 rendered_views    Radiance images of every view on disk: products of a dataset, or what its photon counts
                   are drawn from.
-resources         What a recipe takes of the machine, told before any work: memory of each step, bytes of
-                  each product.
+resources         What a recipe takes of the machine, estimated before any work: memory of each step,
+                  bytes of each product.
 series            A recipe at many seeds: one dataset each, alike in everything but chance.
 """

@@ -1,4 +1,4 @@
-"""What a recipe takes of the machine, told before any work: memory of each step, bytes of each product.
+"""What a recipe takes of the machine, estimated before any work: memory of each step, bytes of each product.
 
 `simgen check` reports it and `simgen generate` refuses what does not fit, both by this one estimate. Bytes
 per item were measured, as the growth of the process with the number of items.
@@ -42,12 +42,12 @@ EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
 ROUNDING = 1.05
-"""Two digits are off by up to 5 %: what is told to fit does so."""
+"""Two digits are off by up to 5 %: what is said to fit does so."""
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What of a recipe takes memory and disk; `planes` at which it is told what is in focus."""
+    """What of a recipe takes memory and disk; `planes` is for how many the truth says what is in focus."""
 
     grid: Grid
     sensor: Sensor
@@ -165,7 +165,7 @@ def available_bytes() -> float:
         room = min(
             room, float((group / "memory.max").read_text()) - float((group / "memory.current").read_text())
         )
-    except (OSError, StopIteration, ValueError):  # not told here, or no limit
+    except (OSError, StopIteration, ValueError):  # not known here, or no limit
         pass
     return room
 
@@ -213,7 +213,7 @@ def _of_photons(needs: Needs, plan: Plan, room: float) -> Step:
 def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:
     """The need of the majorant, which grows with disparities and with the number of cameras.
 
-    It is told of the field that is farthest from the paper's camera grid.
+    It names the field that is farthest from the paper's camera grid.
     """
     cameras, usual, z_mm = grid.camera_grid(), Grid(), np.array(plan.depths_mm or (math.inf,))
     pitch, shear = max(grid.pitch_mm), max(grid.shear_px, key=abs)
@@ -270,7 +270,7 @@ def _scaled(pair: tuple[float, float], which: float, share: float) -> tuple[floa
 
 
 def _even(value: float) -> str:
-    """A number told with two digits."""
+    """A number with two digits."""
     return f"{float(f'{value:.2g}'):g}"
 
 

@@ -29,7 +29,7 @@ def count_tiles(counts: PhotonCounts, box: Box) -> np.ndarray:
     """Photon counts of the views in bins, (K, L, h, w, 3): mean counts per pixel of each colour.
 
     Of each view the part `box`. A bin is large enough to hold a photon or two where there is light: on a
-    quarter of the pixels, one guesses. Grids of more than `MOST_TILES` cameras to a side are told by some
+    quarter of the pixels, one guesses. Grids of more than `MOST_TILES` cameras to a side show some
     of their views.
     """
     grid, events = counts.grid, counts.events

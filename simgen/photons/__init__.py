@@ -1,7 +1,7 @@
 """Photon counts: by thinning a majorant, or from rendered views, and which of the two.
 
-candidates            Candidates: rays drawn from a majorant, looked at, and followed if that is worth
-                      while.
+candidates            Candidates of photons: rays drawn from a majorant, and followed if they may be
+                      bright enough to be kept.
 counting_plan         How photon counts will be made: thinned one by one or drawn from rendered views, and
                       what led to it.
 disparity_layers      Layers of disparity and their tiles: pieces of surface that all views share.
@@ -14,8 +14,8 @@ pilot                 The pilot: a few paths that find where there is light, and
                       majorant.
 rendering_noise       How many samples a dense rendering needs for its noise not to show in the photon
                       counts.
-samplers              Which way candidates are worked on: all at once where a compiled backend runs, else
-                      one by one.
+samplers              Which sampler of candidates: all at once where a compiled backend runs, else one by
+                      one.
 scalar_sampler        Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call
                       of the renderer each.
 thinning              Photons, not pixels: photon-limited images by thinning, in the time that their

@@ -1,6 +1,7 @@
-"""Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
+"""Candidates of photons: rays drawn from a majorant, and followed if they may be bright enough to be kept.
 
-What all backends share. `lanes` works on a whole wavefront at once, `singles` on one ray after the other.
+What all backends share: `wavefront_sampler` traces all candidates at once, `scalar_sampler` one after the
+other.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from simgen.sensor.photon_table import PhotonTable, no_photons
 
 @dataclass(frozen=True)
 class Setup:
-    """What is looked at, by which cameras, through which filters, along how long paths."""
+    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments."""
 
     render_scene: RenderScene
     cameras: Cameras
@@ -89,14 +90,15 @@ class CandidateSampler(Protocol):
     def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
         """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
 
-        Those that fall beside the film are left out. How much the others tell depends on the backend.
+        Those that fall beside the film are left out. Where nothing follows one, its `light` is NaN (see
+        `Samples`); how many are not followed depends on the backend.
         """
         ...
 
 
-def paths_of(pool: CandidateSampler, candidates: int, followed: int) -> int:
+def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:
     """Light paths of so many candidates, of which some are followed beyond their first hit."""
-    return candidates + (pool.paths_each - 1) * followed
+    return candidates + (sampler.paths_each - 1) * followed
 
 
 @dataclass(frozen=True)

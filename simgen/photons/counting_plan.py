@@ -69,15 +69,15 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
     """
     grid = capture.grid
     pixels = grid.height * grid.width
-    seen = probe(render_scene, grid, capture.cfa, PROBE_SEED)
-    per_view, gain = _photons(capture, seen)
+    probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
+    per_view, gain = _photons(capture, probed)
     scope_pixels = _scope_pixels(capture)
-    samples = seen.samples_for(gain, scope_pixels)
+    samples = probed.samples_for(gain, scope_pixels)
     samples = min(max(samples, least_samples), (MOST_PATHS - 1) // pixels)
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
-    noise = seen.photon_noise(gain, samples)
+    noise = probed.photon_noise(gain, samples)
     cheaper = photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
     few = per_view * grid.view_count <= MOST_SINGLE_PHOTONS
     if capture.photons.nested and not few:
@@ -86,18 +86,18 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
     # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
-    thins = few and seen.mean > 0 and (cheaper or noise > NOISE_SHARE)
+    thins = few and probed.mean > 0 and (cheaper or noise > NOISE_SHARE)
     return Plan(
         thins=thins,
         samples=samples,
         photons_per_view=per_view,
         noise=noise,
-        normaliser_error=0.0 if scope_pixels is None else seen.light_error(samples * scope_pixels),
+        normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
         depths_mm=depths_seen(render_scene, grid) if thins else (),
     )
 
 
-def _photons(capture: Capture, seen: Probe) -> tuple[float, float]:
+def _photons(capture: Capture, probed: Probe) -> tuple[float, float]:
     """Photons that a view is expected to have, and those of a pixel and a unit of radiance.
 
     For a budget the second is estimated from what the virtual centre sees, for an exposure the first.
@@ -105,10 +105,10 @@ def _photons(capture: Capture, seen: Probe) -> tuple[float, float]:
     grid, gain = capture.grid, capture.photons_per_radiance
     pixels = grid.height * grid.width
     if gain is not None:
-        return gain * seen.mean * pixels, gain
+        return gain * probed.mean * pixels, gain
     scopes = {"view": 1.0, "channel": float(channel_count(capture.cfa)), "scene": 1 / grid.view_count}
     per_view = capture.photons.budget * scopes[capture.photons.scope]
-    return per_view, per_view / (pixels * seen.mean) if seen.mean > 0 else 0.0
+    return per_view, per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
 
 
 def _scope_pixels(capture: Capture) -> int | None:

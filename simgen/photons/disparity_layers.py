@@ -21,7 +21,7 @@ _RING = np.array([(a, b) for a in range(-1, 3) for b in range(-1, 3)])
 
 @dataclass(frozen=True)
 class Samples:
-    """Paths (N,): where they went through which film, and what they brought.
+    """Paths (N,): where they went through which film, and the radiance that they found.
 
     `guess` and `light` are (N, C); `light` is NaN for paths that were not followed beyond the first
     hit.
@@ -132,11 +132,11 @@ def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:
     disparity_px = disparity_mm / z_mm
     thin = 4 * LAYER_BLUR_TILES * tile_px / max(cameras - 1, 1)
     step_px = max(thin, float(disparity_px.max()) / MOST_LAYERS)
-    seen = np.unique(np.rint(disparity_px / step_px))
-    steps = np.arange(int(seen[-1]) + 1)
-    layer_at = np.abs(steps[:, None] - seen).argmin(axis=1)
+    levels = np.unique(np.rint(disparity_px / step_px))
+    steps = np.arange(int(levels[-1]) + 1)
+    layer_at = np.abs(steps[:, None] - levels).argmin(axis=1)
     # Further right a camera sees the point further left, but for shear, so its film moves right by as much.
-    disparity = seen[:, None] * step_px
+    disparity = levels[:, None] * step_px
     col = _from_zero((disparity * grid.pitch_mm[0] / longer - grid.shear_px[0]) * np.arange(grid.cols))
     row = _from_zero((disparity * grid.pitch_mm[1] / longer - grid.shear_px[1]) * np.arange(grid.rows))
     rows = -(-(grid.height + int(row.max())) // tile_px)

@@ -91,7 +91,7 @@ class Majorant:
         self.radiance_ratio_bound[listed] *= factor
 
     def lift(self, over: Samples, reach: int = 1) -> None:
-        """Raise limits above what these paths brought, on their tiles and on those up to `reach` away."""
+        """Raise limits above the radiance of these paths, on their tiles and on those up to `reach` away."""
         owner = self.owner_of(over)
         faint = (owner < self.coarse_count) & (over.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
@@ -119,19 +119,19 @@ def fit(grid: CameraGrid, frame: Frame, samples: Samples, dim: np.ndarray) -> Ma
 
     A tile is listed, and its largest guess looked up, with what lies within half a tile around it.
     """
-    lit = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
-    samples = samples.take(np.asarray(lit))
+    above_dim = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
+    samples = samples.take(np.asarray(above_dim))
     half = replace(frame, tile_px=frame.tile_px // 2, rows=2 * frame.rows, cols=2 * frame.cols)
     halves = half.tiles_of(samples)
     tiles, followed = half.merge(halves, 2), samples.followed
     light = samples.light[followed]
     near = _Near(frame, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
-    seen, guess = _largest(halves, samples.guess)
-    radiance_ratio_bound = near.largest(half.merge(seen, 2))[:, dim.size :]
+    found, guess = _largest(halves, samples.guess)
+    radiance_ratio_bound = near.largest(half.merge(found, 2))[:, dim.size :]
     bright = (guess * radiance_ratio_bound > dim).any(axis=1)
-    listed = _distinct(half.merge(half.around(seen[bright]).ravel(), 2))
+    listed = _distinct(half.merge(half.around(found[bright]).ravel(), 2))
     table = np.zeros((half.tiles, dim.size), dtype=np.float32)
-    table[seen] = guess
+    table[found] = guess
     found = near.largest(listed)
     light, radiance_ratio_bound = found[:, : dim.size], found[:, dim.size :]
     majorant = Majorant(grid, frame, dim)

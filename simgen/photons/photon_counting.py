@@ -94,16 +94,16 @@ def write_counts(
     counts = detect(arrivals, grid, cfa, sensor, capture.seed)
     found: dict[str, Any] = {"arrived": int(arrivals.n.sum())}
     for budget in (None, *photons.nested):
-        own = counts
+        kept = counts
         if budget is not None:
-            own = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
+            kept = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
         if sensor.counter_bits is not None:
-            own = saturate(own, grid, sensor.counter_bits, capture.seed)
-        own = own.by_pixel(grid)
-        events = PhotonCounts.from_events(own.k, own.l, own.i, own.j, own.n, grid, cfa=cfa)
+            kept = saturate(kept, grid, sensor.counter_bits, capture.seed)
+        kept = kept.by_pixel(grid)
+        events = PhotonCounts.from_events(kept.k, kept.l, kept.i, kept.j, kept.n, grid, cfa=cfa)
         _write_events(out / nested_name(COUNTS, budget), events)
-        if with_origins and own.object_id is not None and own.z_mm is not None:
-            origins = {"object_id": own.object_id.repeat(own.n), "z_mm": own.z_mm.repeat(own.n)}
+        if with_origins and kept.object_id is not None and kept.z_mm is not None:
+            origins = {"object_id": kept.object_id.repeat(kept.n), "z_mm": kept.z_mm.repeat(kept.n)}
             write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
         told = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:

@@ -1,4 +1,4 @@
-"""Which way candidates are worked on: all at once where a compiled backend runs, else one by one."""
+"""Which sampler of candidates: all at once where a compiled backend runs, else one by one."""
 
 from collections.abc import Sequence
 

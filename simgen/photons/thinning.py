@@ -135,9 +135,9 @@ class _Drawing:
         for done in range(WARM_UP_ROUNDS):
             group = np.arange(number) % len(self.groups)
             path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
-            pool = self._pool()
-            found = pool.try_candidates(group, None, path_seed)
-            paths += paths_of(pool, number, found.ratio.size)
+            sampler = self._sampler()
+            found = sampler.try_candidates(group, None, path_seed)
+            paths += paths_of(sampler, number, found.ratio.size)
             factor = _factor(found.ratio)
             self.share = max(found.photons.n.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
@@ -148,7 +148,7 @@ class _Drawing:
         assert self.pilot.majorant is not None
         return self.pilot.majorant
 
-    def _pool(self) -> CandidateSampler:
+    def _sampler(self) -> CandidateSampler:
         return sampler_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
 
     def _budgeted(self) -> Iterator[PhotonTable]:
@@ -159,7 +159,7 @@ class _Drawing:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = candidates_needed(missing, round_number, self.share)
                 part = self.attempt << 16 | round_number
-                yield self._round(wanting, candidates, self._pool(), number, part)
+                yield self._round(wanting, candidates, self._sampler(), number, part)
                 round_number += 1
                 got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
                 self.report(self._stage("photons"), got, wanted)
@@ -168,29 +168,29 @@ class _Drawing:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
         assert self.gain is not None
         views = np.arange(self.setup.grid.view_count)
-        parts = int(np.ceil(self.gain * self._pool().mass[0] * views.size / (WAVEFRONT / 2)))
+        parts = int(np.ceil(self.gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
         for part in range(parts):
-            pool = self._pool()
+            sampler = self._sampler()
             rng = seeds.generator(self.seed, view=part, stage="totals", part=self.attempt)
-            candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
-            yield self._round(views, candidates, pool, part, self.attempt << 16)
+            candidates = rng.poisson(self.gain / parts * sampler.mass[0], views.size)
+            yield self._round(views, candidates, sampler, part, self.attempt << 16)
             self.report(self._stage("parts of the exposure"), part + 1, parts)
 
     def _stage(self, what: str) -> str:
-        """What progress is told of: each attempt is a stage of its own, which says why it begins again."""
+        """Name of a stage in reports of progress; of another attempt it says why everything begins again."""
         again = f", drawn again with a higher bound (attempt {self.attempt + 1})"
         return what + again * (self.attempt > 0)
 
     def _round(
-        self, scopes: np.ndarray, candidates: np.ndarray, pool: CandidateSampler, number: int, part: int
+        self, scopes: np.ndarray, candidates: np.ndarray, sampler: CandidateSampler, number: int, part: int
     ) -> PhotonTable:
         """Photons of one round: so many candidates for each of these scopes."""
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
         path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
-        found = pool.try_candidates(self.scopes.group[owner], views, path_seed)
+        found = sampler.try_candidates(self.scopes.group[owner], views, path_seed)
         # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
-        pool.majorant.lift(found.over, reach=1 + self.attempt)
+        sampler.majorant.lift(found.over, reach=1 + self.attempt)
         path = np.arange(found.candidate.size).repeat(found.photons.n)
         scope = owner[found.candidate[path]]
         rank = places(scope) + self.scopes.got[scope]
@@ -200,7 +200,7 @@ class _Drawing:
         self.scopes.tried[scopes] += candidates
         self.tally.candidates += owner.size
         self.tally.followed += found.ratio.size
-        self.tally.paths += paths_of(pool, owner.size, found.ratio.size)
+        self.tally.paths += paths_of(sampler, owner.size, found.ratio.size)
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
         self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)

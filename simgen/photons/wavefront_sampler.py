@@ -107,16 +107,16 @@ class WavefrontSampler:
         some = dr.arange(mi.UInt32, min(follow, len(candidates.k)))
         guess, light = [0.0] * setup.channels, [0.0] * setup.channels
         z_mm = None
-        for look, colour in enumerate(self.light.looks(candidates.colour)):
+        for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):
             recoloured = replace(candidates, colour=colour)
             first = self._hit_first(recoloured)
             dr.eval(vars(first))
             followed = _take(recoloured, some)
-            found = self._follow(followed, _take(first, some), seed + look)
-            seen = self.light.seen(first.guess, colour, candidates.wavelength_sample)
-            guess = [old + new for old, new in zip(guess, seen, strict=True)]
-            seen = self.light.seen(found, followed.colour, followed.wavelength_sample)
-            light = [old + new for old, new in zip(light, seen, strict=True)]
+            found = self._follow(followed, _take(first, some), seed + turn)
+            part = self.light.per_colour(first.guess, colour, candidates.wavelength_sample)
+            guess = [old + new for old, new in zip(guess, part, strict=True)]
+            part = self.light.per_colour(found, followed.colour, followed.wavelength_sample)
+            light = [old + new for old, new in zip(light, part, strict=True)]
             dr.eval(guess, light)
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
@@ -141,18 +141,19 @@ class WavefrontSampler:
     def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
         """What each candidate's pixel gets of radiance that rays carry."""
         return of_colour(
-            self.light.seen(radiance, candidates.colour, candidates.wavelength_sample), candidates.colour
+            self.light.per_colour(radiance, candidates.colour, candidates.wavelength_sample),
+            candidates.colour,
         )
 
     def _exceeding(self, candidates: Candidates, first: FirstHits, light: Any, over: Any) -> Samples:
         dr = load_drjit()
         candidates, first = _take(candidates, over), _take(first, over)
-        guess, brought = (
-            self.light.seen(one, candidates.colour, candidates.wavelength_sample)
-            for one in (first.guess, gathered(light, over))
+        guess, light_over = (
+            self.light.per_colour(radiance, candidates.colour, candidates.wavelength_sample)
+            for radiance in (first.guess, gathered(light, over))
         )
-        dr.eval(vars(candidates), first.z_mm, guess, brought)
-        return _samples(candidates, first.z_mm, guess, brought)
+        dr.eval(vars(candidates), first.z_mm, guess, light_over)
+        return _samples(candidates, first.z_mm, guess, light_over)
 
 
 def _sampler(mi: Any, seed: int, size: int) -> Any:
@@ -176,14 +177,14 @@ def _take(record: Record, index: Any) -> Record:
 
 
 def _samples(candidates: Candidates, z_mm: Any, guess: list[Any], light: list[Any]) -> Samples:
-    """Candidates as NumPy, of which the first were followed and brought `light`."""
+    """Candidates as NumPy, of which the first were followed and found `light`."""
     # Of other colours than their own wavelengths tell nothing, and 0 / 0 would be no number.
     guesses = np.maximum([np.array(part) for part in guess], LEAST_GUESS, dtype=np.float64).T
-    seen = np.full((len(candidates.k), len(guess)), np.nan)
-    seen[: len(light[0])] = np.stack([np.array(part) for part in light], axis=1)
+    known = np.full((len(candidates.k), len(guess)), np.nan)
+    known[: len(light[0])] = np.stack([np.array(part) for part in light], axis=1)
     return Samples(
         **{name: np.array(getattr(candidates, name)).astype(np.int64) for name in ("k", "l", "row", "col")},
         z_mm=np.array(z_mm),
         guess=guesses,
-        light=seen,
+        light=known,
     )

@@ -4,7 +4,7 @@ The estimator is path tracing with next-event estimation (Kajiya 1986) and multi
 by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
 chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
 varies, the fewer candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays
-of one lane a ray. Needs a compiled backend.
+with an element for each ray. Needs a compiled backend.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ GOLDEN = (5**0.5 - 1) / 2
 class FirstHits:
     """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
 
-    `guess` is the radiance that can be told without a light path: what shines itself, else what the
+    `guess` is the radiance that is known without a light path: what shines itself, else what the
     lamps would give if nothing stood in the way, and light from all around.
     """
 
@@ -72,12 +72,14 @@ def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     away = dr.zeros(mi.SurfaceInteraction3f, 256)
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
     found: Any = 0.0
-    for colour in light.looks(dr.zeros(mi.UInt32, 256)):
+    for colour in light.colours_to_follow(dr.zeros(mi.UInt32, 256)):
         # The directions are in no order of colour, so that any will do for wavelengths.
         wavelength_sample = number * GOLDEN - dr.floor(number * GOLDEN)
         away.wavelengths = light.aim(dr.zeros(mi.Ray3f, 256), colour, wavelength_sample).wavelengths
-        seen = mi.Spectrum(0) if around is None else around.eval(away)
-        found += np.array(light.seen(seen, colour, wavelength_sample)).mean(axis=1, dtype=np.float64)
+        radiance = mi.Spectrum(0) if around is None else around.eval(away)
+        found += np.array(light.per_colour(radiance, colour, wavelength_sample)).mean(
+            axis=1, dtype=np.float64
+        )
     return found
 
 
@@ -176,6 +178,6 @@ class _Tracer:
         return dr.select(able & ~blocked, value * weight * share, 0)
 
 
-def _share(own: Any, other: Any) -> Any:
+def _share(pdf: Any, other: Any) -> Any:
     """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
-    return own * own / (own * own + other * other)
+    return pdf * pdf / (pdf * pdf + other * other)

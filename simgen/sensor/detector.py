@@ -100,10 +100,10 @@ def full_light_image(
     sensor: Sensor,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Radiance (H, W, C) as a camera would tell it, float32, in the same unit.
+    """Radiance (H, W, C) as a camera would measure it, float32, in the same unit.
 
     Photons arrive at random and are detected with the quantum efficiency; a pixel holds no more than
-    its full well, reading adds noise, the converter has steps. What it tells is divided by the
+    its full well, reading adds noise, the converter has steps. What it reads is divided by the
     efficiency and by the photons that a unit of radiance gives. `C` is 1 behind a filter, or 3.
     """
     light = sensor.full_light
@@ -119,8 +119,8 @@ def full_light_image(
     electrons = np.minimum(electrons, light.full_well_e)
     electrons += rng.normal(0, light.read_noise_e, electrons.shape)
     steps = (1 << light.adc_bits) - 1
-    told = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
-    return (told * (light.full_well_e / steps) / per_unit).astype(np.float32)
+    read = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
+    return (read * (light.full_well_e / steps) / per_unit).astype(np.float32)
 
 
 def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:

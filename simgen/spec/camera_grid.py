@@ -9,7 +9,7 @@ from simgen.base.strict_models import Count, NonNegative, Positive, Real, Strict
 
 
 class CalibrationErrors(Strict):
-    """How far the cameras are off. Whoever opens the dataset is not told; the truth keeps it."""
+    """How far the cameras are off. The truth keeps it; the grid that a dataset opens with does not."""
 
     position_sd_mm: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Standard deviation of each camera's place along X, Y and Z."""

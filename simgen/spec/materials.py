@@ -120,7 +120,7 @@ class Material(Strict):
     """An sRGB image file inside the scene's folder, or a pattern such as { type = "star", spokes = 36 };
     laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")
-    """Matt unless told otherwise; { type = "plastic", roughness = 0.1 } adds highlights."""
+    """Matt by default; { type = "plastic", roughness = 0.1 } adds highlights."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:

@@ -56,7 +56,7 @@ class FullLight(Strict):
     read_noise_e: NonNegative = 2.0
     """Standard deviation of the noise of reading a pixel, in electrons."""
     adc_bits: Annotated[Whole, Field(ge=1, le=24)] = 12
-    """The full well is told in so many steps of equal size: 2^bits - 1."""
+    """The full well is read in so many steps of equal size: 2^bits - 1."""
 
 
 class Sensor(Strict):
@@ -167,7 +167,7 @@ class Analysis(Strict):
     """Where whoever opens the dataset should look; nothing of it is rendered."""
 
     z_mm: tuple[Positive, ...] = ()
-    """Depths of the sections that `pcii run` reconstructs unless told otherwise."""
+    """Depths of the sections that `pcii run` reconstructs by default."""
     z_range_mm: tuple[Positive, Positive] | None = None
     """Nearest and farthest depth that a depth map considers."""
 
@@ -220,10 +220,10 @@ class Recipe(Strict):
     @model_validator(mode="after")
     def _one_aperture(self) -> Self:
         if self.exposure is not None and self.grid.lens is not None:
-            told = self.grid.focal_mm / self.exposure.f_number
-            if abs(self.grid.lens.aperture_mm / told - 1) > APERTURE_TOLERANCE:
+            expected_mm = self.grid.focal_mm / self.exposure.f_number
+            if abs(self.grid.lens.aperture_mm / expected_mm - 1) > APERTURE_TOLERANCE:
                 raise ValueError(
-                    f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {told:g} mm, "
+                    f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {expected_mm:g} mm, "
                     f"and aperture_mm is {self.grid.lens.aperture_mm:g}; make them agree"
                 )
         return self

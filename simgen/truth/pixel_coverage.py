@@ -8,7 +8,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 
 SAMPLES = 233
 """Rays through a pixel, on a Fibonacci lattice. An edge along one of its lines is worst: half of the some
-15 points of a line may be on the wrong side, 3 % of the pixel; most edges are told to 1 %."""
+15 points of a line may be on the wrong side, 3 % of the pixel; most edges are known to 1 %."""
 _GENERATOR = 144
 PART = 1 << 13
 """Pixels that are sampled at once."""

@@ -34,17 +34,17 @@ def visible_views(
     point = centre_camera(grid).towards(row, col) * hits.z_mm[row, col, None].astype(np.float64)
     start = point + normal * (OFF_SURFACE * (1 + np.abs(point).max(axis=1, initial=0)))[:, None]
     doubtful = _can_be_blocked(render_scene, rig, start)
-    own = (normal * point).sum(axis=1)
+    facing = (normal * point).sum(axis=1)
     count, traced = np.zeros(row.size, dtype=np.uint16), 0
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
         camera = rig.pinhole(k, l)
         # It faces a point if normal . (camera - point) > 0.
-        seen = camera.on_film(point) & (normal @ camera.position_mm > own)
-        asked = np.flatnonzero(seen & doubtful)
-        if asked.size:
-            seen[asked] = ~blocked(render_scene, start[asked], camera.position_mm)
+        seen = camera.on_film(point) & (normal @ camera.position_mm > facing)
+        tested = np.flatnonzero(seen & doubtful)
+        if tested.size:
+            seen[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
         count += seen
-        traced += asked.size
+        traced += tested.size
         report("visibility", done, grid.view_count)
     result = np.zeros((H, W), dtype=np.uint16)
     result[row, col] = count
