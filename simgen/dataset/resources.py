@@ -29,7 +29,8 @@ PLANE_BYTES = 2.0
 VIEW_BYTES = 400.0
 """Of a camera: where it stands, and what is added up for its view."""
 PHOTON_BYTES = 200.0
-"""Of a photon, or a pixel that counts without any, while the counts are made."""
+"""Of a photon, or a pixel that counts without any, while the counts are made: 135 where the sensor has no
+faults, up to 260 where counters stop and budgets are nested."""
 ORIGIN_BYTES = 30.0
 """Of each of several counts of one pixel while their origins are written."""
 TILE_BYTES = 110.0

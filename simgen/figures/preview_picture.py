@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.core.errors import InputError
+from simgen.base.srgb import linear_to_srgb
 from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.figures.picture_parts import (
@@ -60,7 +61,7 @@ def write_preview(
     aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
     figure = new_figure(PANEL_IN * (aspect * 3.84 + 0.2) + 0.5, PANEL_IN + 0.7)
     axes = figure.subplots(1, 3, width_ratios=(1, 1, 1.84))
-    axes[0].imshow(np.clip(picture / max(white, 1e-12), 0, 1) ** (1 / 2.2))
+    axes[0].imshow(linear_to_srgb(picture / max(white, 1e-12)))
     axes[0].set_title("virtual centre")
     hide_frame(axes[0])
     if things.any() and box[0].stop - box[0].start < grid.height:

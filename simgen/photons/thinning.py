@@ -115,7 +115,9 @@ class _Drawing:
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        return joined([no_photons(), *drawn]).by_pixel(self.setup.grid), log
+        photons = joined([no_photons(), *drawn])
+        drawn.clear()  # there may be tens of millions of photons: none is kept twice while they are sorted
+        return photons.by_pixel(self.setup.grid), log
 
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""

@@ -11,7 +11,8 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral.filters import Filters
 
 SEED_STEP = 0x9E3779B9
-"""Far from every other view's seed: parts of one view need seeds of their own."""
+"""Between seeds of parts of one view: 2^32 over the golden ratio, whose multiples stay far apart (modulo
+2^32), so that no part has the seed of another view's."""
 
 
 def render_view(

@@ -73,7 +73,7 @@ def detect(
         dead = np.zeros(pixels, dtype=bool)
         dead[shuffled[pixels - round(sensor.dead_pixel_share * pixels) :]] = True
         counts = counts.take(~dead.reshape(grid.height, grid.width)[counts.i, counts.j])
-    return counts.take(counts.n > 0)
+    return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
 def saturate(counts: PhotonTable, grid: CameraGrid, bits: int, seed: int) -> PhotonTable:

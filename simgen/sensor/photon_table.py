@@ -66,6 +66,8 @@ class PhotonTable:
     def by_pixel(self, grid: CameraGrid) -> "PhotonTable":
         """Ordered by view and pixel, rows of one pixel as they were."""
         pixel = self.flat_pixels(grid)
+        if (pixel[1:] >= pixel[:-1]).all():  # tens of millions of photons are not copied for nothing
+            return self
         # With the place in the table as a last digit no two are equal, and any sort will do.
         return self.take(np.argsort(pixel * pixel.size + np.arange(pixel.size)))
 
@@ -78,6 +80,8 @@ class PhotonTable:
 
 def joined(parts: Sequence[PhotonTable]) -> PhotonTable:
     """Rows of all parts, one part after the other, with the columns that are known of all."""
+    if len(parts) == 1:
+        return parts[0]
     known = [part.columns() for part in parts]
     names = [name for name in known[0] if all(name in columns for columns in known)]
     return PhotonTable(**{name: np.concatenate([columns[name] for columns in known]) for name in names})
