@@ -67,8 +67,8 @@ def draw_photons(
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:
-        own = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
-        image = render_view(render_scene, capture.rig, k, l, samples_per_pixel=made.samples, seed=own)
+        path_seed = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
+        image = render_view(render_scene, capture.rig, k, l, samples_per_pixel=made.samples, seed=path_seed)
         return sense(image, recipe.cfa)
 
     if made.thins:

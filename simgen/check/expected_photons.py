@@ -57,12 +57,12 @@ def channel_weights(facts: Facts) -> np.ndarray:
 def _object_finding(facts: Facts, thing: ObjectFacts) -> Finding:
     grid = facts.grid
     total = photons_per_view(facts, np.ones(channel_count(facts.sensor.bayer)))
-    own = photons_per_view(facts, thing.light_share)
-    everywhere = own * grid.view_count
+    expected = photons_per_view(facts, thing.light_share)
+    everywhere = expected * grid.view_count
     voxel = everywhere / max(thing.film_share * grid.height * grid.width, 1e-9)
     error = f", a relative error of {1 / math.sqrt(voxel):.0%}" if voxel > 0 else ""
     text = (
-        f"{thing.name}: {own / total:.1%}, {_number(own)} per view, {_number(everywhere)} in all; "
+        f"{thing.name}: {expected / total:.1%}, {_number(expected)} per view, {_number(everywhere)} in all; "
         f"{voxel:.2g} per voxel{error}"
     )
     if everywhere < LEAST_PHOTONS:

@@ -1,4 +1,4 @@
-"""What a coarse look at a scene tells, and what follows from it: the nouns of `simgen check`."""
+"""What a coarse look at a scene shows, and what follows from it: the types of `simgen check`."""
 
 import math
 from collections.abc import Mapping

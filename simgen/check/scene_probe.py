@@ -178,12 +178,12 @@ def _boxes(render_scene: RenderScene) -> dict[int, np.ndarray]:
     for number, shape in zip(
         backend.shape_numbers(render_scene.scene), render_scene.scene.shapes(), strict=True
     ):
-        own: Any = shape.bbox()
-        box = np.array([np.ravel(own.min), np.ravel(own.max)], dtype=np.float64)
+        bounds: Any = shape.bbox()
+        box = np.array([np.ravel(bounds.min), np.ravel(bounds.max)], dtype=np.float64)
         parts.setdefault(int(render_scene.object_of_shape[number]), []).append(box)
     return {
-        number: np.array([np.min([b[0] for b in own], axis=0), np.max([b[1] for b in own], axis=0)])
-        for number, own in parts.items()
+        number: np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])
+        for number, boxes in parts.items()
         if number > 0
     }
 

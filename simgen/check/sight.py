@@ -7,7 +7,7 @@ MOST_HIDDEN = 0.5
 MOST_MAGNIFIED = 10.0
 """What stands nearer than the focal length divided by this is so many times as large on the film."""
 LEAST_GLASS_DEPTH = 6
-"""Segments of a path through the two sides of a ball to something lit, and on to a lamp by way of another."""
+"""Segments of a path through the two sides of a ball to a surface, and on to a lamp by way of another."""
 
 
 def sight_findings(facts: Facts) -> list[Finding]:
@@ -149,7 +149,7 @@ def _lamp_findings(facts: Facts) -> list[Finding]:
         found.append(Finding("warn", "lights", text, f"turn lights[{number - 1}].target_mm to the objects"))
     if facts.luminance <= 0:
         remedy = "point a lamp at the objects, or add a light of type 'uniform'"
-        found.append(Finding("bad", "lights", "nothing that the cameras see is lit", remedy))
+        found.append(Finding("bad", "lights", "no light comes from what the cameras see", remedy))
     elif not found:
         unit = "cd/m^2, as the camera's pixels see it" if facts.sensor.is_spectral else "cd/m^2"
         text = f"the picture's mean luminance is {facts.luminance:.3g} {unit}"

@@ -50,7 +50,7 @@ def hidden_by(
     row, col = np.nonzero(alone & np.isfinite(centre.z_mm))
     z_mm, owner = centre.z_mm[row, col].astype(np.float64), centre.object_id[row, col]
     point = centre_camera(grid).towards(row, col) * z_mm[:, None]
-    found = Counter(render_scene.names[own] for own in owner[owner > 0].tolist())
+    found = Counter(render_scene.names[number] for number in owner[owner > 0].tolist())
     other = owner == 0
     on_wall = np.zeros(other.shape, dtype=bool)
     if scene.backdrop is not None:

@@ -33,7 +33,7 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
 def skipped(
     prepared: Prepared, made: Plan | None, photons: dict[str, Any] | None, shadow_rays: int | None
 ) -> list[dict[str, Any]]:
-    """What was not done: what, why, and how much work that saved, in a unit of its own.
+    """What was not done: what, why, and how much work that saved, and its unit.
 
     `photons` is what the manifest says of them, `shadow_rays` how many were traced to count the cameras that
     see a point; both None if there was no such work.

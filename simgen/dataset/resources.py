@@ -184,7 +184,7 @@ def rounded(value: float, digits: int) -> str:
 
 
 def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
-    """Tiles of the majorant for first hits at these depths, as `majorant.frame_for` makes; inf: endless."""
+    """Tiles of the majorant for first hits at these depths, as of `disparity_layers.layers_for`; or inf."""
     tile_px, longer = tile_px_for(grid), max(grid.pitch_mm)
     with np.errstate(over="ignore", divide="ignore"):
         disparity_px = np.float64(grid.focal_mm) * longer / grid.pixel_mm / z_mm

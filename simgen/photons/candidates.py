@@ -40,7 +40,7 @@ class Setup:
 
     @property
     def channels(self) -> int:
-        """Colours that the sensor tells apart."""
+        """Colours of the sensor's pixels: 3, or 1 for a monochrome sensor."""
         return channel_count(self.cfa)
 
 

@@ -51,7 +51,7 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Frame:
+class DisparityLayers:
     """Layers of disparity and their tiles.
 
     Pixel (i, j) of camera (k, l) lies on the tile of row (i + row_shift[n, k]) // tile_px of layer n,
@@ -75,7 +75,7 @@ class Frame:
         return len(self.row_shift) * self.rows * self.cols
 
     def layer_of(self, z_mm: np.ndarray) -> np.ndarray:
-        """Layer of first hits at planar depth `z_mm`; what is too near for all is put in the nearest."""
+        """Layer of first hits at planar depth `z_mm`; of what is nearer than all, the nearest layer."""
         nearness = np.divide(self.disparity_mm / self.step_px, z_mm)
         return self.layer_at[np.minimum(np.rint(nearness), self.layer_at.size - 1).astype(np.int64)]
 
@@ -113,7 +113,7 @@ class Frame:
         near_col = np.clip(col[:, None] + offsets[:, 1], 0, self.cols - 1)
         return self.flat(layer[:, None], near_row, near_col)
 
-    def merged(self, side: int) -> "Frame":
+    def merged(self, side: int) -> "DisparityLayers":
         """The same layers with tiles of `side` x `side` of these."""
         rows, cols = -(-self.rows // side), -(-self.cols // side)
         return replace(self, tile_px=side * self.tile_px, rows=rows, cols=cols)
@@ -124,7 +124,7 @@ class Frame:
         return self.merged(side).flat(layer, row // side, col // side)
 
 
-def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:
+def layers_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> DisparityLayers:
     """Layers for the depths of a pilot's first hits; depths in between go to the nearest of these."""
     longer = max(grid.pitch_mm)
     disparity_mm = grid.focal_mm * longer / grid.pixel_mm
@@ -141,7 +141,7 @@ def frame_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> Frame:
     row = _from_zero((disparity * grid.pitch_mm[1] / longer - grid.shear_px[1]) * np.arange(grid.rows))
     rows = -(-(grid.height + int(row.max())) // tile_px)
     cols = -(-(grid.width + int(col.max())) // tile_px)
-    return Frame(tile_px, step_px, disparity_mm, layer_at, row, col, rows, cols)
+    return DisparityLayers(tile_px, step_px, disparity_mm, layer_at, row, col, rows, cols)
 
 
 def _from_zero(shifts_px: np.ndarray) -> np.ndarray:

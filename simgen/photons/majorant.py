@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.photons.disparity_layers import Frame, Samples, tile_px_for
+from simgen.photons.disparity_layers import DisparityLayers, Samples, tile_px_for
 
 COARSE_TILES = 8
 """Coarse tiles are 8 x 8 tiles."""
@@ -36,7 +36,7 @@ LIFT = 1.25
 """Where a path exceeds its bound, the bound is raised above it by this factor."""
 
 NEXT_LAYERS = (0, -1, 1)
-"""Layers in which a path's tile is looked for: its own, then those beside it."""
+"""Layers in which a path's tile is looked for: that of its first hit, then those beside it."""
 ENDLESS = 1e30
 """Bound of the radiance ratio by which no guess rejects a candidate."""
 
@@ -45,11 +45,11 @@ class Majorant:
     """Upper bounds of radiance: coarse tiles of the film first, then the listed tiles of the layers.
 
     Of entry e: `layer` (-1 for coarse tiles), tile `row` and `col`, and (E, C) `bound` and
-    `radiance_ratio_bound`. `entry_of` tells a tile's entry, -1 if it has none.
+    `radiance_ratio_bound`. `entry_of` is each tile's entry, -1 if it has none.
     """
 
-    def __init__(self, grid: CameraGrid, frame: Frame, dim: np.ndarray) -> None:
-        self.frame, self.dim = frame, dim
+    def __init__(self, grid: CameraGrid, layers: DisparityLayers, dim: np.ndarray) -> None:
+        self.layers, self.dim = layers, dim
         self.coarse_px = COARSE_TILES * tile_px_for(grid)
         self.coarse_cols = -(-grid.width // self.coarse_px)
         self.coarse_count = -(-grid.height // self.coarse_px) * self.coarse_cols
@@ -57,18 +57,18 @@ class Majorant:
         self.layer = np.full(self.coarse_count, -1)
         self.bound = np.tile(DIM_MARGIN * dim, (self.coarse_count, 1))
         self.radiance_ratio_bound = np.full(self.bound.shape, ENDLESS)
-        self.entry_of = np.full(frame.tiles, -1, dtype=np.int32)
+        self.entry_of = np.full(layers.tiles, -1, dtype=np.int32)
 
     @property
     def side_px(self) -> np.ndarray:
         """Side of each entry's tile, (E,)."""
-        return np.where(self.layer < 0, self.coarse_px, self.frame.tile_px)
+        return np.where(self.layer < 0, self.coarse_px, self.layers.tile_px)
 
     def owner_of(self, samples: Samples) -> np.ndarray:
         """The entry that each path belongs to, (N,)."""
         owner = samples.row // self.coarse_px * self.coarse_cols + samples.col // self.coarse_px
         for aside in reversed(NEXT_LAYERS):
-            entry = self.entry_of[self.frame.tiles_of(samples, aside)]
+            entry = self.entry_of[self.layers.tiles_of(samples, aside)]
             owner = np.where(entry < 0, owner, entry)
         return owner
 
@@ -77,7 +77,7 @@ class Majorant:
 
         `bound` is raised to `dim`.
         """
-        layer, row, col = self.frame.split(tiles)
+        layer, row, col = self.layers.split(tiles)
         self.entry_of[tiles] = np.arange(self.layer.size, self.layer.size + tiles.size)
         self.layer, self.row = np.append(self.layer, layer), np.append(self.row, row)
         self.col = np.append(self.col, col)
@@ -100,7 +100,7 @@ class Majorant:
             over = over.take(~faint)
         if not over.k.size:
             return
-        around = self.frame.around(self.frame.tiles_of(over), reach)
+        around = self.layers.around(self.layers.tiles_of(over), reach)
         near = around.ravel()
         unlisted = _distinct(near[self.entry_of[near] < 0])
         nothing = np.zeros((unlisted.size, over.light.shape[1]))
@@ -114,18 +114,18 @@ class Majorant:
             levels[lifted] = np.maximum(levels[lifted], height)
 
 
-def fit(grid: CameraGrid, frame: Frame, samples: Samples, dim: np.ndarray) -> Majorant:
+def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.ndarray) -> Majorant:
     """The majorant that a pilot suggests; `dim` (C,) is the bound of the coarse tiles.
 
     A tile is listed, and its largest guess looked up, with what lies within half a tile around it.
     """
     above_dim = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
     samples = samples.take(np.asarray(above_dim))
-    half = replace(frame, tile_px=frame.tile_px // 2, rows=2 * frame.rows, cols=2 * frame.cols)
+    half = replace(layers, tile_px=layers.tile_px // 2, rows=2 * layers.rows, cols=2 * layers.cols)
     halves = half.tiles_of(samples)
     tiles, followed = half.merge(halves, 2), samples.followed
     light = samples.light[followed]
-    near = _Near(frame, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
+    near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
     found, guess = _largest(halves, samples.guess)
     radiance_ratio_bound = near.largest(half.merge(found, 2))[:, dim.size :]
     bright = (guess * radiance_ratio_bound > dim).any(axis=1)
@@ -134,7 +134,7 @@ def fit(grid: CameraGrid, frame: Frame, samples: Samples, dim: np.ndarray) -> Ma
     table[found] = guess
     found = near.largest(listed)
     light, radiance_ratio_bound = found[:, : dim.size], found[:, dim.size :]
-    majorant = Majorant(grid, frame, dim)
+    majorant = Majorant(grid, layers, dim)
     guess = _highest(table, half.ring(listed))
     majorant.list_tiles(listed, np.minimum(light, guess * radiance_ratio_bound), radiance_ratio_bound)
     return majorant
@@ -143,12 +143,12 @@ def fit(grid: CameraGrid, frame: Frame, samples: Samples, dim: np.ndarray) -> Ma
 class _Near:
     """Largest of `values` (N, C), found on `tiles` (N,), in the smallest neighbourhood that shows enough."""
 
-    def __init__(self, frame: Frame, tiles: np.ndarray, values: np.ndarray) -> None:
-        self.frame, self.anywhere = frame, values.max(axis=0)
-        self.levels: list[tuple[int, Frame, np.ndarray, np.ndarray]] = []
+    def __init__(self, layers: DisparityLayers, tiles: np.ndarray, values: np.ndarray) -> None:
+        self.layers, self.anywhere = layers, values.max(axis=0)
+        self.levels: list[tuple[int, DisparityLayers, np.ndarray, np.ndarray]] = []
         for side in (1, 2, 4, COARSE_TILES):
-            merged = frame.merged(side)
-            blocks = frame.merge(tiles, side)
+            merged = layers.merged(side)
+            blocks = layers.merge(tiles, side)
             largest = np.zeros((merged.tiles, values.shape[1]), dtype=np.float32)
             found, highest = _largest(blocks, values)
             largest[found] = highest
@@ -162,7 +162,7 @@ class _Near:
         for side, merged, largest, number in self.levels:
             if not missing.size:
                 break
-            blocks, inverse = np.unique(self.frame.merge(tiles[missing], side), return_inverse=True)
+            blocks, inverse = np.unique(self.layers.merge(tiles[missing], side), return_inverse=True)
             around = merged.around(blocks)
             enough = (number[around].sum(axis=1) >= SMALL_SAMPLE)[inverse]
             highest = _highest(largest, around)

@@ -105,11 +105,11 @@ def write_counts(
         if with_origins and kept.object_id is not None and kept.z_mm is not None:
             origins = {"object_id": kept.object_id.repeat(kept.n), "z_mm": kept.z_mm.repeat(kept.n)}
             write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
-        told = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
+        totals_here = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
-            found |= told
+            found |= totals_here
         else:
-            found.setdefault("nested", []).append({"budget": budget, **told})
+            found.setdefault("nested", []).append({"budget": budget, **totals_here})
     return found
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup, paths_of
-from simgen.photons.disparity_layers import Samples, frame_for, tile_px_for
+from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
 from simgen.photons.majorant import COARSE_TILES, DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
 
@@ -53,21 +53,21 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     grid = setup.grid
     fine_px = tile_px_for(grid)
-    coarse = fit(grid, frame_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
+    coarse = fit(grid, layers_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
     sampler = sampler_for(setup, coarse, [np.arange(4)], ambient)
     seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
     candidates = int(np.clip(expected(mean), *AIMED_CANDIDATES))
     followed = int(FOLLOWED_SHARE * candidates)
     aimed = sampler.trace_pilot(candidates, followed, seed_of_part)
     known = even.join(aimed)
-    majorant = fit(grid, frame_for(grid, fine_px, known.z_mm), known, dim)
+    majorant = fit(grid, layers_for(grid, fine_px, known.z_mm), known, dim)
     return Pilot(
         majorant, mean, ambient, paths + paths_of(sampler, candidates, followed), sampler.max_dark_candidates
     )
 
 
 def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
-    nowhere = frame_for(setup.grid, tile_px_for(setup.grid), np.array([np.inf]))
+    nowhere = layers_for(setup.grid, tile_px_for(setup.grid), np.array([np.inf]))
     flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
     sampler = sampler_for(setup, flat, [np.arange(4)], ambient)
     part, paths, spent = 0, EVEN_PATHS, 0

@@ -26,7 +26,7 @@ PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
 DEPTHS = 64
-"""Depths are told apart in so many equal steps of disparity."""
+"""Depths are rounded to so many equal steps of disparity."""
 
 
 @dataclass(frozen=True)

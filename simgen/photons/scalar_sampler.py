@@ -126,8 +126,8 @@ class ScalarSampler:
         down, right = rng.random((2, group.size)) * (side // 2)
         row = majorant.row[entry] * side + 2 * down.astype(np.int64) + (cell >> 1)
         col = majorant.col[entry] * side + 2 * right.astype(np.int64) + (cell & 1)
-        row -= np.where(layer < 0, 0, majorant.frame.row_shift[layer, k])
-        col -= np.where(layer < 0, 0, majorant.frame.col_shift[layer, l])
+        row -= np.where(layer < 0, 0, majorant.layers.row_shift[layer, k])
+        col -= np.where(layer < 0, 0, majorant.layers.col_shift[layer, l])
         row_px, col_px = row + down % 1 - 0.5, col + right % 1 - 0.5
         lens_point, rig = np.zeros((2, group.size)), self.setup.rig
         if rig.lens is not None:

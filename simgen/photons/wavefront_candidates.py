@@ -39,7 +39,7 @@ class MajorantArrays:
 
     def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
         self.setup, self.majorant = setup, majorant
-        mi, frame = setup.render_scene.mi, majorant.frame
+        mi, layers = setup.render_scene.mi, majorant.layers
         of_groups = [chances(setup, majorant, cells) for cells in groups]
         sizes = np.array([one.running.size for one in of_groups])
         ends = np.cumsum(sizes)
@@ -63,12 +63,12 @@ class MajorantArrays:
         )
         self.dim = floats(mi, majorant.dim)
         self.entry_of = signed(mi, majorant.entry_of)
-        self.layer_at = signed(mi, frame.layer_at)
-        self.nearness_mm = opaque(mi.Float, frame.disparity_mm / frame.step_px)
-        self.last_step = opaque(mi.Float, frame.layer_at.size - 1)
-        self.last_layer = opaque(mi.Int32, len(frame.row_shift) - 1)
-        self.rows, self.cols = opaque(mi.Int32, frame.rows), opaque(mi.Int32, frame.cols)
-        self.row_shift, self.col_shift = signed(mi, frame.row_shift), signed(mi, frame.col_shift)
+        self.layer_at = signed(mi, layers.layer_at)
+        self.nearness_mm = opaque(mi.Float, layers.disparity_mm / layers.step_px)
+        self.last_step = opaque(mi.Float, layers.layer_at.size - 1)
+        self.last_layer = opaque(mi.Int32, len(layers.row_shift) - 1)
+        self.rows, self.cols = opaque(mi.Int32, layers.rows), opaque(mi.Int32, layers.cols)
+        self.row_shift, self.col_shift = signed(mi, layers.row_shift), signed(mi, layers.col_shift)
 
     def draw(self, sampler: Any, group: Any, view: Any, light: Light) -> Candidates:
         """One candidate for each of these groups and views: tile and cell by the bound, the rest evenly."""
@@ -112,7 +112,7 @@ class MajorantArrays:
 
     def owner_of(self, candidates: Candidates, z_mm: Any) -> Any:
         """The entry that each candidate's path, which hits something at depth `z_mm`, belongs to."""
-        mi, dr, frame = self.setup.render_scene.mi, load_drjit(), self.majorant.frame
+        mi, dr, layers = self.setup.render_scene.mi, load_drjit(), self.majorant.layers
         nearness = dr.minimum(self.nearness_mm / z_mm, self.last_step)
         nearest = dr.gather(mi.Int32, self.layer_at, mi.UInt32(dr.round(nearness)))
         coarse_px, across = self.majorant.coarse_px, self.majorant.coarse_cols
@@ -121,8 +121,8 @@ class MajorantArrays:
             layer = dr.clip(nearest + aside, 0, self.last_layer)
             shift_row, shift_col = self._shifts(layer, candidates.k, candidates.l, candidates.inside)
             row, col = (
-                (candidates.row + shift_row) // frame.tile_px,
-                (candidates.col + shift_col) // frame.tile_px,
+                (candidates.row + shift_row) // layers.tile_px,
+                (candidates.col + shift_col) // layers.tile_px,
             )
             listed = gathered(self.entry_of, (layer * self.rows + row) * self.cols + col, candidates.inside)
             owner = dr.select(listed < 0, owner, listed)

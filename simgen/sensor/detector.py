@@ -2,7 +2,7 @@
 
 Photon by photon: each is detected with the quantum efficiency of its pixel's colour, dark counts and hot
 pixels add counts of their own, dead pixels count nothing, and a counter of k bits stops at 2^k - 1; of one
-bit it tells only whether there was a photon (Bernoulli counts, as of a single-photon camera's frame).
+bit it says only whether there was a photon (Bernoulli counts, as of a single-photon camera's frame).
 
 Full-light images: electrons up to the full well, the noise of reading them, and a converter's steps.
 """

@@ -1,4 +1,4 @@
-"""The camera grid as a recipe tells it: where cameras ought to stand, how far they are off, their lens."""
+"""The camera grid as a recipe describes it: places of cameras, how far they are off, their lens."""
 
 from typing import Annotated, Self
 

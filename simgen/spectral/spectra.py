@@ -1,8 +1,8 @@
 """Spectra of lights, surfaces and cameras, on one set of wavelengths; measured ones from colour-science.
 
-Notation: N wavelengths, `WAVELENGTH_NM` (N,). A light's spectrum tells its radiance in cd/m^2 of white
-light of equal energy at each wavelength (cd/m^2, the numbers that the renderer's own white has), so that
-its integral with the CIE luminosity function, divided by that function's own, is its luminance.
+Notation: N wavelengths, `WAVELENGTH_NM` (N,). A light's spectrum is its radiance in cd/m^2 of white
+light of equal energy at each wavelength (cd/m^2, the numbers that the renderer's white has), so that
+its integral with the CIE luminosity function, divided by that function's integral, is its luminance.
 """
 
 import warnings

@@ -47,7 +47,7 @@ def in_focus(grid: CameraGrid, z_mm: np.ndarray, planes_mm: Sequence[float]) -> 
     farthest_mm = np.abs(as_rig(grid).position_mm).max()
     seen_px = grid.focal_mm * farthest_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
     back_px = [grid.focal_mm * farthest_mm / (plane * grid.pixel_mm) for plane in planes_mm]
-    masks = [np.abs(seen_px - own) <= IN_FOCUS_PX for own in back_px]
+    masks = [np.abs(seen_px - shift_px) <= IN_FOCUS_PX for shift_px in back_px]
     return np.array(masks, dtype=bool).reshape(len(masks), *seen_px.shape)
 
 
