@@ -112,8 +112,8 @@ def _picture(
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
     total, spent = np.zeros((grid.height, grid.width, 1)), 0.0
-    for part in (2, 3):  # 0 and 1 are those of the plan; the first here compiles, the second is timed
-        path_seed = seeds.integer(seed, view=0, stage="probe", part=part)
+    for part in range(2):  # the first compiles, the second is timed
+        path_seed = seeds.integer(seed, stage="check probe", part=part)
         begun = time.perf_counter()
         total = total + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
         spent = time.perf_counter() - begun

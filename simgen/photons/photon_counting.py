@@ -52,7 +52,7 @@ def draw_from_views(
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
     dark = int((energies <= 0).all(axis=1).sum())
     normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
-    totals = fixed_totals(photons, energies, seeds.generator(capture.seed, view=0, stage="totals"))
+    totals = fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns: list[list[np.ndarray]] = []
     for number, (k, l) in enumerate(views):
         raw = mosaic_of(k, l)
@@ -122,7 +122,7 @@ def _one_by_one(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
         scope = np.zeros_like(scope)
     elif capture.photons.scope == "channel" and capture.cfa is not None:
         scope = 3 * scope + rows.colours(capture.cfa)
-    order = np.lexsort((seeds.generator(capture.seed, view=1, stage="nested").random(total), scope))
+    order = np.lexsort((seeds.generator(capture.seed, stage="nested ranks").random(total), scope))
     rank = np.empty(total, dtype=np.int64)
     rank[order] = places(scope[order])
     return replace(rows, scope=scope, rank=rank)

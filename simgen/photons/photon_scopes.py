@@ -55,7 +55,7 @@ def scopes_for(photons: Photons, view_count: int, group_count: int, seed: int) -
     elif photons.statistics == "multinomial":
         wanted = np.full(view.size, round(photons.budget))
     else:
-        wanted = seeds.generator(seed, view=0, stage="totals").poisson(photons.budget, view.size)
+        wanted = seeds.generator(seed, stage="budget totals").poisson(photons.budget, view.size)
     return PhotonScopes(view, group, wanted)
 
 

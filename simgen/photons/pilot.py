@@ -55,10 +55,10 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     fine_px = tile_px_for(grid)
     coarse = fit(grid, layers_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
     sampler = sampler_for(setup, coarse, [np.arange(4)], ambient)
-    seed_of_part = seeds.integer(seed, view=0, stage="pilot", part=1)
+    path_seed = seeds.integer(seed, stage="aimed pilot")
     candidates = int(np.clip(expected(mean), *AIMED_CANDIDATES))
     followed = int(FOLLOWED_SHARE * candidates)
-    aimed = sampler.trace_pilot(candidates, followed, seed_of_part)
+    aimed = sampler.trace_pilot(candidates, followed, path_seed)
     known = even.join(aimed)
     majorant = fit(grid, layers_for(grid, fine_px, known.z_mm), known, dim)
     return Pilot(
@@ -70,11 +70,11 @@ def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples,
     nowhere = layers_for(setup.grid, tile_px_for(setup.grid), np.array([np.inf]))
     flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
     sampler = sampler_for(setup, flat, [np.arange(4)], ambient)
-    part, paths, spent = 0, EVEN_PATHS, 0
+    round_number, paths, spent = 0, EVEN_PATHS, 0
     while True:
-        number = seeds.integer(seed, view=1, stage="pilot", part=part)
-        even = sampler.trace_pilot(paths, paths, number)
+        path_seed = seeds.integer(seed, stage="even pilot", round_number=round_number)
+        even = sampler.trace_pilot(paths, paths, path_seed)
         spent += paths_of(sampler, paths, paths)
         if even.light.any() or paths >= sampler.max_dark_candidates:
             return even, spent
-        part, paths = part + 1, paths * 4
+        round_number, paths = round_number + 1, paths * 4

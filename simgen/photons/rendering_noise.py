@@ -67,7 +67,7 @@ def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: in
                 0,
                 0,
                 samples_per_pixel=PROBE_SAMPLES,
-                seed=seeds.integer(seed, view=0, stage="probe", part=part),
+                seed=seeds.integer(seed, stage="plan probe", part=part),
             ),
             cfa,
         ).astype(np.float64)

@@ -136,7 +136,7 @@ class _Drawing:
         majorant, paths = self._majorant(), 0
         for done in range(WARM_UP_ROUNDS):
             group = np.arange(number) % len(self.groups)
-            path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
+            path_seed = seeds.integer(self.seed, stage="warm-up", round_number=done)
             sampler = self._sampler()
             found = sampler.try_candidates(group, None, path_seed)
             paths += paths_of(sampler, number, found.ratio.size)
@@ -155,13 +155,12 @@ class _Drawing:
 
     def _budgeted(self) -> Iterator[PhotonTable]:
         """Rounds of candidates until every scope has its photons, or is dark."""
-        for number, block in enumerate(self.scopes.blocks()):
+        for part, block in enumerate(self.scopes.blocks()):
             round_number = 0
             while (wanting := np.intersect1d(self.scopes.open(self.pilot.max_dark_candidates), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = candidates_needed(missing, round_number, self.share)
-                part = self.attempt << 16 | round_number
-                yield self._round(wanting, candidates, self._sampler(), number, part)
+                yield self._round(wanting, candidates, self._sampler(), part, round_number)
                 round_number += 1
                 got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
                 self.report(self._stage("photons"), got, wanted)
@@ -173,9 +172,9 @@ class _Drawing:
         parts = int(np.ceil(self.gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
         for part in range(parts):
             sampler = self._sampler()
-            rng = seeds.generator(self.seed, view=part, stage="totals", part=self.attempt)
+            rng = seeds.generator(self.seed, stage="exposure candidates", part=part, attempt=self.attempt)
             candidates = rng.poisson(self.gain / parts * sampler.mass[0], views.size)
-            yield self._round(views, candidates, sampler, part, self.attempt << 16)
+            yield self._round(views, candidates, sampler, part)
             self.report(self._stage("parts of the exposure"), part + 1, parts)
 
     def _stage(self, what: str) -> str:
@@ -184,12 +183,19 @@ class _Drawing:
         return what + again * (self.attempt > 0)
 
     def _round(
-        self, scopes: np.ndarray, candidates: np.ndarray, sampler: CandidateSampler, number: int, part: int
+        self,
+        scopes: np.ndarray,
+        candidates: np.ndarray,
+        sampler: CandidateSampler,
+        part: int,
+        round_number: int = 0,
     ) -> PhotonTable:
-        """Photons of one round: so many candidates for each of these scopes."""
+        """Photons of one round of a part of the work: so many candidates for each of these scopes."""
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
-        path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
+        path_seed = seeds.integer(
+            self.seed, stage="candidate paths", part=part, attempt=self.attempt, round_number=round_number
+        )
         found = sampler.try_candidates(self.scopes.group[owner], views, path_seed)
         # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
         sampler.majorant.lift(found.over, reach=1 + self.attempt)

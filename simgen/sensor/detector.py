@@ -36,7 +36,7 @@ def nested_subset(
     else:
         first, larger = totals, photons.budget
         for part, smaller in enumerate(sorted(photons.nested, reverse=True)):
-            rng = seeds.generator(seed, view=0, stage="nested", part=part)
+            rng = seeds.generator(seed, stage="nested totals", part=part)
             first, larger = rng.binomial(first, smaller / larger), smaller
             if smaller == budget:
                 break
@@ -50,7 +50,7 @@ def detect(
     arrivals: PhotonTable, grid: CameraGrid, cfa: str | None, sensor: Sensor, seed: int
 ) -> PhotonTable:
     """Counts that come of arriving photons, before a counter stops."""
-    rng = seeds.generator(seed, view=0, stage="detection")
+    rng = seeds.generator(seed, stage="detection")
     efficiency = np.array(sensor.quantum_efficiency)[arrivals.colours(cfa)]
     if (efficiency < 1).any():
         arrivals = replace(arrivals, n=rng.binomial(arrivals.n, efficiency))
@@ -62,7 +62,7 @@ def detect(
             _without_photon(grid, rng.integers(0, views * pixels, number), np.ones(number, np.int64))
         )
     # One camera takes all views, so its faulty pixels are the same in each.
-    faulty = seeds.generator(seed, view=0, stage="faulty pixels")
+    faulty = seeds.generator(seed, stage="faulty pixels")
     shuffled = faulty.permutation(pixels) if sensor.hot_pixel_share or sensor.dead_pixel_share else None
     if shuffled is not None and sensor.hot_pixel_share > 0:
         hot = shuffled[: round(sensor.hot_pixel_share * pixels)]
@@ -82,7 +82,7 @@ def saturate(counts: PhotonTable, grid: CameraGrid, bits: int, seed: int) -> Pho
     if counts.object_id is not None:  # else nobody can tell which of a pixel's counts were kept
         counts = counts.one_by_one()
     pixel = counts.flat_pixels(grid)
-    chance = seeds.generator(seed, view=0, stage="saturation").random(pixel.size)
+    chance = seeds.generator(seed, stage="saturation").random(pixel.size)
     order = np.lexsort((chance, pixel))
     counts, pixel = counts.take(order), pixel[order]
     running = np.cumsum(counts.n)

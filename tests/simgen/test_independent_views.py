@@ -119,8 +119,8 @@ def test_one_seed_for_two_views_is_caught(
 ) -> None:
     exact = seeds._sequence
 
-    def slipped(seed: int, view: int, *rest: Any) -> np.random.SeedSequence:
-        return exact(seed, 41 if view == 73 else view, *rest)
+    def slipped(seed: int, stage: seeds.Stage, view: int, *rest: int) -> np.random.SeedSequence:
+        return exact(seed, stage, 41 if view == 73 else view, *rest)
 
     monkeypatch.setattr(seeds, "_sequence", slipped)
     found = likeness(noisy(tmp_path))
