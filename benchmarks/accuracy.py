@@ -168,7 +168,7 @@ def _demosaicing() -> Iterator[str]:
     recipe, _ = load_recipe("paper")
     setup = setup_of(recipe)
     grid = replace(setup.grid, height=SIDE_PX, width=SIDE_PX)
-    rendered = _centre_view(setup.built, grid, 512)
+    rendered = _centre_view(setup.render_scene, grid, 512)
     pixels = np.arange(SIDE_PX)
     pictures = {
         "textured plane": Texture().seen_at(pixels, pixels),

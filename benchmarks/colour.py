@@ -18,7 +18,8 @@ from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import Scene
-from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names, sensitivity
+from simgen.spectral.camera_curves import sensitivity
+from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 LAMPS = ("D65", "A")
@@ -206,10 +207,10 @@ def _times() -> Iterator[str]:
     for spectral in ([], [f"sensor.camera={CAMERAS[0]}"]):
         setup = setup_of(load_recipe("paper", view + spectral)[0])
         dense, _ = timed(
-            lambda seed, s=setup: render_view(s.built, s.grid, 0, 0, samples_per_pixel=16, seed=seed)
+            lambda seed, s=setup: render_view(s.render_scene, s.grid, 0, 0, samples_per_pixel=16, seed=seed)
         )
-        photons, drawn = thinned(load_recipe("paper", spectral)[0])
-        seconds.append((dense, photons, drawn.log["kept_share"]))
+        photons, log = thinned(load_recipe("paper", spectral)[0])
+        seconds.append((dense, photons, log["kept_share"]))
     plain, own = seconds
     yield "| time | RGB mode | spectral mode | ratio |"
     yield "|---|---|---|---|"

@@ -6,13 +6,14 @@ The paper's recipe. Dense views are timed on a few views and scaled to all, sinc
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.timing import timed
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, thin_photons
+from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
@@ -26,15 +27,15 @@ DENSE_VIEWS = 4
 def setup_of(recipe: Recipe) -> Setup:
     """The recipe's scene and cameras, ready to draw from."""
     scene, folder = load_scene(recipe.scene)
-    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe, Path())
+    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
     built = build(mi, scene, folder, recipe.render.max_depth, curves)
     return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
 
 
-def thinned(recipe: Recipe) -> tuple[float, PhotonList]:
-    """Seconds to draw the photons of all views of a recipe, and the last draw."""
+def thinned(recipe: Recipe) -> tuple[float, dict[str, Any]]:
+    """Seconds to draw the photons of all views of a recipe, and the log of the last draw."""
     setup = setup_of(recipe)
-    return timed(lambda seed: thin_photons(setup, recipe.photons, seed=seed))
+    return timed(lambda seed: thin_photons(setup, recipe.photons, seed=seed)[1])
 
 
 def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
@@ -47,7 +48,7 @@ def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
         drawing = 0.0
         for view in range(DENSE_VIEWS):
             image = render_view(
-                setup.built, setup.grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed
+                setup.render_scene, setup.grid, 4, view, samples_per_pixel=samples_per_pixel, seed=seed
             )
             start = time.perf_counter()
             raw = sense(image, recipe.cfa)
@@ -68,19 +69,19 @@ def table() -> Iterator[str]:
     yield ""
     yield "| what | seconds | against thinning | kept | overshoot |"
     yield "|---|---|---|---|---|"
-    base, drawn = thinned(recipe)
-    yield _row("thinning, 1000 photons per view", base, base, drawn)
+    base, log = thinned(recipe)
+    yield _row("thinning, 1000 photons per view", base, base, log)
     costs = {}
     for samples in (1, 16):
         seconds, costs[0] = dense(recipe, samples)
         costs[samples] = seconds
         yield f"| dense, {samples} samples + Poisson | {seconds:.2f} | {seconds / base:.1f} x | | |"
     larger, _ = load_recipe("paper", ["grid.height=4096", "grid.width=4096", "grid.pixel_mm=0.0088"])
-    seconds, drawn = thinned(larger)
-    yield _row("thinning, 4096 x 4096 pixels", seconds, base, drawn)
+    seconds, log = thinned(larger)
+    yield _row("thinning, 4096 x 4096 pixels", seconds, base, log)
     brighter, _ = load_recipe("paper", ["photons.budget=10000"])
-    seconds, drawn = thinned(brighter)
-    yield _row("thinning, 10 000 photons per view", seconds, base, drawn)
+    seconds, log = thinned(brighter)
+    yield _row("thinning, 10 000 photons per view", seconds, base, log)
     yield ""
     yield from _costs(recipe, (seconds - base) / 900_000, costs)
     yield ""
@@ -88,7 +89,7 @@ def table() -> Iterator[str]:
 
 
 def _costs(recipe: Recipe, per_photon: float, dense_s: dict[int, float]) -> Iterator[str]:
-    """What `simgen.photons.photon_counting` chooses by."""
+    """What `simgen.photons.counting_plan` chooses by."""
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
     yield "| cost | microseconds |"
@@ -106,13 +107,12 @@ def _growth() -> Iterator[str]:
         recipe, _ = load_recipe("paper", ["grid.rows=2", "grid.cols=2", f"photons.budget={budget:g}"])
         setup = setup_of(recipe)
         start = time.perf_counter()
-        drawn = thin_photons(setup, recipe.photons, seed=1)
+        drawn, _ = thin_photons(setup, recipe.photons, seed=1)
         seconds = time.perf_counter() - start
         yield f"| {budget:.0e} | {seconds:.2f} | {1e6 * seconds / drawn.k.size:.2f} |"
 
 
-def _row(name: str, seconds: float, base: float, drawn: PhotonList) -> str:
-    log = drawn.log
+def _row(name: str, seconds: float, base: float, log: dict[str, Any]) -> str:
     over = log["overshoot_photons"] / max(log["kept"], 1)
     share = f"{log['kept_share']:.1%}"
     return f"| {name} | {seconds:.2f} | {seconds / base:.2f} x | {share} | {over:.1e} |"

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from simgen.app.library import (
         RecipeFile,
         SceneFile,
-        draw_photons,
         generate,
         load_recipe,
         load_scene,
         preview,
     )
+    from simgen.app.photons_in_memory import draw_photons
 
 __all__ = [
     "RecipeFile",
@@ -36,9 +36,9 @@ __version__ = version("photon-integral-imaging")
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'simgen' has no attribute {name!r}")
-    from simgen.app import library
+    from simgen.app import library, photons_in_memory
 
-    return getattr(library, name)
+    return getattr(photons_in_memory if name == "draw_photons" else library, name)
 
 
 def __dir__() -> list[str]:

@@ -102,6 +102,15 @@ class PhotonLog(_Part):
     rendering_noise: Real | None = None
 
 
+class SkippedWork(_Part):
+    """Work that was not done: what, why, and how much that saved."""
+
+    what: Text
+    why: Text
+    saved: Real
+    unit: Text
+
+
 class Grid(_Part):
     """The members of a `CameraGrid`, which looks at their values itself."""
 
@@ -130,6 +139,7 @@ class DatasetManifest(_Part):
     recipe: Recipe = Recipe()
     backend: Backend | None = None
     photons: PhotonLog | None = None
+    skipped: list[str | SkippedWork] = []  # sentences in older manifests
     timings_s: dict[str, Seconds] = {}
     files: dict[FileName, FileEntry]
 

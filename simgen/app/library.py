@@ -1,36 +1,17 @@
-"""What the commands do, as functions: scenes and recipes by name, photons without a file, datasets."""
+"""What the commands do, as functions: scenes and recipes by name, datasets, pictures."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import cache
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import PhotonTruth, Truth
-from simgen.base import random_streams
-from simgen.base.strict_models import validate
-from simgen.cameras.rig import centre_camera, rig_of
 from simgen.dataset import generation
-from simgen.dataset.prepared import Prepared
-from simgen.dataset.resources import check_resources
 from simgen.figures.preview_picture import write_preview
-from simgen.photons.photon_counting import draw_from_views, origins_of, plan, thin
-from simgen.renderer import backend
-from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import detect
-from simgen.sensor.mosaic import sense
 from simgen.spec import recipe as recipes
 from simgen.spec import scene as scenes
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_at_centre
-from simgen.truth.pixel_coverage import coverage
 
 
 @dataclass(frozen=True)
@@ -89,70 +70,3 @@ def preview(name_or_path: str | Path, out: str | Path, samples_per_pixel: int = 
     Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
     """
     write_preview(str(name_or_path), Path(out), samples_per_pixel)
-
-
-def draw_photons(
-    scene: SceneFile,
-    grid: CameraGrid,
-    *,
-    budget: float = 1000.0,
-    cfa: str | None = "GRBG",
-    seed: int = 0,
-    report: Report = silent,
-) -> tuple[PhotonCounts, Truth]:
-    """Photon counts of a scene as `grid` sees it, and its truth, without a file.
-
-    `budget` photons are expected in each view, behind the Bayer pattern `cfa` (None: monochrome). The counts
-    are those of a dataset with the same scene, grid, budget, pattern and seed. The truth has depth in mm and
-    object of every pixel of the virtual centre (H, W), and where each photon came from if there are
-    few enough to be drawn one by one. Raises `pcii.InputError` for a value that is out of its range.
-
-    >>> grid = pcii.CameraGrid(rows=10, cols=10, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.0352,
-    ...                        height=1024, width=1024)                             # doctest: +SKIP
-    >>> counts, truth = draw_photons(load_scene("two_objects"), grid, seed=1)       # doctest: +SKIP
-    """
-    if not isinstance(scene, SceneFile):
-        raise InputError(f"scene: expected what simgen.load_scene gives, got {type(scene).__name__}")
-    if not isinstance(grid, CameraGrid):
-        raise InputError(f"grid: expected a pcii.CameraGrid, got {type(grid).__name__}")
-    values = {
-        "scene": str(scene.folder),
-        "seed": seed,
-        "grid": asdict(grid),
-        "sensor": {"cfa": "none" if cfa is None else cfa},
-        "photons": {"budget": budget},
-    }
-    recipe = validate(Recipe, values, "draw_photons")
-    built = Prepared(recipe, scene.scene, scene.folder, None).built()
-    made = plan(recipe, built, backend.choose().kind)
-    check_resources(recipe, made, Path())
-    rig = rig_of(recipe)
-
-    @cache
-    def mosaic_of(k: int, l: int) -> np.ndarray:
-        own = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
-        return sense(render_view(built, rig, k, l, samples_per_pixel=made.samples, seed=own), recipe.cfa)
-
-    if made.thins:
-        arrivals, _ = thin(recipe, built, made, report)
-    else:
-        arrivals, _ = draw_from_views(recipe, mosaic_of, made, report)
-    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed)
-    counts = PhotonCounts.from_events(
-        counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
-    )
-    centre = first_hits_at_centre(built, grid)
-    photons = None
-    origins = origins_of(counted, grid)
-    if origins is not None:
-        events = counts.events
-        photons = PhotonTruth(**{name: getattr(events, name).repeat(events.n) for name in "klij"}, **origins)
-    truth = Truth(
-        z_mm=centre.z_mm,
-        object_id=centre.object_id,
-        names=built.names,
-        photons=photons,
-        normal=centre.normal,
-        coverage=coverage(built, centre_camera(grid), centre.object_id),
-    )
-    return counts, truth

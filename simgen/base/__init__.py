@@ -4,7 +4,7 @@ asset_names     Names of files that a scene brings along, and where these files 
                 folder.
 locations       Where scenes and recipes are found: the working directory, the source tree, the installed
                 package.
-random_streams  Random streams, keyed (scene, view, stage): the same for any number of workers and any
+random_streams  Random streams, keyed by stage of the work: the same for any number of workers and any
                 order.
 srgb            sRGB (IEC 61966-2-1): what its numbers mean.
 strict_models   What scene and recipe files share: strict models, TOML, and errors that point at the

@@ -8,11 +8,11 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 def _roots(name: str) -> list[Path]:
     candidates = (Path.cwd() / name, _PACKAGE.parent / name, _PACKAGE / "_shipped" / name)
-    seen: list[Path] = []
+    roots: list[Path] = []
     for root in candidates:
-        if root.is_dir() and root.resolve() not in (known.resolve() for known in seen):
-            seen.append(root)
-    return seen
+        if root.is_dir() and root.resolve() not in (known.resolve() for known in roots):
+            roots.append(root)
+    return roots
 
 
 def scene_roots() -> list[Path]:

@@ -1,7 +1,7 @@
-"""Random streams, keyed (scene, view, stage): the same for any number of workers and any order.
+"""Random streams, keyed by stage of the work: the same for any number of workers and any order.
 
-The key is a `SeedSequence.spawn_key` of fixed length, since seeds given as lists of numbers collide
-when one list is another with zeros appended.
+Each purpose has a stage of its own. The key is a `SeedSequence.spawn_key` of fixed length, since seeds given
+as lists of numbers collide when one list is another with zeros appended.
 """
 
 from typing import Literal, get_args
@@ -11,29 +11,41 @@ import numpy as np
 Stage = Literal[
     "radiance",
     "photons",
-    "totals",
-    "pilot",
-    "paths",
-    "nested",
+    "full light",
+    "camera errors",
     "detection",
     "faulty pixels",
     "saturation",
-    "full light",
-    "probe",
-    "camera errors",
+    "budget totals",
+    "nested totals",
+    "nested ranks",
+    "even pilot",
+    "aimed pilot",
+    "warm-up",
+    "exposure candidates",
+    "candidate paths",
+    "plan probe",
+    "check probe",
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
-def _sequence(seed: int, view: int, stage: Stage, part: int, scene: int) -> np.random.SeedSequence:
-    return np.random.SeedSequence(seed, spawn_key=(scene, view, _STAGES.index(stage), part))
+def _sequence(
+    seed: int, stage: Stage, view: int, part: int, attempt: int, round_number: int
+) -> np.random.SeedSequence:
+    key = (_STAGES.index(stage), view, part, attempt, round_number)
+    return np.random.SeedSequence(seed, spawn_key=key)
 
 
-def generator(seed: int, *, view: int, stage: Stage, part: int = 0, scene: int = 0) -> np.random.Generator:
-    """NumPy's generator of one view and stage; `part` counts repetitions of a stage."""
-    return np.random.default_rng(_sequence(seed, view, stage, part, scene))
+def generator(
+    seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
+) -> np.random.Generator:
+    """NumPy's generator of a stage: of one view, of one part of the stage's work, of one attempt or round."""
+    return np.random.default_rng(_sequence(seed, stage, view, part, attempt, round_number))
 
 
-def integer(seed: int, *, view: int, stage: Stage, part: int = 0, scene: int = 0) -> int:
-    """A 32-bit seed of one view and stage, for the renderer."""
-    return int(_sequence(seed, view, stage, part, scene).generate_state(1)[0])
+def integer(
+    seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
+) -> int:
+    """A 32-bit seed for the renderer, of a stage as for `generator`."""
+    return int(_sequence(seed, stage, view, part, attempt, round_number).generate_state(1)[0])

@@ -131,9 +131,9 @@ def _repr(value: Any) -> str:
 
 
 def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
-    """The first error, told; and how many more there are."""
+    """A sentence of the first error, and how many more there are."""
     errors = fault.errors(include_url=False)
-    # An unknown key is most often the cause of the missing one, so it is told first.
+    # An unknown key is most often the cause of the missing one, so it is named first.
     first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
     location, known, types = _follow(model, first["loc"])
     where = _dotted(location)

@@ -85,7 +85,7 @@ def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[floa
     steps = np.linspace(0, MOST_PITCH_CHANGE, PITCH_STEPS + 1)
     for factor in (1 + sign * step for step in steps for sign in (1, -1)):
         # To what one would type: a hundredth of a millimetre, or finer where that is coarse.
-        pitch = tuple(round(factor * own, 2) if own >= 1 else factor * own for own in grid.pitch_mm)
+        pitch = tuple(round(factor * old, 2) if old >= 1 else factor * old for old in grid.pitch_mm)
         changed = replace(grid, pitch_mm=pitch)
         if all(_is_mixed(shift) for z in depths_mm for shift in shifts_px(changed, z)):
             return changed.pitch_mm

@@ -2,6 +2,7 @@
 
 from simgen.check.scene_facts import Facts, Finding
 from simgen.dataset.resources import (
+    Needs,
     available_bytes,
     in_bytes,
     least_rendered_bytes,
@@ -10,33 +11,32 @@ from simgen.dataset.resources import (
     rounded,
     shortage,
 )
-from simgen.photons.photon_counting import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
-from simgen.spec.recipe import Recipe
+from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
 MOST_MEMORY = 0.8
 
 
-def hopeless(recipe: Recipe) -> list[Finding]:
+def hopeless(needs: Needs) -> list[Finding]:
     """What cannot even be looked at, since memory cannot hold it whatever the scene; empty if it can be."""
     room = available_bytes()
-    lacking = shortage(recipe, None, room)
+    lacking = shortage(needs, None, room)
     return [] if lacking is None else [Finding("bad", "memory", lacking.sentence(room))]
 
 
 def cost_findings(facts: Facts) -> list[Finding]:
     """What will be written and what it takes, before compression and to an order of magnitude."""
-    recipe, plan, room = facts.recipe, facts.plan, facts.memory_bytes
-    sizes = product_bytes(recipe, plan)
+    needs, plan, room = facts.needs, facts.plan, facts.memory_bytes
+    sizes = product_bytes(needs, plan)
     text = ", ".join(f"{name} {in_bytes(size)}" for name, size in sizes.items()) or "nothing but a manifest"
     found = [Finding("ok", "size", f"{text}, before compression")]
-    files = least_rendered_bytes(recipe, plan)
+    files = least_rendered_bytes(needs, plan)
     if files > facts.disk_bytes:
         left = in_bytes(facts.disk_bytes)
         text = f"rendered views take {in_bytes(files)} or more, and this folder's disk has {left} left"
         found = [Finding("warn", "size", text, "take fewer or smaller views, or another disk")]
-    peak = peak_bytes(recipe, plan)
+    peak = peak_bytes(needs, plan)
     text = f"some {in_bytes(peak)} of memory at the peak"
-    lacking = shortage(recipe, plan, room)
+    lacking = shortage(needs, plan, room)
     if lacking is not None:
         found.append(Finding("bad", "memory", lacking.sentence(room)))
     elif peak > MOST_MEMORY * room:
@@ -49,7 +49,7 @@ def cost_findings(facts: Facts) -> list[Finding]:
         way = "photons one by one (thinning)"
         if not facts.plan.thins:
             way = f"counts drawn from views of {facts.plan.samples} samples per pixel"
-    if facts.recipe.products.radiance != "none":
+    if facts.needs.products.radiance != "none":
         way += f"{', ' if way else ''}full-light images"
     way = f"{way}; " if way else ""
     found.append(Finding("ok", "time", f"{way}in the order of {in_time(seconds(facts))} on this machine"))
@@ -58,16 +58,16 @@ def cost_findings(facts: Facts) -> list[Finding]:
 
 def seconds(facts: Facts) -> float:
     """Time of rendering and of photons, from the probe's speed; nothing else is counted."""
-    grid, recipe, plan = facts.grid, facts.recipe, facts.plan
+    grid, products, plan = facts.grid, facts.needs.products, facts.plan
     everywhere = grid.height * grid.width * grid.view_count
     spent = 0.0
-    if recipe.products.truth:
+    if products.truth:
         spent += facts.hit_s * grid.height * grid.width
-    if recipe.products.view_truth:
+    if products.view_truth:
         spent += facts.hit_s * everywhere
     dense = plan is not None and not plan.thins
-    if recipe.products.radiance != "none" or dense:
-        samples = plan.samples if plan is not None and dense else recipe.render.samples_per_pixel
+    if products.radiance != "none" or dense:
+        samples = plan.samples if plan is not None and dense else facts.render.samples_per_pixel
         spent += facts.path_s * samples * everywhere
     if plan is not None and plan.thins:
         costs = (PHOTON_COST, SAMPLE_COST) if facts.compiled else (SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST)

@@ -30,7 +30,7 @@ LEAST_SEEN_BY_ALL = 0.5
 MOST_PITCH_FACTOR = 3.0
 """Cameras are not to be moved further apart than this only to tell two objects apart."""
 MOST_LINES = 8
-"""So many pairs of objects are told one by one."""
+"""So many pairs of objects are listed one by one."""
 
 
 def depth_findings(facts: Facts) -> list[Finding]:
@@ -81,14 +81,14 @@ def separation_findings(facts: Facts) -> list[Finding]:
     if len(found) <= MOST_LINES:
         return found
     quiet = [finding for finding in found if finding.verdict != "warn"]
-    told = [finding for finding in found if finding.verdict == "warn"][:MOST_LINES]
-    rest = len(found) - len(told) - len(quiet)
+    listed_first = [finding for finding in found if finding.verdict == "warn"][:MOST_LINES]
+    rest = len(found) - len(listed_first) - len(quiet)
     if quiet:
         text = f"{len(quiet)} more pairs of neighbours in depth are further apart or in one plane"
-        told.append(Finding("ok", "separation", text))
+        listed_first.append(Finding("ok", "separation", text))
     if rest:
-        told.append(Finding("warn", "separation", f"{rest} more pairs are as close"))
-    return told
+        listed_first.append(Finding("warn", "separation", f"{rest} more pairs are as close"))
+    return listed_first
 
 
 def _separation(facts: Facts, near: ObjectFacts, far: ObjectFacts) -> Finding:
@@ -121,7 +121,7 @@ def focus_findings(facts: Facts) -> list[Finding]:
         remedy = f"add {round(thing.middle_mm)} to analysis.z_mm"
         poor = share < LEAST_FOCUS_SHARE
         found.append(Finding("warn" if poor else "ok", "focus", text, remedy if poor else ""))
-    for z in facts.recipe.analysis.z_mm:
+    for z in facts.analysis.z_mm:
         if z not in used:
             text = f"no object is in focus at the plane {z:g} mm"
             found.append(Finding("warn", "focus", text, "take it from analysis.z_mm or move an object there"))
@@ -134,7 +134,7 @@ def focus_share(facts: Facts, thing: ObjectFacts, z_mm: float) -> float:
 
 
 def _range_findings(facts: Facts) -> list[Finding]:
-    limits = facts.recipe.analysis.z_range_mm
+    limits = facts.analysis.z_range_mm
     if limits is None or not facts.seen:
         return []
     outside = [t.name for t in facts.seen if t.z_mm.min() < limits[0] or t.z_mm.max() > limits[1]]
@@ -153,8 +153,8 @@ def overlap_findings(facts: Facts) -> list[Finding]:
         return []
     views = facts.grid.view_count
     shares = {z: share_seen_by_all(facts.grid, z) for z in (min(facts.planes_mm), max(facts.planes_mm))}
-    told = " and ".join(f"{share:.0%} of the section at {z:g} mm" for z, share in shares.items())
-    text = f"all {views} views see {told}"
+    seen_shares = " and ".join(f"{share:.0%} of the section at {z:g} mm" for z, share in shares.items())
+    text = f"all {views} views see {seen_shares}"
     if min(shares.values()) >= LEAST_SEEN_BY_ALL:
         return [Finding("ok", "overlap", text)]
     return [Finding("warn", "overlap", text, "take a smaller pitch, fewer cameras or a wider film")]
@@ -162,7 +162,7 @@ def overlap_findings(facts: Facts) -> list[Finding]:
 
 def alias_findings(facts: Facts) -> list[Finding]:
     """Planes at which the cameras' shifts leave voxels without one of the colours of the Bayer pattern."""
-    grid, cfa = facts.grid, facts.recipe.cfa
+    grid, cfa = facts.grid, facts.sensor.bayer
     if cfa is None or not facts.planes_mm:
         return []
     found = []

@@ -19,12 +19,12 @@ def photon_findings(facts: Facts) -> list[Finding]:
     if facts.plan is None or facts.luminance <= 0 or not facts.plan.photons_per_view > 0:
         return []
     found = [_object_finding(facts, thing) for thing in facts.seen]
-    total = photons_per_view(facts, np.ones(channel_count(facts.recipe.cfa)))
+    total = photons_per_view(facts, np.ones(channel_count(facts.sensor.bayer)))
     for place, share in facts.elsewhere.items():
         lost = photons_per_view(facts, share) / total
         if lost > 0.0005:
             much = lost > MOST_LOST_SHARE and bool(facts.seen)
-            more = "expose longer" if facts.recipe.photons.scope == "exposure" else "raise photons.budget"
+            more = "expose longer" if facts.photons.scope == "exposure" else "raise photons.budget"
             remedy = f"darken it, or {more} for the objects" if much else ""
             text = f"{place}: {lost:.1%} of the photons"
             found.append(Finding("warn" if remedy else "ok", "photons", text, remedy))
@@ -39,30 +39,30 @@ def photons_per_view(facts: Facts, light_share: np.ndarray) -> float:
     """
     assert facts.plan is not None
     weights = channel_weights(facts)
-    sensor = facts.recipe.sensor
+    sensor = facts.sensor
     kept = np.array(sensor.quantum_efficiency)
-    if facts.recipe.cfa is None:
+    if facts.sensor.bayer is None:
         kept = kept[1:2]
     return float(facts.plan.photons_per_view * (weights * kept * light_share).sum())
 
 
 def channel_weights(facts: Facts) -> np.ndarray:
     """Share (C,) of a view's photons that each colour gets."""
-    channels = channel_count(facts.recipe.cfa)
-    if facts.recipe.photons.scope == "channel":
+    channels = channel_count(facts.sensor.bayer)
+    if facts.photons.scope == "channel":
         return np.full(channels, 1 / channels)
     return facts.colour_share
 
 
 def _object_finding(facts: Facts, thing: ObjectFacts) -> Finding:
     grid = facts.grid
-    total = photons_per_view(facts, np.ones(channel_count(facts.recipe.cfa)))
-    own = photons_per_view(facts, thing.light_share)
-    everywhere = own * grid.view_count
+    total = photons_per_view(facts, np.ones(channel_count(facts.sensor.bayer)))
+    expected = photons_per_view(facts, thing.light_share)
+    everywhere = expected * grid.view_count
     voxel = everywhere / max(thing.film_share * grid.height * grid.width, 1e-9)
     error = f", a relative error of {1 / math.sqrt(voxel):.0%}" if voxel > 0 else ""
     text = (
-        f"{thing.name}: {own / total:.1%}, {_number(own)} per view, {_number(everywhere)} in all; "
+        f"{thing.name}: {expected / total:.1%}, {_number(expected)} per view, {_number(everywhere)} in all; "
         f"{voxel:.2g} per voxel{error}"
     )
     if everywhere < LEAST_PHOTONS:
@@ -76,15 +76,15 @@ def _object_finding(facts: Facts, thing: ObjectFacts) -> Finding:
 
 
 def _more(facts: Facts, factor: float, purpose: str) -> str:
-    if facts.recipe.photons.scope == "exposure":
+    if facts.photons.scope == "exposure":
         return f"expose {factor:.2g} times as long {purpose}"
-    budget = facts.recipe.photons.budget * factor
+    budget = facts.photons.budget * factor
     step = 10 ** max(0, math.floor(math.log10(budget)) - 1)
     return f"photons.budget = {math.ceil(budget / step) * step} {purpose}"
 
 
 def _false_findings(facts: Facts, counted: float) -> list[Finding]:
-    sensor, grid = facts.recipe.sensor, facts.grid
+    sensor, grid = facts.sensor, facts.grid
     per_pixel = sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts
     if not per_pixel:
         return []

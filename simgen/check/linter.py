@@ -1,4 +1,4 @@
-"""`simgen check`: what a scene or recipe will give, told without rendering it, but for one coarse probe."""
+"""`simgen check`: what a scene or recipe will give, found without rendering it, but for one coarse probe."""
 
 from collections.abc import Sequence
 
@@ -9,6 +9,7 @@ from simgen.check.scene_facts import Facts, Finding
 from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
 from simgen.check.targets import load_target
+from simgen.dataset.prepared import needs_of
 
 
 def lint(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[str, list[Finding]]:
@@ -18,7 +19,7 @@ def lint(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[str, list[Fi
     views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
     line = f"{recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    return line, hopeless(recipe) or findings(probe_scene(target))
+    return line, hopeless(needs_of(recipe)) or findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""What a coarse look at a scene tells, and what follows from it: the nouns of `simgen check`."""
+"""What a coarse look at a scene shows, and what follows from it: the types of `simgen check`."""
 
 import math
 from collections.abc import Mapping
@@ -11,9 +11,10 @@ import numpy as np
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.disparities import apart_px
 from simgen.check.unseen import OnFilm
-from simgen.photons.photon_counting import Plan
+from simgen.dataset.resources import Needs
+from simgen.photons.counting_plan import Plan
 from simgen.spec.lights import Level
-from simgen.spec.recipe import Recipe
+from simgen.spec.recipe import Analysis, Photons, Render, Sensor
 
 Verdict = Literal["ok", "note", "warn", "bad"]
 Elsewhere = Literal["backdrop", "a lamp in view", "nothing"]
@@ -76,9 +77,14 @@ class ObjectFacts:
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What the findings rest on: the recipe, a coarse probe of its scene, and how the counts will be made."""
+    """What the findings rest on: parts of a recipe, a coarse probe of its scene, and a plan."""
 
-    recipe: Recipe
+    grid: CameraGrid
+    sensor: Sensor
+    photons: Photons
+    render: Render
+    analysis: Analysis
+    needs: Needs
     objects: tuple[ObjectFacts, ...]
     luminance: float
     """Mean luminance of the virtual centre's image in cd/m^2; in spectral mode what its pixels see."""
@@ -111,11 +117,6 @@ class Facts:
     probe_px: tuple[int, int] = (256, 256)
     """Rows and columns of the probe's film."""
 
-    @cached_property
-    def grid(self) -> CameraGrid:
-        """The recipe's camera grid."""
-        return self.recipe.grid.camera_grid()
-
     @property
     def seen(self) -> tuple[ObjectFacts, ...]:
         """The objects that the virtual centre sees."""
@@ -128,7 +129,7 @@ class Facts:
         for middle_mm in sorted(thing.middle_mm for thing in self.seen):
             if not planes or apart_px(self.grid, planes[-1], middle_mm) > PLANES_APART_PX:
                 planes.append(float(round(middle_mm)) or middle_mm)
-        return self.recipe.analysis.z_mm or tuple(planes)
+        return self.analysis.z_mm or tuple(planes)
 
 
 def listed(names: list[str], most: int = 6) -> str:

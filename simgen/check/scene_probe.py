@@ -16,16 +16,15 @@ from simgen.base import random_streams as seeds
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
 from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, seen_alone
-from simgen.dataset.prepared import Prepared
+from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes
-from simgen.photons.photon_counting import plan
+from simgen.photons.counting_plan import plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.sensor.mosaic import sense
 from simgen.spec.lights import AreaLight
 from simgen.spec.materials import Glass
-from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
 
@@ -40,27 +39,36 @@ def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, scene, kind = target.recipe, target.scene, backend.choose().kind
     compiled = kind != "scalar"
-    built = target.built()
+    render_scene = target.render_scene()
     grid = recipe.grid.camera_grid()
-    made = plan(recipe, built, kind) if recipe.products.counts else None
+    made = None
+    if recipe.products.counts:
+        made = plan(capture_of(recipe), render_scene, kind, least_samples(recipe))
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
-    image, path_s = _picture(built, small, recipe)
-    centre = first_hits_at_centre(built, small)
+    image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
+    centre = first_hits_at_centre(render_scene, small)
     rows, cols = {0, grid.rows - 1}, {0, grid.cols - 1}
     begun = time.perf_counter()
-    corners = {(k, l): first_hits_of_view(built, small, k, l) for k in sorted(rows) for l in sorted(cols)}
+    corners = {
+        (k, l): first_hits_of_view(render_scene, small, k, l) for k in sorted(rows) for l in sorted(cols)
+    }
     hit_s = (time.perf_counter() - begun) / (len(corners) * centre.z_mm.size)
-    boxes = _boxes(built)
+    boxes = _boxes(render_scene)
     alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
-    together = first_hits_at_centre(built, alone)
-    hidden = _hidden_shares(built, target, alone, boxes, together)
+    together = first_hits_at_centre(render_scene, alone)
+    hidden = _hidden_shares(render_scene, target, alone, boxes, together)
     light = image.sum(axis=(0, 1))
     objects = [
         _object_facts(number, name, centre, corners, image, boxes.get(number), hidden, small)
-        for number, name in built.names.items()
+        for number, name in render_scene.names.items()
     ]
     return Facts(
-        recipe=recipe,
+        grid=grid,
+        sensor=recipe.sensor,
+        photons=recipe.photons,
+        render=recipe.render,
+        analysis=recipe.analysis,
+        needs=needs_of(recipe),
         objects=tuple(
             replace(
                 thing,
@@ -68,11 +76,11 @@ def probe_scene(target: Prepared) -> Facts:
                 on_film=None if number not in boxes else on_film(boxes[number], grid),
                 hidden_by=()
                 if thing.z_mm.size
-                else hidden_by(built, scene, target.folder, number, alone, together),
+                else hidden_by(render_scene, scene, target.folder, number, alone, together),
             )
             for number, thing in enumerate(objects, start=1)
         ),
-        luminance=float(image.mean() if built.filters is not None else sense(image, None).mean()),
+        luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
         elsewhere={
             place: _share(image[mask].sum(axis=0), light) for place, mask in _elsewhere(scene, centre).items()
@@ -86,7 +94,7 @@ def probe_scene(target: Prepared) -> Facts:
         corners=len(corners),
         lamps_away=_lamps_away(scene, list(boxes.values())),
         level=scene.level,
-        gain=built.gain,
+        gain=render_scene.gain,
         glass=tuple(thing.name for thing in scene.objects if isinstance(thing.material.finish, Glass)),
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),
@@ -98,16 +106,18 @@ def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
     return with_larger_pixels(grid, max(1.0, max(grid.height, grid.width) / side_px), least_px=1)
 
 
-def _picture(built: RenderScene, grid: CameraGrid, recipe: Recipe) -> tuple[np.ndarray, float]:
+def _picture(
+    render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int
+) -> tuple[np.ndarray, float]:
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
     total, spent = np.zeros((grid.height, grid.width, 1)), 0.0
-    for part in (2, 3):  # 0 and 1 are those of the plan; the first here compiles, the second is timed
-        seed = seeds.integer(recipe.seed, view=0, stage="probe", part=part)
+    for part in range(2):  # the first compiles, the second is timed
+        path_seed = seeds.integer(seed, stage="check probe", part=part)
         begun = time.perf_counter()
-        total = total + render_view(built, single, 0, 0, samples_per_pixel=SAMPLES, seed=seed) / 2
+        total = total + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
         spent = time.perf_counter() - begun
-    image = total if recipe.cfa is not None else sense(total, None)[..., None]
+    image = total if cfa is not None else sense(total, None)[..., None]
     return image, spent / (SAMPLES * grid.height * grid.width)
 
 
@@ -162,16 +172,18 @@ def _at_border(mask: np.ndarray) -> bool:
     return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
 
 
-def _boxes(built: RenderScene) -> dict[int, np.ndarray]:
+def _boxes(render_scene: RenderScene) -> dict[int, np.ndarray]:
     """Bounding boxes (2, 3) of the objects, smallest and largest X, Y, Z in mm."""
     parts: dict[int, list[np.ndarray]] = {}
-    for number, shape in zip(backend.shape_numbers(built.scene), built.scene.shapes(), strict=True):
-        own: Any = shape.bbox()
-        box = np.array([np.ravel(own.min), np.ravel(own.max)], dtype=np.float64)
-        parts.setdefault(int(built.object_of_shape[number]), []).append(box)
+    for number, shape in zip(
+        backend.shape_numbers(render_scene.scene), render_scene.scene.shapes(), strict=True
+    ):
+        bounds: Any = shape.bbox()
+        box = np.array([np.ravel(bounds.min), np.ravel(bounds.max)], dtype=np.float64)
+        parts.setdefault(int(render_scene.object_of_shape[number]), []).append(box)
     return {
-        number: np.array([np.min([b[0] for b in own], axis=0), np.max([b[1] for b in own], axis=0)])
-        for number, own in parts.items()
+        number: np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])
+        for number, boxes in parts.items()
         if number > 0
     }
 
@@ -182,18 +194,22 @@ def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
 
 
 def _hidden_shares(
-    built: RenderScene, target: Prepared, grid: CameraGrid, boxes: dict[int, np.ndarray], together: FirstHits
+    render_scene: RenderScene,
+    target: Prepared,
+    grid: CameraGrid,
+    boxes: dict[int, np.ndarray],
+    together: FirstHits,
 ) -> dict[int, float]:
     """Share of each object, seen alone from the virtual centre, that other objects stand before.
 
     Only objects whose boxes appear to overlap another's are looked at alone.
     """
     owner, shares = together.object_id, dict[int, float]()
-    for number in built.names:
+    for number in render_scene.names:
         others = [box for other, box in boxes.items() if other != number]
         if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
             continue
-        alone = seen_alone(built, target.scene, target.folder, number, grid)
+        alone = seen_alone(render_scene, target.scene, target.folder, number, grid)
         before = alone & (owner > 0) & (owner != number)
         shares[number] = float(before.sum() / alone.sum()) if alone.any() else 0.0
     return shares

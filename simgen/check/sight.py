@@ -1,20 +1,20 @@
 """Findings on what the cameras see: objects hidden, cut or never seen, cameras inside things, lamps."""
 
-from simgen.cameras.rig import NEAR_CLIP_MM
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts, listed
+from simgen.renderer.mitsuba_camera import NEAR_CLIP_MM
 
 MOST_HIDDEN = 0.5
 MOST_MAGNIFIED = 10.0
 """What stands nearer than the focal length divided by this is so many times as large on the film."""
 LEAST_GLASS_DEPTH = 6
-"""Segments of a path through the two sides of a ball to something lit, and on to a lamp by way of another."""
+"""Segments of a path through the two sides of a ball to a surface, and on to a lamp by way of another."""
 
 
 def sight_findings(facts: Facts) -> list[Finding]:
     """All findings of this file."""
-    told = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
-    found = [finding for own in told.values() for finding in own]
-    whole = [name for name, own in told.items() if not own]
+    findings_of = {thing.name: _object_findings(facts, thing) for thing in facts.objects}
+    found = [finding for found_here in findings_of.values() for finding in found_here]
+    whole = [name for name, found_here in findings_of.items() if not found_here]
     if whole:
         text = f"the virtual centre and the corner cameras see all of {listed(whole)}"
         found.insert(0, Finding("ok", "objects", text))
@@ -113,7 +113,7 @@ def _in_millimetres(z_mm: float) -> str:
 
 
 def _glass_findings(facts: Facts) -> list[Finding]:
-    depth = facts.recipe.render.max_depth
+    depth = facts.render.max_depth
     if not facts.glass or depth >= LEAST_GLASS_DEPTH:
         return []
     text = f"{listed(list(facts.glass))}: paths of {depth} segments end inside glass, which looks dark"
@@ -149,9 +149,9 @@ def _lamp_findings(facts: Facts) -> list[Finding]:
         found.append(Finding("warn", "lights", text, f"turn lights[{number - 1}].target_mm to the objects"))
     if facts.luminance <= 0:
         remedy = "point a lamp at the objects, or add a light of type 'uniform'"
-        found.append(Finding("bad", "lights", "nothing that the cameras see is lit", remedy))
+        found.append(Finding("bad", "lights", "no light comes from what the cameras see", remedy))
     elif not found:
-        unit = "cd/m^2, as the camera's pixels see it" if facts.recipe.is_spectral else "cd/m^2"
+        unit = "cd/m^2, as the camera's pixels see it" if facts.sensor.is_spectral else "cd/m^2"
         text = f"the picture's mean luminance is {facts.luminance:.3g} {unit}"
         found.append(Finding("ok", "lights", text))
     return found

@@ -30,25 +30,27 @@ class OnFilm:
     """Whether part of it falls on the film of the virtual centre or of a corner camera."""
 
 
-def seen_alone(built: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid) -> np.ndarray:
+def seen_alone(
+    render_scene: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid
+) -> np.ndarray:
     """Where the virtual centre sees object `number` (from 1), alone but for the lamps, (H, W) bool."""
     lamps = tuple(light for light in scene.lights if isinstance(light, AreaLight))
-    return _seen(built, scene, folder, number, grid, lamps)
+    return _seen(render_scene, scene, folder, number, grid, lamps)
 
 
 def hidden_by(
-    built: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid, centre: FirstHits
+    render_scene: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid, centre: FirstHits
 ) -> tuple[str, ...]:
     """What stands before object `number` (from 1), which the virtual centre does not see.
 
     Names of objects, "the backdrop", and lamps as "lamp 1 (lights[0])"; what hides most of it comes first.
     `centre` are the first hits of the whole scene on the same grid. Empty if nothing hides it.
     """
-    alone = _seen(built, scene, folder, number, grid, ())
+    alone = _seen(render_scene, scene, folder, number, grid, ())
     row, col = np.nonzero(alone & np.isfinite(centre.z_mm))
     z_mm, owner = centre.z_mm[row, col].astype(np.float64), centre.object_id[row, col]
     point = centre_camera(grid).towards(row, col) * z_mm[:, None]
-    found = Counter(built.names[own] for own in owner[owner > 0].tolist())
+    found = Counter(render_scene.names[number] for number in owner[owner > 0].tolist())
     other = owner == 0
     on_wall = np.zeros(other.shape, dtype=bool)
     if scene.backdrop is not None:
@@ -66,12 +68,12 @@ def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
     rig, centre = as_rig(grid), centre_camera(grid)
     ends = [rig.camera(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
     corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
-    across, down = np.ptp(_projected(corners, centre), axis=0).tolist()
+    across, down = np.ptp(centre.film_px(corners), axis=0).tolist()
     return OnFilm((across, down), any(_meets(corners, one) for one in (centre, *ends)))
 
 
 def _seen(
-    built: RenderScene,
+    render_scene: RenderScene,
     scene: Scene,
     folder: Path,
     number: int,
@@ -81,7 +83,7 @@ def _seen(
     # Only its shape and lamps in view matter, so that no more files than its mesh are needed.
     plain = scene.objects[number - 1].model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5))})
     single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
-    return first_hits_at_centre(build(built.mi, single, folder, 2), grid).object_id == 1
+    return first_hits_at_centre(build(render_scene.mi, single, folder, 2), grid).object_id == 1
 
 
 def _lamps_at(scene: Scene, points: np.ndarray) -> Counter[str]:
@@ -102,14 +104,7 @@ def _lamps_at(scene: Scene, points: np.ndarray) -> Counter[str]:
     return Counter(names[nearest] for nearest in np.argmin(list(away.values()), axis=0).tolist())
 
 
-def _projected(points: np.ndarray, camera: Camera) -> np.ndarray:
-    """Columns and rows (N, 2) of points before a camera, in px from the film's middle."""
-    x, y, z = ((points - camera.position_mm) @ camera.rotation).T
-    scale_px = camera.grid.focal_mm / camera.grid.pixel_mm
-    return np.stack([x / z * scale_px + camera.shift_px[0], y / z * scale_px + camera.shift_px[1]], axis=1)
-
-
 def _meets(points: np.ndarray, camera: Camera) -> bool:
     """Whether the outline of points reaches onto the film."""
-    px, half = _projected(points, camera), np.array([camera.grid.width, camera.grid.height]) / 2
+    px, half = camera.film_px(points), np.array([camera.grid.width, camera.grid.height]) / 2
     return bool(np.all(px.min(axis=0) < half) and np.all(px.max(axis=0) > -half))

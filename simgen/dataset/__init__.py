@@ -1,8 +1,13 @@
 """From a recipe to a dataset on disk: resources, order of work, resuming, many seeds.
 
-generation  From a recipe to a dataset folder: the order of the work, resuming, and the manifest.
-prepared    A recipe with all that it names: its scene, that scene's folder, its camera's sensitivities.
-resources   What a recipe takes of the machine, told before any work: memory of each step, bytes of each
-            product.
-series      A recipe at many seeds: one dataset each, alike in everything but chance.
+dataset_folder    Whose folder it is: what identifies a dataset, finished ones, and unfinished ones that
+                  one run works on.
+generation        From a recipe to a dataset folder: the order of the work.
+manifest_entries  What the manifest says of a dataset: recipe, scene, software, and what work was skipped.
+prepared          A recipe with all that it names, and the parts of it that each stage of the work takes.
+rendered_views    Radiance images of every view on disk: products of a dataset, or what its photon counts
+                  are drawn from.
+resources         What a recipe takes of the machine, estimated before any work: memory of each step,
+                  bytes of each product.
+series            A recipe at many seeds: one dataset each, alike in everything but chance.
 """

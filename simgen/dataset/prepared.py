@@ -1,12 +1,16 @@
-"""A recipe with all that it names: its scene, that scene's folder, its camera's sensitivities."""
+"""A recipe with all that it names, and the parts of it that each stage of the work takes."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from simgen.cameras.calibration import rig_of
+from simgen.dataset.resources import Needs
+from simgen.photons.counting_plan import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene, load_scene
@@ -21,7 +25,7 @@ class Prepared:
     folder: Path
     curves: np.ndarray | None
 
-    def built(self) -> RenderScene:
+    def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
         mi = backend.load(spectral=self.recipe.is_spectral)
         return build(mi, self.scene, self.folder, self.recipe.render.max_depth, self.curves)
@@ -30,4 +34,30 @@ class Prepared:
 def prepare(recipe: Recipe, near: Path | None) -> Prepared:
     """Look up what a recipe of the folder `near` names; `InputError` if it is missing or wrong."""
     scene, folder = load_scene(recipe.scene, near)
-    return Prepared(recipe, scene, folder, sensitivities(recipe, near or Path()))
+    return Prepared(recipe, scene, folder, sensitivities(recipe.sensor, near or Path()))
+
+
+def capture_of(recipe: Recipe) -> Capture:
+    """What of a recipe decides which photons arrive where."""
+    gain = None
+    if recipe.photons.scope == "exposure":
+        assert recipe.exposure is not None
+        gain = photons_per_radiance(recipe.exposure, recipe.grid.pixel_mm)
+    return Capture(rig_of(recipe.grid, recipe.seed), recipe.cfa, recipe.photons, gain, recipe.seed)
+
+
+def needs_of(recipe: Recipe) -> Needs:
+    """What of a recipe takes memory and disk."""
+    return Needs(
+        recipe.grid,
+        recipe.sensor,
+        recipe.photons,
+        recipe.exposure,
+        recipe.products,
+        planes=len(recipe.analysis.z_mm),
+    )
+
+
+def least_samples(recipe: Recipe) -> int:
+    """Samples per pixel of the radiance images that a recipe asks for; 1 if it asks for none."""
+    return 1 if recipe.products.radiance == "none" else recipe.render.samples_per_pixel

@@ -1,4 +1,4 @@
-"""What a recipe takes of the machine, told before any work: memory of each step, bytes of each product.
+"""What a recipe takes of the machine, estimated before any work: memory of each step, bytes of each product.
 
 `simgen check` reports it and `simgen generate` refuses what does not fit, both by this one estimate. Bytes
 per item were measured, as the growth of the process with the number of items.
@@ -15,13 +15,13 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from simgen.photons.majorant import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
-from simgen.photons.photon_counting import Plan
+from simgen.photons.counting_plan import Plan
+from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.spec.camera_grid import Grid
-from simgen.spec.recipe import Recipe
+from simgen.spec.recipe import Exposure, Photons, Products, Sensor
 
 BASE_BYTES = 4e8
-"""What the renderer and its libraries take, whatever the recipe."""
+"""What the renderer and its libraries take, whatever the needs."""
 PIXEL_BYTES = 165.0
 """Of a pixel while the first hits of its view are found; rendering takes less."""
 PLANE_BYTES = 2.0
@@ -29,7 +29,8 @@ PLANE_BYTES = 2.0
 VIEW_BYTES = 400.0
 """Of a camera: where it stands, and what is added up for its view."""
 PHOTON_BYTES = 200.0
-"""Of a photon, or a pixel that counts without any, while the counts are made."""
+"""Of a photon, or a pixel that counts without any, while the counts are made: 135 where the sensor has no
+faults, up to 260 where counters stop and budgets are nested."""
 ORIGIN_BYTES = 30.0
 """Of each of several counts of one pixel while their origins are written."""
 TILE_BYTES = 110.0
@@ -42,7 +43,19 @@ EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
 ROUNDING = 1.05
-"""Two digits are off by up to 5 %: what is told to fit does so."""
+"""Two digits are off by up to 5 %: what is said to fit does so."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What of a recipe takes memory and disk; `planes` is for how many the truth says what is in focus."""
+
+    grid: Grid
+    sensor: Sensor
+    photons: Photons
+    exposure: Exposure | None
+    products: Products
+    planes: int
 
 
 @dataclass(frozen=True)
@@ -62,15 +75,15 @@ class Step:
         )
 
 
-def steps(recipe: Recipe, plan: Plan | None, room: float) -> Iterator[Step]:
+def steps(needs: Needs, plan: Plan | None, room: float) -> Iterator[Step]:
     """Each step's need of memory; `room` is what is available. Without `plan` those that need none."""
-    grid, sensor, products = recipe.grid, recipe.sensor, recipe.products
+    grid, sensor, products = needs.grid, needs.sensor, needs.products
     pixels, views = float(grid.height * grid.width), float(grid.rows * grid.cols)
     yield _linear(PIXEL_BYTES * pixels, room, *_longer("height", grid.height, "width", grid.width))
     yield _linear(VIEW_BYTES * views, room, *_longer("rows", grid.rows, "cols", grid.cols))
-    if products.truth and recipe.analysis.z_mm:
-        planes = len(recipe.analysis.z_mm)
-        yield _linear(PLANE_BYTES * pixels * planes, room, "analysis.z_mm", planes, " planes")
+    if products.truth and needs.planes:
+        needed = PLANE_BYTES * pixels * needs.planes
+        yield _linear(needed, room, "analysis.z_mm", needs.planes, " planes")
     if products.counts:
         counted = PHOTON_BYTES * pixels * views
         yield _linear(counted * sensor.dark_counts, room, "sensor.dark_counts", sensor.dark_counts)
@@ -82,63 +95,63 @@ def steps(recipe: Recipe, plan: Plan | None, room: float) -> Iterator[Step]:
                 many *= ORIGIN_BYTES / PHOTON_BYTES
             yield _linear(many, room, "sensor.hot_pixel_counts", sensor.hot_pixel_counts)
     if plan is not None:
-        yield _of_photons(recipe, plan, room)
+        yield _of_photons(needs, plan, room)
         if plan.thins:
             yield _of_tiles(grid, plan, room)
 
 
-def peak_bytes(recipe: Recipe, plan: Plan | None) -> float:
+def peak_bytes(needs: Needs, plan: Plan | None) -> float:
     """Memory at the peak: of the libraries and of the largest step."""
-    return BASE_BYTES + max(step.bytes for step in steps(recipe, plan, math.inf))
+    return BASE_BYTES + max(step.bytes for step in steps(needs, plan, math.inf))
 
 
-def shortage(recipe: Recipe, plan: Plan | None, room: float) -> Step | None:
+def shortage(needs: Needs, plan: Plan | None, room: float) -> Step | None:
     """The step that is largest beyond the room, None if all fit."""
-    most = max(steps(recipe, plan, room), key=lambda step: step.bytes)
+    most = max(steps(needs, plan, room), key=lambda step: step.bytes)
     return most if most.bytes > room else None
 
 
-def check_resources(recipe: Recipe, plan: Plan | None, out: Path) -> None:
+def check_resources(needs: Needs, plan: Plan | None, out: Path) -> None:
     """Raise `InputError` if memory cannot hold a step, or the disk of `out` the full-light images."""
     room = available_bytes()
-    lacking = shortage(recipe, plan, room)
+    lacking = shortage(needs, plan, room)
     if lacking is not None:
         raise InputError(lacking.sentence(room))
-    needed, free = least_rendered_bytes(recipe, plan), _free_bytes(out)
+    needed, free = least_rendered_bytes(needs, plan), _free_bytes(out)
     if needed > free:
-        what = "products.radiance" if recipe.products.radiance != "none" else "photons, drawn from such"
+        what = "products.radiance" if needs.products.radiance != "none" else "photons, drawn from such"
         raise InputError(
             f"{what}: rendered views of all cameras take {in_bytes(needed)} or more on disk, and {out} has "
             f"{in_bytes(free)} left; take fewer or smaller views, or another disk"
         )
 
 
-def product_bytes(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
+def product_bytes(needs: Needs, plan: Plan | None) -> dict[str, float]:
     """Bytes of each product that the recipe asks for, before compression."""
-    grid, products = recipe.grid, recipe.products
+    grid, products = needs.grid, needs.products
     pixels, views = grid.height * grid.width, grid.rows * grid.cols
     sizes: dict[str, float] = {}
     if plan is not None:
         sizes["counts"] = EVENT_BYTES * min(plan.photons_per_view * views, float(pixels * views))
     if products.radiance != "none":
-        sizes["radiance"] = _rendered_bytes(recipe, None)
+        sizes["radiance"] = _rendered_bytes(needs, None)
     truth = pixels * products.truth + pixels * views * bool(products.view_truth)
     if truth:
         sizes["truth"] = float(TRUTH_BYTES * truth)
     return sizes
 
 
-def least_rendered_bytes(recipe: Recipe, plan: Plan | None) -> float:
+def least_rendered_bytes(needs: Needs, plan: Plan | None) -> float:
     """What the files of rendered views take at least: of products, or for dense counts to be drawn from."""
-    return EXR_SHARE * _rendered_bytes(recipe, plan)
+    return EXR_SHARE * _rendered_bytes(needs, plan)
 
 
-def _rendered_bytes(recipe: Recipe, plan: Plan | None) -> float:
+def _rendered_bytes(needs: Needs, plan: Plan | None) -> float:
     dense = plan is not None and not plan.thins
-    if recipe.products.radiance == "none" and not dense:
+    if needs.products.radiance == "none" and not dense:
         return 0.0
-    pixels = float(recipe.grid.height * recipe.grid.width * recipe.grid.rows * recipe.grid.cols)
-    return 4.0 * pixels * (3 if recipe.products.radiance == "rgb" else 1)
+    pixels = float(needs.grid.height * needs.grid.width * needs.grid.rows * needs.grid.cols)
+    return 4.0 * pixels * (3 if needs.products.radiance == "rgb" else 1)
 
 
 def available_bytes() -> float:
@@ -153,7 +166,7 @@ def available_bytes() -> float:
         room = min(
             room, float((group / "memory.max").read_text()) - float((group / "memory.current").read_text())
         )
-    except (OSError, StopIteration, ValueError):  # not told here, or no limit
+    except (OSError, StopIteration, ValueError):  # not known here, or no limit
         pass
     return room
 
@@ -171,7 +184,7 @@ def rounded(value: float, digits: int) -> str:
 
 
 def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
-    """Tiles of the majorant for first hits at these depths, as `majorant.frame_for` makes; inf: endless."""
+    """Tiles of the majorant for first hits at these depths, as of `disparity_layers.layers_for`; or inf."""
     tile_px, longer = tile_px_for(grid), max(grid.pitch_mm)
     with np.errstate(over="ignore", divide="ignore"):
         disparity_px = np.float64(grid.focal_mm) * longer / grid.pixel_mm / z_mm
@@ -186,12 +199,12 @@ def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
     return count
 
 
-def _of_photons(recipe: Recipe, plan: Plan, room: float) -> Step:
-    grid = recipe.grid
+def _of_photons(needs: Needs, plan: Plan, room: float) -> Step:
+    grid = needs.grid
     photons = plan.photons_per_view * grid.rows * grid.cols
     rows = photons if plan.thins else min(photons, float(grid.height * grid.width * grid.rows * grid.cols))
-    absolute = recipe.exposure if recipe.photons.scope == "exposure" else None
-    field, value = ("photons.budget", recipe.photons.budget)
+    absolute = needs.exposure if needs.photons.scope == "exposure" else None
+    field, value = ("photons.budget", needs.photons.budget)
     if absolute is not None:
         field, value = "exposure.time_s", absolute.time_s
     fits = value * (room / (PHOTON_BYTES * photons)) / ROUNDING if photons > 0 else value
@@ -201,7 +214,7 @@ def _of_photons(recipe: Recipe, plan: Plan, room: float) -> Step:
 def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:
     """The need of the majorant, which grows with disparities and with the number of cameras.
 
-    It is told of the field that is farthest from the paper's camera grid.
+    It names the field that is farthest from the paper's camera grid.
     """
     cameras, usual, z_mm = grid.camera_grid(), Grid(), np.array(plan.depths_mm or (math.inf,))
     pitch, shear = max(grid.pitch_mm), max(grid.shear_px, key=abs)
@@ -258,7 +271,7 @@ def _scaled(pair: tuple[float, float], which: float, share: float) -> tuple[floa
 
 
 def _even(value: float) -> str:
-    """A number told with two digits."""
+    """A number with two digits."""
     return f"{float(f'{value:.2g}'):g}"
 
 

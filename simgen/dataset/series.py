@@ -40,6 +40,6 @@ def generate_series(
     recipes = at_seeds(recipe, count)
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for those of several seeds")
-    for own in recipes:
-        folder = folder_of(out, own)
-        yield folder, generate(own, near, folder)
+    for seeded in recipes:
+        folder = folder_of(out, seeded)
+        yield folder, generate(seeded, near, folder)

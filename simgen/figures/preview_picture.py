@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
+from simgen.base.srgb import linear_to_srgb
 from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.figures.picture_parts import (
@@ -51,21 +52,21 @@ def write_preview(
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
-    built = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
-    picture = render_view(built, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
-    hits = first_hits_at_centre(built, grid)
+    render_scene = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
+    picture = render_view(render_scene, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
+    hits = first_hits_at_centre(render_scene, grid)
     things = hits.object_id > 0
     white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
     box = part_of_interest(things, MARGIN * max(things.shape))
     aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
     figure = new_figure(PANEL_IN * (aspect * 3.84 + 0.2) + 0.5, PANEL_IN + 0.7)
     axes = figure.subplots(1, 3, width_ratios=(1, 1, 1.84))
-    axes[0].imshow(np.clip(picture / max(white, 1e-12), 0, 1) ** (1 / 2.2))
+    axes[0].imshow(linear_to_srgb(picture / max(white, 1e-12)))
     axes[0].set_title("virtual centre")
     hide_frame(axes[0])
     if things.any() and box[0].stop - box[0].start < grid.height:
         frame_part(axes[0], box)
     draw_depth(figure, axes[1], hits.z_mm[box], things[box])
-    draw_objects(axes[2], hits.object_id[box], built.names)
+    draw_objects(axes[2], hits.object_id[box], render_scene.names)
     figure.suptitle(recipe.title or target.scene.title, parse_math=False)
     save_figure(figure, out, dots_per_inch)

@@ -7,6 +7,7 @@ import numpy as np
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from simgen.base.srgb import linear_to_srgb
 
 Box = tuple[slice, slice]
 """Rows and columns of a film."""
@@ -29,7 +30,7 @@ def count_tiles(counts: PhotonCounts, box: Box) -> np.ndarray:
     """Photon counts of the views in bins, (K, L, h, w, 3): mean counts per pixel of each colour.
 
     Of each view the part `box`. A bin is large enough to hold a photon or two where there is light: on a
-    quarter of the pixels, one guesses. Grids of more than `MOST_TILES` cameras to a side are told by some
+    quarter of the pixels, one guesses. Grids of more than `MOST_TILES` cameras to a side show some
     of their views.
     """
     grid, events = counts.grid, counts.events
@@ -53,8 +54,8 @@ def count_tiles(counts: PhotonCounts, box: Box) -> np.ndarray:
 
 def _bins_for(counts: PhotonCounts, box: Box, photons_per_view: float) -> tuple[int, int]:
     sizes = [part.stop - part.start for part in box]
-    lit = LIT_SHARE * sizes[0] * sizes[1] / max(sizes) ** 2
-    side = int(np.clip(np.sqrt(photons_per_view / (COUNTS_PER_BIN * lit)), *BINS))
+    pixels_with_light = LIT_SHARE * sizes[0] * sizes[1] / max(sizes) ** 2
+    side = int(np.clip(np.sqrt(photons_per_view / (COUNTS_PER_BIN * pixels_with_light)), *BINS))
     return _bin_numbers(box, side, counts.cfa)
 
 
@@ -109,9 +110,9 @@ def _as_rgb(mean: np.ndarray) -> np.ndarray:
 
 def joined(tiles: np.ndarray) -> np.ndarray:
     """Tiles (K, L, h, w, 3) as one picture with gaps of white, linear values scaled to 0 .. 1 sRGB."""
-    lit = tiles[tiles > 0]
-    white = float(np.quantile(lit, WHITE_SHARE)) if lit.size else 1.0
-    shown = np.clip(tiles / white, 0, 1) ** (1 / 2.2)
+    positive = tiles[tiles > 0]
+    white = float(np.quantile(positive, WHITE_SHARE)) if positive.size else 1.0
+    shown = linear_to_srgb(tiles / white)
     framed = np.pad(shown, ((0, 0), (0, 0), (0, GAP_PX), (0, GAP_PX), (0, 0)), constant_values=1.0)
     K, L, h, w, _ = framed.shape
     return framed.transpose(0, 2, 1, 3, 4).reshape(K * h, L * w, 3)[:-GAP_PX, :-GAP_PX]

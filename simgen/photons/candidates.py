@@ -1,6 +1,7 @@
-"""Candidates: rays drawn from a majorant, looked at, and followed if that is worth while.
+"""Candidates of photons: rays drawn from a majorant, and followed if they may be bright enough to be kept.
 
-What all backends share. `lanes` works on a whole wavefront at once, `singles` on one ray after the other.
+What all backends share: `wavefront_sampler` traces all candidates at once, `scalar_sampler` one after the
+other.
 """
 
 from dataclasses import dataclass
@@ -12,15 +13,17 @@ import numpy as np
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Cameras, Rig, as_rig
-from simgen.photons.majorant import Majorant, Samples
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.majorant import Majorant
 from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.sensor.photon_table import PhotonTable, no_photons
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What is looked at, by which cameras, through which filters, along how long paths."""
+    """A scene in the renderer, the cameras, the Bayer pattern, and the longest path in segments."""
 
-    built: RenderScene
+    render_scene: RenderScene
     cameras: Cameras
     cfa: str | None
     max_depth: int
@@ -37,34 +40,20 @@ class Setup:
 
     @property
     def channels(self) -> int:
-        """Colours that the sensor tells apart."""
+        """Colours of the sensor's pixels: 3, or 1 for a monochrome sensor."""
         return channel_count(self.cfa)
 
 
-@dataclass(frozen=True)
-class PhotonPaths:
-    """Paths (N,) of photons: camera (k, l), pixel (i, j), film point, first hit's `object_id` and `z_mm`."""
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """The `photons` that candidates gave: a row for each that gave any, n of them, and its first hit.
 
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    row_px: np.ndarray
-    col_px: np.ndarray
-    object_id: np.ndarray
-    z_mm: np.ndarray
-
-
-@dataclass(frozen=True)
-class Accepted(PhotonPaths):
-    """Paths that gave photons, the number of the `candidate` of each, and how many it gave (`multiplicity`).
-
-    `ratio` (F,) is radiance by limit of all paths that were followed beyond their first hit, `over`
-    those that exceeded it.
+    `candidate` (rows,) is the number of each. `ratio` (F,) is radiance by limit of all paths that were
+    followed beyond their first hit, `over` those that exceeded it.
     """
 
+    photons: PhotonTable
     candidate: np.ndarray
-    multiplicity: np.ndarray
     ratio: np.ndarray
     over: Samples
 
@@ -98,17 +87,18 @@ class CandidateSampler(Protocol):
         """
         ...
 
-    def look_around(self, number: int, follow: int, seed: int) -> Samples:
+    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
         """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
 
-        Those that fall beside the film are left out. How much the others tell depends on the backend.
+        Those that fall beside the film are left out. Where nothing follows one, its `light` is NaN (see
+        `Samples`); how many are not followed depends on the backend.
         """
         ...
 
 
-def paths_of(pool: CandidateSampler, candidates: int, followed: int) -> int:
+def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:
     """Light paths of so many candidates, of which some are followed beyond their first hit."""
-    return candidates + (pool.paths_each - 1) * followed
+    return candidates + (sampler.paths_each - 1) * followed
 
 
 @dataclass(frozen=True)
@@ -134,6 +124,4 @@ def chances(setup: Setup, majorant: Majorant, cells: np.ndarray) -> Chances:
 def nothing(channels: int) -> Accepted:
     """No photons."""
     whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
-    over = Samples(whole, whole, whole, whole, real, colours, colours)
-    object_id = np.zeros(0, np.int16)
-    return Accepted(whole, whole, whole, whole, real, real, object_id, real, whole, whole, real, over)
+    return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))

@@ -26,7 +26,7 @@ PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
 DEPTHS = 64
-"""Depths are told apart in so many equal steps of disparity."""
+"""Depths are rounded to so many equal steps of disparity."""
 
 
 @dataclass(frozen=True)
@@ -56,18 +56,18 @@ class Probe:
         return max(noise, math.ceil(error**2), 1)
 
 
-def probe(built: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
+def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
     """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
     small = replace(_coarse(grid), rows=1, cols=1)
     first, second = (
         sense(
             render_view(
-                built,
+                render_scene,
                 small,
                 0,
                 0,
                 samples_per_pixel=PROBE_SAMPLES,
-                seed=seeds.integer(seed, view=0, stage="probe", part=part),
+                seed=seeds.integer(seed, stage="plan probe", part=part),
             ),
             cfa,
         ).astype(np.float64)
@@ -78,10 +78,10 @@ def probe(built: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> P
     return Probe(float((first + second).mean() / 2), float(variance))
 
 
-def depths_seen(built: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
+def depths_seen(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
     """Up to `DEPTHS` depths in mm, of what a coarse look from the corner cameras finds; inf for nothing."""
     small, ends = _coarse(grid), [(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
-    z_mm = np.concatenate([first_hits_of_view(built, small, k, l).z_mm.ravel() for k, l in ends])
+    z_mm = np.concatenate([first_hits_of_view(render_scene, small, k, l).z_mm.ravel() for k, l in ends])
     nearest = float(z_mm.min())
     if not nearest < math.inf:
         return (math.inf,)

@@ -1,4 +1,4 @@
-"""Which way candidates are worked on: all at once where a compiled backend runs, else one by one."""
+"""Which sampler of candidates: all at once where a compiled backend runs, else one by one."""
 
 from collections.abc import Sequence
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from simgen.photons.candidates import CandidateSampler, Setup
 from simgen.photons.majorant import Majorant
-from simgen.photons.scalar_sampler import SinglePool
-from simgen.photons.wavefront_sampler import LanePool
+from simgen.photons.scalar_sampler import ScalarSampler
+from simgen.photons.wavefront_sampler import WavefrontSampler
 from simgen.renderer.path_tracing import surrounding_radiance
 from simgen.renderer.wavelengths import light_of
 
@@ -17,16 +17,16 @@ def sampler_for(
 ) -> CandidateSampler:
     """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
     if _is_scalar(setup):
-        return SinglePool(setup, majorant, groups)
-    return LanePool(setup, majorant, groups, ambient)
+        return ScalarSampler(setup, majorant, groups)
+    return WavefrontSampler(setup, majorant, groups, ambient)
 
 
 def surroundings(setup: Setup) -> np.ndarray:
     """What pixels see of what shines from all around (C,), where candidates are guessed at; else zeros."""
     if _is_scalar(setup):
         return np.zeros(setup.channels)
-    return surrounding_radiance(setup.built, light_of(setup.built, setup.cfa))
+    return surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
 
 
 def _is_scalar(setup: Setup) -> bool:
-    return setup.built.mi.variant().startswith("scalar")
+    return setup.render_scene.mi.variant().startswith("scalar")

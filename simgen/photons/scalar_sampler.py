@@ -1,6 +1,7 @@
 """Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call of the renderer each.
 
-A call takes about a microsecond, less than a first guess would: every candidate on its own tile is followed.
+A call takes about a microsecond, less than a guess of the radiance would: every candidate whose first hit
+belongs to the tile that it was drawn for is followed.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,8 +13,10 @@ import numpy as np
 from pcii.core.bayer import colour_cells
 from simgen.base.srgb import LUMINANCE
 from simgen.photons.candidates import Accepted, Setup, chances
-from simgen.photons.majorant import Majorant, Samples
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.majorant import Majorant
 from simgen.renderer.backend import shape_numbers
+from simgen.sensor.photon_table import PhotonTable
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""
@@ -23,7 +26,7 @@ PART = 1 << 14
 
 
 @dataclass(frozen=True)
-class _Rays:
+class _Candidates:
     """Candidates (N,): camera, pixel, point of the film, entry of the majorant, colour, point of the lens.
 
     `lens_x_mm` and `lens_y_mm` are 0 without a lens.
@@ -40,11 +43,11 @@ class _Rays:
     lens_x_mm: np.ndarray
     lens_y_mm: np.ndarray
 
-    def take(self, which: np.ndarray) -> "_Rays":
-        return _Rays(**{name: column[which] for name, column in vars(self).items()})
+    def take(self, which: np.ndarray) -> "_Candidates":
+        return _Candidates(**{name: column[which] for name, column in vars(self).items()})
 
 
-class SinglePool:
+class ScalarSampler:
     """The `CandidateSampler` of scalar mode."""
 
     paths_each, max_dark_candidates = PATHS, 1 << 17
@@ -52,130 +55,148 @@ class SinglePool:
     def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
         self.setup, self.majorant = setup, majorant
         self.groups = [chances(setup, majorant, cells) for cells in groups]
-        self.mass = np.array([own.running[-1] for own in self.groups])
+        self.mass = np.array([one.running[-1] for one in self.groups])
 
     def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
         """See `candidates`."""
         rng = np.random.default_rng(seed)
-        rays, chance = self._draw(rng, group, view), rng.random(group.size)
-        candidate = self._inside(rays)
-        rays, chance = rays.take(candidate), chance[candidate]
-        object_id, z_mm = self._first_hits(rays)
-        own = self.majorant.owner_of(self._samples(rays, z_mm)) == rays.entry
-        rays, candidate, chance = rays.take(own), candidate[own], chance[own]
-        object_id, z_mm = object_id[own], z_mm[own]
-        light = self._follow(rays, rng, seed)
-        at = np.arange(light.shape[0]), rays.colour
-        ratio = light[at] / self.majorant.bound[rays.entry, rays.colour]
+        candidates, chance = self._draw(rng, group, view), rng.random(group.size)
+        candidate = self._inside(candidates)
+        candidates, chance = candidates.take(candidate), chance[candidate]
+        object_id, z_mm = self._first_hits(candidates)
+        followed = self.majorant.owner_of(self._samples(candidates, z_mm)) == candidates.entry
+        candidates = candidates.take(followed)
+        candidate, chance = candidate[followed], chance[followed]
+        object_id, z_mm = object_id[followed], z_mm[followed]
+        light = self._follow(candidates, rng, seed)
+        at = np.arange(light.shape[0]), candidates.colour
+        ratio = light[at] / self.majorant.bound[candidates.entry, candidates.colour]
         multiplicity = (ratio + chance).astype(np.int64)
         kept, over = np.flatnonzero(multiplicity), np.flatnonzero(ratio > 1)
-        photon = rays.take(kept)
+        photon = candidates.take(kept)
         return Accepted(
-            k=photon.k,
-            l=photon.l,
-            i=photon.row,
-            j=photon.col,
-            row_px=photon.row_px,
-            col_px=photon.col_px,
-            object_id=object_id[kept],
-            z_mm=z_mm[kept],
+            photons=PhotonTable(
+                k=photon.k,
+                l=photon.l,
+                i=photon.row,
+                j=photon.col,
+                n=multiplicity[kept],
+                object_id=object_id[kept],
+                z_mm=z_mm[kept],
+            ),
             candidate=candidate[kept],
-            multiplicity=multiplicity[kept],
             ratio=ratio,
-            over=self._samples(rays.take(over), z_mm[over], light[over]),
+            over=self._samples(candidates.take(over), z_mm[over], light[over]),
         )
 
-    def look_around(self, number: int, follow: int, seed: int) -> Samples:
-        """See `candidates`; only those that are followed tell anything."""
+    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
+        """See `candidates`; only those that are followed are traced."""
         rng = np.random.default_rng(seed)
-        rays = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)
-        rays = rays.take(self._inside(rays))
-        looks = enumerate(self._looks(rays))
-        light = np.sum([self._follow(own, rng, seed + look) for look, own in looks], axis=0)
-        return self._samples(rays, self._first_hits(rays)[1], light)
+        candidates = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)
+        candidates = candidates.take(self._inside(candidates))
+        turns = enumerate(self._in_colours(candidates))
+        light = np.sum([self._follow(recoloured, rng, seed + turn) for turn, recoloured in turns], axis=0)
+        return self._samples(candidates, self._first_hits(candidates)[1], light)
 
-    def _looks(self, rays: _Rays) -> Iterator[_Rays]:
-        """The rays as often as they must be followed to tell of all colours."""
-        if self.setup.built.filters is None:
-            yield rays
+    def _in_colours(self, candidates: _Candidates) -> Iterator[_Candidates]:
+        """The candidates as often as they must be followed to show all colours."""
+        if self.setup.render_scene.filters is None:
+            yield candidates
             return
         for colour in range(self.setup.channels):
-            yield replace(rays, colour=np.full_like(rays.colour, colour))
+            yield replace(candidates, colour=np.full_like(candidates.colour, colour))
 
-    def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> _Rays:
+    def _draw(self, rng: np.random.Generator, group: np.ndarray, view: np.ndarray | None) -> _Candidates:
         """Tile and cell by the bound, the rest evenly."""
         grid, majorant = self.setup.grid, self.majorant
         if view is None:
             view = rng.integers(0, grid.view_count, group.size)
         target, entry = rng.random(group.size), np.empty(group.size, dtype=np.int64)
         cell = np.empty(group.size, dtype=np.int64)
-        for number, own in enumerate(self.groups):
+        for number, chances_here in enumerate(self.groups):
             here = group == number
-            found = np.searchsorted(own.running, target[here] * own.running[-1], side="right")
-            found = np.minimum(found, own.running.size - 1)
-            entry[here], cell[here] = own.entry[found], own.cell[found]
+            found = np.searchsorted(
+                chances_here.running, target[here] * chances_here.running[-1], side="right"
+            )
+            found = np.minimum(found, chances_here.running.size - 1)
+            entry[here], cell[here] = chances_here.entry[found], chances_here.cell[found]
         side, layer = majorant.side_px[entry], majorant.layer[entry]
         k, l = np.divmod(view, grid.cols)
         # One number gives the pixel (its whole part) and the place within the pixel (the rest).
         down, right = rng.random((2, group.size)) * (side // 2)
         row = majorant.row[entry] * side + 2 * down.astype(np.int64) + (cell >> 1)
         col = majorant.col[entry] * side + 2 * right.astype(np.int64) + (cell & 1)
-        row -= np.where(layer < 0, 0, majorant.frame.row_shift[layer, k])
-        col -= np.where(layer < 0, 0, majorant.frame.col_shift[layer, l])
+        row -= np.where(layer < 0, 0, majorant.layers.row_shift[layer, k])
+        col -= np.where(layer < 0, 0, majorant.layers.col_shift[layer, l])
         row_px, col_px = row + down % 1 - 0.5, col + right % 1 - 0.5
         lens_point, rig = np.zeros((2, group.size)), self.setup.rig
         if rig.lens is not None:
             lens_point = rig.lens_points(rng.random((2, group.size)))
         colour = colour_cells(self.setup.cfa).ravel()[cell]
-        return _Rays(k, l, row, col, row_px, col_px, entry, colour, *lens_point)
+        return _Candidates(k, l, row, col, row_px, col_px, entry, colour, *lens_point)
 
-    def _inside(self, rays: _Rays) -> np.ndarray:
+    def _inside(self, candidates: _Candidates) -> np.ndarray:
         """Numbers of those that fall on the film."""
         H, W = self.setup.grid.height, self.setup.grid.width
-        return np.flatnonzero((rays.row >= 0) & (rays.row < H) & (rays.col >= 0) & (rays.col < W))
+        return np.flatnonzero(
+            (candidates.row >= 0) & (candidates.row < H) & (candidates.col >= 0) & (candidates.col < W)
+        )
 
-    def _first_hits(self, rays: _Rays) -> tuple[np.ndarray, np.ndarray]:
+    def _first_hits(self, candidates: _Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
-        built, intersect = self.setup.built, self.setup.built.scene.ray_intersect
-        numbers = zip(built.scene.shapes(), shape_numbers(built.scene), strict=True)
-        ids = {shape.id(): built.object_of_shape[number] for shape, number in numbers}
-        object_id, z_mm = np.zeros(rays.k.size, np.int16), np.full(rays.k.size, np.inf, np.float32)
-        for number, ray in enumerate(self._traced(rays)):
+        render_scene, intersect = self.setup.render_scene, self.setup.render_scene.scene.ray_intersect
+        numbers = zip(render_scene.scene.shapes(), shape_numbers(render_scene.scene), strict=True)
+        ids = {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
+        object_id, z_mm = (
+            np.zeros(candidates.k.size, np.int16),
+            np.full(candidates.k.size, np.inf, np.float32),
+        )
+        for number, ray in enumerate(self._traced(candidates)):
             hit = intersect(ray)
             if hit.is_valid():
                 object_id[number], z_mm[number] = ids[hit.shape.id()], hit.p.z
         return object_id, z_mm
 
-    def _follow(self, rays: _Rays, rng: np.random.Generator, seed: int) -> np.ndarray:
+    def _follow(self, candidates: _Candidates, rng: np.random.Generator, seed: int) -> np.ndarray:
         """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0."""
-        built = self.setup.built
-        sampler = built.mi.load_dict({"type": "independent"})
+        render_scene = self.setup.render_scene
+        sampler = render_scene.mi.load_dict({"type": "independent"})
         sampler.seed(seed, 1)
-        sample, scene = built.scene.integrator().sample, built.scene
-        if built.filters is None:
-            rgb = np.empty((rays.k.size, 3))
-            for number, ray in enumerate(self._traced(rays)):
+        sample, scene = render_scene.scene.integrator().sample, render_scene.scene
+        if render_scene.filters is None:
+            rgb = np.empty((candidates.k.size, 3))
+            for number, ray in enumerate(self._traced(candidates)):
                 rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
             rgb /= PATHS
             return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
-        chosen_nm, weight = built.filters.draw(rays.colour, rng.random(rays.k.size))
-        seen = np.zeros((rays.k.size, self.setup.channels))
-        for number, ray in enumerate(self._traced(rays)):
+        chosen_nm, weight = render_scene.filters.draw(candidates.colour, rng.random(candidates.k.size))
+        light = np.zeros((candidates.k.size, self.setup.channels))
+        for number, ray in enumerate(self._traced(candidates)):
             ray.wavelengths = chosen_nm[number].tolist()
             radiance = np.array(sum(sample(scene, sampler, ray)[0] for _ in range(PATHS)))
-            seen[number, rays.colour[number]] = weight[number] @ radiance / PATHS
-        return seen
+            light[number, candidates.colour[number]] = weight[number] @ radiance / PATHS
+        return light
 
-    def _traced(self, rays: _Rays) -> Iterator[Any]:
+    def _traced(self, candidates: _Candidates) -> Iterator[Any]:
         """The renderer's rays."""
-        mi, lens_point = self.setup.built.mi, np.stack([rays.lens_x_mm, rays.lens_y_mm])
-        origins, directions = self.setup.rig.rays(rays.k, rays.l, rays.row_px, rays.col_px, lens_point)
+        mi, lens_point = self.setup.render_scene.mi, np.stack([candidates.lens_x_mm, candidates.lens_y_mm])
+        origins, directions = self.setup.rig.rays(
+            candidates.k, candidates.l, candidates.row_px, candidates.col_px, lens_point
+        )
         columns = np.concatenate([origins, directions], axis=1)
         # Python's numbers take several times the memory of NumPy's, so there are never many at once.
         for part in np.split(columns, range(PART, len(columns), PART)):
             for ray in part.tolist():
                 yield mi.RayDifferential3f(mi.Point3f(ray[:3]), mi.Vector3f(ray[3:]))
 
-    def _samples(self, rays: _Rays, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
-        guess = np.full((rays.k.size, self.setup.channels), GUESS)
-        return Samples(rays.k, rays.l, rays.row, rays.col, z_mm, guess, guess if light is None else light)
+    def _samples(self, candidates: _Candidates, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
+        guess = np.full((candidates.k.size, self.setup.channels), GUESS)
+        return Samples(
+            candidates.k,
+            candidates.l,
+            candidates.row,
+            candidates.col,
+            z_mm,
+            guess,
+            guess if light is None else light,
+        )

@@ -18,7 +18,7 @@ the majorant as it is by then.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -26,10 +26,12 @@ import numpy as np
 from pcii.base.progress import Report, silent
 from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, PhotonPaths, Setup, paths_of
+from simgen.photons.candidates import CandidateSampler, Setup, paths_of
 from simgen.photons.majorant import Majorant
+from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, places, scopes_for
 from simgen.photons.pilot import explore
 from simgen.photons.samplers import sampler_for
+from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
 OVERSHOOT_SHARE = 1e-4
@@ -43,53 +45,6 @@ EXCESS_SHARE = 5e-5
 LIKELY_SHARE = 0.3
 """Share of the candidates that are kept, until it is known."""
 LEAST_SHARE = 1e-4
-WAVEFRONT = 1 << 21
-"""Candidates traced at once at most."""
-KINDS = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int32) | {
-    "row_px": np.float32,
-    "col_px": np.float32,
-    "object_id": np.int16,
-    "z_mm": np.float32,
-}
-"""How the columns of a list of photons are kept."""
-
-
-@dataclass(frozen=True)
-class PhotonList(PhotonPaths):
-    """One path for each photon (N,), ordered by view and pixel.
-
-    `scope` is the number of the scope that each was drawn for and `rank` its place there: the first n
-    of a scope are themselves an exact draw of n photons. `log` says how they came about.
-    """
-
-    scope: np.ndarray
-    rank: np.ndarray
-    log: dict[str, Any]
-
-
-@dataclass
-class _Scopes:
-    """What photons are counted over, (S,): view (-1: all together), group of cells, and progress."""
-
-    view: np.ndarray
-    group: np.ndarray
-    wanted: np.ndarray
-
-    def __post_init__(self) -> None:
-        self.start()
-
-    def start(self) -> None:
-        """Nothing is drawn yet."""
-        self.got = np.zeros(self.view.size, dtype=np.int64)
-        self.tried = np.zeros(self.view.size, dtype=np.int64)
-
-    def open(self, max_dark_candidates: int) -> np.ndarray:
-        """Numbers of those that still want photons and are not dark.
-
-        Dark are those of which `max_dark_candidates` found nothing.
-        """
-        dark = (self.got == 0) & (self.tried >= max_dark_candidates)
-        return np.flatnonzero((self.got < self.wanted) & ~dark)
 
 
 @dataclass
@@ -108,8 +63,10 @@ def thin_photons(
     seed: int,
     photons_per_radiance: float | None = None,
     report: Report = silent,
-) -> PhotonList:
-    """All photons of all views; the same for the same setup, settings and seed.
+) -> tuple[PhotonTable, dict[str, Any]]:
+    """All photons of all views, ordered by view and pixel, and a log of how they came about.
+
+    One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     """
@@ -124,19 +81,17 @@ class _Drawing:
     ) -> None:
         self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
         self.gain = photons_per_radiance
-        self.groups = [np.arange(4)]
-        if photons.scope == "channel":
-            cells = colour_cells(setup.cfa).ravel()
-            self.groups = [np.flatnonzero(cells == colour) for colour in range(setup.channels)]
-        self.scopes, self.tally = self._scopes(), _Tally()
+        self.groups = cell_groups(photons.scope, setup.cfa)
+        self.scopes = scopes_for(photons, setup.grid.view_count, len(self.groups), seed)
+        self.tally = _Tally()
         self.pilot = explore(setup, self._expected, seed)
         self.share = LIKELY_SHARE
         self.attempt = 0
 
-    def run(self) -> PhotonList:
+    def run(self) -> tuple[PhotonTable, dict[str, Any]]:
         """Warm up and draw, anew if too many photons came in clumps."""
         paths = self.pilot.paths
-        drawn: list[dict[str, np.ndarray]] = []
+        drawn: list[PhotonTable] = []
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
@@ -160,7 +115,9 @@ class _Drawing:
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        return _joined(self.setup, drawn, log)
+        photons = joined([no_photons(), *drawn])
+        drawn.clear()  # there may be tens of millions of photons: none is kept twice while they are sorted
+        return photons.by_pixel(self.setup.grid), log
 
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""
@@ -168,22 +125,6 @@ class _Drawing:
             return float(self.scopes.wanted.sum())
         grid, cells = self.setup.grid, colour_cells(self.setup.cfa).ravel()
         return float(self.gain * mean[cells].mean() * grid.view_count * grid.height * grid.width)
-
-    def _scopes(self) -> _Scopes:
-        """The scopes; how many photons each gets of a budget is part of the experiment."""
-        photons, views = self.photons, np.arange(self.setup.grid.view_count)
-        if photons.scope == "scene":
-            views = np.array([-1])
-        groups = np.arange(len(self.groups))
-        view, group = views.repeat(groups.size), np.tile(groups, views.size)
-        if self.gain is not None:
-            wanted = np.full(view.size, np.iinfo(np.int64).max)
-        elif photons.statistics == "multinomial":
-            wanted = np.full(view.size, round(photons.budget))
-        else:
-            totals = seeds.generator(self.seed, view=0, stage="totals")
-            wanted = totals.poisson(photons.budget, view.size)
-        return _Scopes(view, group, wanted)
 
     def _warm_up(self) -> int:
         """Draw candidates for nothing but to lift the majorant where it is exceeded; how many paths it took.
@@ -195,12 +136,12 @@ class _Drawing:
         majorant, paths = self._majorant(), 0
         for done in range(WARM_UP_ROUNDS):
             group = np.arange(number) % len(self.groups)
-            path_seed = seeds.integer(self.seed, view=2, stage="pilot", part=done)
-            pool = self._pool()
-            found = pool.try_candidates(group, None, path_seed)
-            paths += paths_of(pool, number, found.ratio.size)
+            path_seed = seeds.integer(self.seed, stage="warm-up", round_number=done)
+            sampler = self._sampler()
+            found = sampler.try_candidates(group, None, path_seed)
+            paths += paths_of(sampler, number, found.ratio.size)
             factor = _factor(found.ratio)
-            self.share = max(found.multiplicity.sum() / number / factor, LEAST_SHARE)
+            self.share = max(found.photons.n.sum() / number / factor, LEAST_SHARE)
             majorant.scale(factor)
             majorant.lift(found.over)
         return paths
@@ -209,50 +150,56 @@ class _Drawing:
         assert self.pilot.majorant is not None
         return self.pilot.majorant
 
-    def _pool(self) -> CandidateSampler:
+    def _sampler(self) -> CandidateSampler:
         return sampler_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
 
-    def _budgeted(self) -> Iterator[dict[str, np.ndarray]]:
+    def _budgeted(self) -> Iterator[PhotonTable]:
         """Rounds of candidates until every scope has its photons, or is dark."""
-        for number, block in enumerate(_blocks(self.scopes.wanted)):
+        for part, block in enumerate(self.scopes.blocks()):
             round_number = 0
             while (wanting := np.intersect1d(self.scopes.open(self.pilot.max_dark_candidates), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
-                candidates = _candidates_needed(missing, round_number, self.share)
-                part = self.attempt << 16 | round_number
-                yield self._round(wanting, candidates, self._pool(), number, part)
+                candidates = candidates_needed(missing, round_number, self.share)
+                yield self._round(wanting, candidates, self._sampler(), part, round_number)
                 round_number += 1
                 got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
                 self.report(self._stage("photons"), got, wanted)
 
-    def _exposed(self) -> Iterator[dict[str, np.ndarray]]:
+    def _exposed(self) -> Iterator[PhotonTable]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
         assert self.gain is not None
         views = np.arange(self.setup.grid.view_count)
-        parts = int(np.ceil(self.gain * self._pool().mass[0] * views.size / (WAVEFRONT / 2)))
+        parts = int(np.ceil(self.gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
         for part in range(parts):
-            pool = self._pool()
-            rng = seeds.generator(self.seed, view=part, stage="totals", part=self.attempt)
-            candidates = rng.poisson(self.gain / parts * pool.mass[0], views.size)
-            yield self._round(views, candidates, pool, part, self.attempt << 16)
+            sampler = self._sampler()
+            rng = seeds.generator(self.seed, stage="exposure candidates", part=part, attempt=self.attempt)
+            candidates = rng.poisson(self.gain / parts * sampler.mass[0], views.size)
+            yield self._round(views, candidates, sampler, part)
             self.report(self._stage("parts of the exposure"), part + 1, parts)
 
     def _stage(self, what: str) -> str:
-        """What progress is told of: each attempt is a stage of its own, which says why it begins again."""
+        """Name of a stage in reports of progress; of another attempt it says why everything begins again."""
         again = f", drawn again with a higher bound (attempt {self.attempt + 1})"
         return what + again * (self.attempt > 0)
 
     def _round(
-        self, scopes: np.ndarray, candidates: np.ndarray, pool: CandidateSampler, number: int, part: int
-    ) -> dict[str, np.ndarray]:
-        """Photons of one round: so many candidates for each of these scopes."""
+        self,
+        scopes: np.ndarray,
+        candidates: np.ndarray,
+        sampler: CandidateSampler,
+        part: int,
+        round_number: int = 0,
+    ) -> PhotonTable:
+        """Photons of one round of a part of the work: so many candidates for each of these scopes."""
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
-        path_seed = seeds.integer(self.seed, view=number, stage="paths", part=part)
-        found = pool.try_candidates(self.scopes.group[owner], views, path_seed)
+        path_seed = seeds.integer(
+            self.seed, stage="candidate paths", part=part, attempt=self.attempt, round_number=round_number
+        )
+        found = sampler.try_candidates(self.scopes.group[owner], views, path_seed)
         # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
-        pool.majorant.lift(found.over, reach=1 + self.attempt)
-        path = np.arange(found.k.size).repeat(found.multiplicity)
+        sampler.majorant.lift(found.over, reach=1 + self.attempt)
+        path = np.arange(found.candidate.size).repeat(found.photons.n)
         scope = owner[found.candidate[path]]
         rank = places(scope) + self.scopes.got[scope]
         taken = rank < self.scopes.wanted[scope]
@@ -261,13 +208,12 @@ class _Drawing:
         self.scopes.tried[scopes] += candidates
         self.tally.candidates += owner.size
         self.tally.followed += found.ratio.size
-        self.tally.paths += paths_of(pool, owner.size, found.ratio.size)
+        self.tally.paths += paths_of(sampler, owner.size, found.ratio.size)
         self.tally.kept += path.size
         self.tally.overshoot += int((np.diff(path) == 0).sum())
-        self.share = max(found.multiplicity.sum() / max(owner.size, 1), LEAST_SHARE)
-        own = {field.name: getattr(found, field.name) for field in fields(PhotonPaths)}
-        columns = {name: column[path] for name, column in own.items()} | {"scope": scope, "rank": rank}
-        return {name: column.astype(KINDS[name]) for name, column in columns.items()}
+        self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)
+        photons = found.photons.take(path)
+        return replace(photons, n=np.ones_like(photons.n), scope=scope, rank=rank)
 
 
 def _factor(ratio: np.ndarray) -> float:
@@ -279,38 +225,3 @@ def _factor(ratio: np.ndarray) -> float:
     if allowed <= 0:
         return 1.0
     return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))
-
-
-def _blocks(wanted: np.ndarray) -> Iterator[np.ndarray]:
-    """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""
-    block = (np.cumsum(wanted) - 1) // (WAVEFRONT // 4)
-    yield from np.split(np.arange(wanted.size), np.flatnonzero(np.diff(block)) + 1)
-
-
-def _candidates_needed(missing: np.ndarray, round_number: int, share: float) -> np.ndarray:
-    """How many to draw for each scope: about what is missing at first, then enough to be done.
-
-    Together never more than fit a wavefront.
-    """
-    aim = missing if round_number == 0 else missing + 3.5 * np.sqrt(missing) + 4
-    return np.clip(aim / share, 16, max(WAVEFRONT // missing.size, 16)).astype(np.int64)
-
-
-def places(scope: np.ndarray) -> np.ndarray:
-    """Place (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
-    number = np.bincount(scope)
-    first = np.cumsum(number) - number
-    return np.arange(scope.size) - first[scope]
-
-
-def _joined(setup: Setup, drawn: list[dict[str, np.ndarray]], log: dict[str, Any]) -> PhotonList:
-    """All batches as one list, ordered by view and pixel, those of one pixel as they were drawn."""
-    drawn = [{name: np.zeros(0, kind) for name, kind in KINDS.items()}, *drawn]
-    pixel = np.concatenate(
-        [np.ravel_multi_index([b[n] for n in "klij"], setup.grid.shape_KLHW) for b in drawn]
-    )
-    # With the place in the list as a last digit no two are equal, and any sort will do.
-    order = np.argsort(pixel * pixel.size + np.arange(pixel.size))
-    # A column leaves its batches when it is joined: there may be tens of millions of photons.
-    columns = {name: np.concatenate([batch.pop(name) for batch in drawn])[order] for name in KINDS}
-    return PhotonList(**columns, log=log)

@@ -1,8 +1,10 @@
 """The one room that knows Mitsuba: backends, scenes, light paths, radiance.
 
 backend           The renderer behind everything: the one place that loads Mitsuba and Dr.Jit.
+device_arrays     NumPy's arrays as the renderer's, and parts of those; for compiled backends.
 intersection      Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one
                   in scalar mode.
+mitsuba_camera    Cameras as Mitsuba's: its sensors, and rays through points of their films.
 mitsuba_colours   Colours and spectra as Mitsuba's textures, in the variant that is set.
 mitsuba_lights    Lights as Mitsuba's emitters, and how bright they make a plane.
 mitsuba_scene     From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never

@@ -14,13 +14,13 @@ PART = 1 << 14
 """In scalar mode so many rays are Python numbers at once: those take several times the memory of NumPy's."""
 
 
-def first_objects(built: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
-    mi, scene = built.mi, built.scene
+    mi, scene = render_scene.mi, render_scene.scene
     unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
     if _one_by_one(mi):
         numbers = zip(scene.shapes(), shape_numbers(scene), strict=True)
-        ids = {shape.id(): built.object_of_shape[number] for shape, number in numbers}
+        ids = {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
         found = np.zeros(len(unit), dtype=np.int16)
         origin = mi.Point3f(*origin_mm)
         for number, towards in enumerate(_rows(unit)):
@@ -32,12 +32,12 @@ def first_objects(built: RenderScene, origin_mm: np.ndarray, direction: np.ndarr
     origins = np.broadcast_to(origin_mm, unit.shape)
     hit = scene.ray_intersect_preliminary(mi.Ray3f(_column(mi.Point3f, origins), _column(mi.Vector3f, unit)))
     shape = dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0)
-    return built.object_of_shape[np.array(shape)]
+    return render_scene.object_of_shape[np.array(shape)]
 
 
-def blocked(built: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
+def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
     """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
-    mi, scene = built.mi, built.scene
+    mi, scene = render_scene.mi, render_scene.scene
     away = target_mm - origin_mm
     length = np.linalg.norm(away, axis=-1)
     unit, reach = away / length[:, None], length * (1 - SHY_OF_TARGET)

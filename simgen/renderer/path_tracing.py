@@ -4,16 +4,14 @@ The estimator is path tracing with next-event estimation (Kajiya 1986) and multi
 by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
 chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
 varies, the fewer candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays
-of one lane a ray. Needs a compiled backend.
+with an element for each ray. Needs a compiled backend.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from simgen.cameras.rig import Rig
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.wavelengths import Light
@@ -34,7 +32,7 @@ GOLDEN = (5**0.5 - 1) / 2
 class FirstHits:
     """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
 
-    `guess` is the radiance that can be told without a light path: what shines itself, else what the
+    `guess` is the radiance that is known without a light path: what shines itself, else what the
     lamps would give if nothing stood in the way, and light from all around.
     """
 
@@ -44,55 +42,17 @@ class FirstHits:
     guess: Any
 
 
-def film_rays(
-    built: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
-) -> Any:
-    """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`."""
-    mi, dr, grid = built.mi, load_drjit(), rig.grid
-    camera = k * grid.cols + l
-
-    def own(values: np.ndarray) -> Any:
-        if (values == values.flat[0]).all():
-            return float(values.flat[0])  # what all cameras share needs no look-up
-        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
-
-    def turned(*vector: Any) -> list[Any]:
-        columns = range(len(vector))
-        return [_dot([own(rig.rotation[..., row, col]) for col in columns], vector) for row in range(3)]
-
-    per_px = grid.pixel_mm / grid.focal_mm
-    x = (col_px - own((grid.width - 1) / 2 + rig.shift_px[..., 0])) * per_px
-    y = (row_px - own((grid.height - 1) / 2 + rig.shift_px[..., 1])) * per_px
-    origin = mi.Point3f(*(own(rig.position_mm[..., axis]) for axis in range(3)))
-    if rig.lens is not None:
-        x, y = x - lens_point.x / rig.lens.focus_mm, y - lens_point.y / rig.lens.focus_mm
-        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
-    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
-    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
-
-
-def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
-    """Sum of products, but for what is multiplied by a plain 0 or 1."""
-    parts = zip(row, vector, strict=True)
-    terms = [part if isinstance(f, float) and f == 1 else f * part for f, part in parts if not _is_zero(f)]
-    return sum(terms[1:], terms[0]) if terms else 0
-
-
-def _is_zero(factor: Any) -> bool:
-    return isinstance(factor, float) and factor == 0
-
-
-def hit_first(built: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
+def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstHits:
     """What each active ray hits first; `ambient` is the radiance that is guessed to come from all around."""
-    mi, dr = built.mi, load_drjit()
-    record = built.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
+    mi, dr = render_scene.mi, load_drjit()
+    record = render_scene.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
     found = active & hit.is_valid()
     shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
     z_mm = dr.select(found, hit.p.z, dr.inf)
-    guess = hit.emitter(built.scene, active).eval(hit, active)
+    guess = hit.emitter(render_scene.scene, active).eval(hit, active)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
-    for lamp in _lamps(built.scene):
+    for lamp in _lamps(render_scene.scene):
         towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
         scattered = bsdf.eval(context, hit, hit.to_local(towards.d), found)
         guess += dr.select(found & (towards.pdf > 0), scattered * weight, 0)
@@ -101,10 +61,10 @@ def hit_first(built: RenderScene, ray: Any, active: Any, ambient: Any) -> FirstH
     return FirstHits(record, shape, z_mm, guess)
 
 
-def surrounding_radiance(built: RenderScene, light: Light) -> np.ndarray:
+def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
-    mi, dr = built.mi, load_drjit()
-    around = built.scene.environment()
+    mi, dr = render_scene.mi, load_drjit()
+    around = render_scene.scene.environment()
     number = dr.arange(mi.Float, 256) + 0.5
     # Evenly spread directions (a Fibonacci lattice).
     up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
@@ -112,12 +72,14 @@ def surrounding_radiance(built: RenderScene, light: Light) -> np.ndarray:
     away = dr.zeros(mi.SurfaceInteraction3f, 256)
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
     found: Any = 0.0
-    for colour in light.looks(dr.zeros(mi.UInt32, 256)):
+    for colour in light.colours_to_follow(dr.zeros(mi.UInt32, 256)):
         # The directions are in no order of colour, so that any will do for wavelengths.
         wavelength_sample = number * GOLDEN - dr.floor(number * GOLDEN)
         away.wavelengths = light.aim(dr.zeros(mi.Ray3f, 256), colour, wavelength_sample).wavelengths
-        seen = mi.Spectrum(0) if around is None else around.eval(away)
-        found += np.array(light.seen(seen, colour, wavelength_sample)).mean(axis=1, dtype=np.float64)
+        radiance = mi.Spectrum(0) if around is None else around.eval(away)
+        found += np.array(light.per_colour(radiance, colour, wavelength_sample)).mean(
+            axis=1, dtype=np.float64
+        )
     return found
 
 
@@ -137,27 +99,32 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
     return [around] if varies else []
 
 
-def radiance_along(built: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
+def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
     The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
     `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
     """
-    mi = built.mi
-    tracer = _Tracer(built, sampler)
+    mi = render_scene.mi
+    tracer = _Tracer(render_scene, sampler)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    radiance = hit.emitter(built.scene).eval(hit)
+    radiance = hit.emitter(render_scene.scene).eval(hit)
     return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
 
 
 class _Tracer:
     """The two halves of path tracing, which call each other: what leaves a hit, what arrives there."""
 
-    def __init__(self, built: RenderScene, sampler: Any) -> None:
-        self.mi, self.dr, self.scene, self.sampler = built.mi, load_drjit(), built.scene, sampler
+    def __init__(self, render_scene: RenderScene, sampler: Any) -> None:
+        self.mi, self.dr, self.scene, self.sampler = (
+            render_scene.mi,
+            load_drjit(),
+            render_scene.scene,
+            sampler,
+        )
         self.context = self.mi.BSDFContext()
-        around = _surroundings(built.mi, built.scene)
-        self.lamps, self.aims_around = _lamps(built.scene) + around, bool(around)
+        around = _surroundings(render_scene.mi, render_scene.scene)
+        self.lamps, self.aims_around = _lamps(render_scene.scene) + around, bool(around)
 
     def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
         """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""
@@ -211,6 +178,6 @@ class _Tracer:
         return dr.select(able & ~blocked, value * weight * share, 0)
 
 
-def _share(own: Any, other: Any) -> Any:
+def _share(pdf: Any, other: Any) -> Any:
     """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
-    return own * own / (own * own + other * other)
+    return pdf * pdf / (pdf * pdf + other * other)

@@ -1,6 +1,6 @@
 """How rays carry light, for compiled backends: as three colours, or as four wavelengths for a pixel's filter.
 
-Everything here is on the renderer's side: Dr.Jit arrays of one lane a ray.
+Everything here is on the renderer's side: Dr.Jit arrays with an element for each ray.
 """
 
 from collections.abc import Iterator
@@ -30,20 +30,20 @@ class Light(Protocol):
         ...
 
     def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """Light from all around, of which pixels of each colour see `ambient`, as rays carry it."""
+        """Light from all around, which is `ambient` in each colour, as rays carry it."""
         ...
 
-    def looks(self, colour: Any) -> Iterator[Any]:
-        """For which colours rays must be followed so that together they tell of all."""
+    def colours_to_follow(self, colour: Any) -> Iterator[Any]:
+        """Colours to follow rays in, one after the other, so that together they show all."""
         ...
 
-    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        """What pixels of each colour see, as far as these wavelengths tell; 0 of the other colours."""
+    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+        """Radiance in each colour, as far as these wavelengths show it; 0 in the other colours."""
         ...
 
 
 class Colours:
-    """Linear sRGB: every ray tells of all colours."""
+    """Linear sRGB: every ray carries all colours."""
 
     def __init__(self, mi: Any, cfa: str | None) -> None:
         self.mi, self.cfa = mi, cfa
@@ -60,11 +60,11 @@ class Colours:
         """See `Light`."""
         return self.mi.Color3f(*ambient) if len(ambient) == 3 else self.mi.Color3f(ambient[0])
 
-    def looks(self, colour: Any) -> Iterator[Any]:
+    def colours_to_follow(self, colour: Any) -> Iterator[Any]:
         """See `Light`."""
         yield colour
 
-    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
         """R, G, B, or luminance for a monochrome sensor."""
         if self.cfa is not None:
             return list(radiance)
@@ -95,20 +95,20 @@ class Wavelengths:
         dr = load_drjit()
         chosen_nm, _ = self._drawn(colour, wavelength_sample)
         white = dr.gather(self.mi.Float, self.white, colour)
-        own = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
-        return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * own for here_nm in chosen_nm))
+        relative = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
+        return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in chosen_nm))
 
-    def looks(self, colour: Any) -> Iterator[Any]:
+    def colours_to_follow(self, colour: Any) -> Iterator[Any]:
         """See `Light`."""
-        for own in range(self.channels):
-            yield load_drjit().full(self.mi.UInt32, own, len(colour))
+        for other in range(self.channels):
+            yield load_drjit().full(self.mi.UInt32, other, len(colour))
 
-    def seen(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
+    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
         """See `Light`."""
         dr = load_drjit()
         _, weight = self._drawn(colour, wavelength_sample)
-        own = dr.sum(radiance * weight)
-        return [dr.select(colour == other, own, 0) for other in range(self.channels)]
+        total = dr.sum(radiance * weight)
+        return [dr.select(colour == other, total, 0) for other in range(self.channels)]
 
     def _drawn(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
         """Wavelengths and their weights, as `Filters.draw` has them."""
@@ -134,15 +134,15 @@ class Wavelengths:
         return dr.lerp(low, high, place - mi.Float(cell))
 
 
-def light_of(built: RenderScene, cfa: str | None) -> Light:
+def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     """How rays carry light in this scene's variant."""
-    if built.filters is None:
-        return Colours(built.mi, cfa)
-    return Wavelengths(built.mi, built.filters)
+    if render_scene.filters is None:
+        return Colours(render_scene.mi, cfa)
+    return Wavelengths(render_scene.mi, render_scene.filters)
 
 
 def of_colour(values: Any, colour: Any) -> Any:
-    """Each lane's value of its own colour."""
+    """Each element's value in its own colour, of `values` in all colours."""
     dr = load_drjit()
     values = list(values)
     if len(values) == 1:

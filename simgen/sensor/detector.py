@@ -2,57 +2,24 @@
 
 Photon by photon: each is detected with the quantum efficiency of its pixel's colour, dark counts and hot
 pixels add counts of their own, dead pixels count nothing, and a counter of k bits stops at 2^k - 1; of one
-bit it tells only whether there was a photon (Bernoulli counts, as of a single-photon camera's frame).
+bit it says only whether there was a photon (Bernoulli counts, as of a single-photon camera's frame).
 
 Full-light images: electrons up to the full well, the noise of reading them, and a converter's steps.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pcii.core.bayer import colour_cells, mosaic
+from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
+from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
 from simgen.spec.recipe import Photons, Sensor
-
-NO_OBJECT = -1
-"""Object id of a count that no photon made."""
-
-
-@dataclass(frozen=True)
-class Arrivals:
-    """Photons that arrive at pixels, or counts that come of them; int64 columns (N,), in any order.
-
-    `n` photons at pixel (i, j) of camera (k, l). `scope` and `rank` tell single photons (n = 1) apart
-    within what a budget is counted over, -1 for counts that belong to no budget. `object_id` and `z_mm`
-    are those of the first hit where that is known.
-    """
-
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    n: np.ndarray
-    scope: np.ndarray
-    rank: np.ndarray
-    object_id: np.ndarray | None = None
-    z_mm: np.ndarray | None = None
-
-    def take(self, which: np.ndarray) -> "Arrivals":
-        """Some rows, by mask or index."""
-        columns = {name: column[which] for name, column in vars(self).items() if column is not None}
-        return Arrivals(**columns)
-
-    def colours(self, cfa: str | None) -> np.ndarray:
-        """Colour of each row's pixel; 1, which is green, for a monochrome sensor."""
-        if cfa is None:
-            return np.ones(self.k.size, dtype=np.int64)
-        return colour_cells(cfa)[self.i % 2, self.j % 2]
 
 
 def nested_subset(
-    counts: Arrivals, arrivals: Arrivals, photons: Photons, budget: float, seed: int
+    counts: PhotonTable, arrivals: PhotonTable, photons: Photons, budget: float, seed: int
 ) -> np.ndarray:
     """Which `counts`, made of `arrivals`, belong to a smaller budget, (N,) bool: an exact draw of that.
 
@@ -60,13 +27,16 @@ def nested_subset(
     for multinomial statistics, for Poisson each with the ratio of the budgets. Those of a smaller
     budget are among those of a larger one; counts that no photon made belong to all.
     """
+    assert arrivals.scope is not None
+    assert counts.scope is not None
+    assert counts.rank is not None
     totals = np.bincount(arrivals.scope)
     if photons.statistics == "multinomial":
         first = np.minimum(totals, round(budget))
     else:
         first, larger = totals, photons.budget
         for part, smaller in enumerate(sorted(photons.nested, reverse=True)):
-            rng = seeds.generator(seed, view=0, stage="nested", part=part)
+            rng = seeds.generator(seed, stage="nested totals", part=part)
             first, larger = rng.binomial(first, smaller / larger), smaller
             if smaller == budget:
                 break
@@ -76,9 +46,11 @@ def nested_subset(
     return belongs
 
 
-def detect(arrivals: Arrivals, grid: CameraGrid, cfa: str | None, sensor: Sensor, seed: int) -> Arrivals:
+def detect(
+    arrivals: PhotonTable, grid: CameraGrid, cfa: str | None, sensor: Sensor, seed: int
+) -> PhotonTable:
     """Counts that come of arriving photons, before a counter stops."""
-    rng = seeds.generator(seed, view=0, stage="detection")
+    rng = seeds.generator(seed, stage="detection")
     efficiency = np.array(sensor.quantum_efficiency)[arrivals.colours(cfa)]
     if (efficiency < 1).any():
         arrivals = replace(arrivals, n=rng.binomial(arrivals.n, efficiency))
@@ -90,28 +62,27 @@ def detect(arrivals: Arrivals, grid: CameraGrid, cfa: str | None, sensor: Sensor
             _without_photon(grid, rng.integers(0, views * pixels, number), np.ones(number, np.int64))
         )
     # One camera takes all views, so its faulty pixels are the same in each.
-    faulty = seeds.generator(seed, view=0, stage="faulty pixels")
+    faulty = seeds.generator(seed, stage="faulty pixels")
     shuffled = faulty.permutation(pixels) if sensor.hot_pixel_share or sensor.dead_pixel_share else None
     if shuffled is not None and sensor.hot_pixel_share > 0:
         hot = shuffled[: round(sensor.hot_pixel_share * pixels)]
         n = rng.poisson(sensor.hot_pixel_counts, (views, hot.size))
         parts.append(_without_photon(grid, (np.arange(views)[:, None] * pixels + hot).ravel(), n.ravel()))
-    counts = _joined(parts)
+    counts = joined(parts)
     if shuffled is not None and sensor.dead_pixel_share > 0:
         dead = np.zeros(pixels, dtype=bool)
         dead[shuffled[pixels - round(sensor.dead_pixel_share * pixels) :]] = True
-        counts = counts.take(~dead[counts.i * grid.width + counts.j])
-    return counts.take(counts.n > 0)
+        counts = counts.take(~dead.reshape(grid.height, grid.width)[counts.i, counts.j])
+    return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
-def saturate(counts: Arrivals, grid: CameraGrid, bits: int, seed: int) -> Arrivals:
+def saturate(counts: PhotonTable, grid: CameraGrid, bits: int, seed: int) -> PhotonTable:
     """Counts after a pixel's counter of so many bits has stopped; which came first is left to chance."""
     most = (1 << bits) - 1
     if counts.object_id is not None:  # else nobody can tell which of a pixel's counts were kept
-        counts = counts.take(np.arange(counts.n.size).repeat(counts.n))
-        counts = replace(counts, n=np.ones(counts.n.size, dtype=np.int64))
-    pixel = np.ravel_multi_index((counts.k, counts.l, counts.i, counts.j), grid.shape_KLHW)
-    chance = seeds.generator(seed, view=0, stage="saturation").random(pixel.size)
+        counts = counts.one_by_one()
+    pixel = counts.flat_pixels(grid)
+    chance = seeds.generator(seed, stage="saturation").random(pixel.size)
     order = np.lexsort((chance, pixel))
     counts, pixel = counts.take(order), pixel[order]
     running = np.cumsum(counts.n)
@@ -129,10 +100,10 @@ def full_light_image(
     sensor: Sensor,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Radiance (H, W, C) as a camera would tell it, float32, in the same unit.
+    """Radiance (H, W, C) as a camera would measure it, float32, in the same unit.
 
     Photons arrive at random and are detected with the quantum efficiency; a pixel holds no more than
-    its full well, reading adds noise, the converter has steps. What it tells is divided by the
+    its full well, reading adds noise, the converter has steps. What it reads is divided by the
     efficiency and by the photons that a unit of radiance gives. `C` is 1 behind a filter, or 3.
     """
     light = sensor.full_light
@@ -148,22 +119,13 @@ def full_light_image(
     electrons = np.minimum(electrons, light.full_well_e)
     electrons += rng.normal(0, light.read_noise_e, electrons.shape)
     steps = (1 << light.adc_bits) - 1
-    told = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
-    return (told * (light.full_well_e / steps) / per_unit).astype(np.float32)
+    read = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
+    return (read * (light.full_well_e / steps) / per_unit).astype(np.float32)
 
 
-def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> Arrivals:
+def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:
     """Counts at flat (view, row, column) indices that no photon made."""
     k, l, i, j = np.unravel_index(flat, grid.shape_KLHW)
-    none = np.full(flat.size, -1)
-    return Arrivals(k, l, i, j, n, none, none, np.full(flat.size, NO_OBJECT), np.full(flat.size, np.inf))
-
-
-def _joined(parts: list[Arrivals]) -> Arrivals:
-    """Rows of all parts; with first hits if the first part knows them."""
-    columns = {
-        name: np.concatenate([getattr(part, name) for part in parts])
-        for name, column in vars(parts[0]).items()
-        if column is not None
-    }
-    return Arrivals(**columns)
+    nowhere = np.full(flat.size, -1)
+    nothing = np.full(flat.size, NO_OBJECT)
+    return PhotonTable(k, l, i, j, n, nowhere, nowhere, nothing, np.full(flat.size, np.inf))

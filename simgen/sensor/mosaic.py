@@ -12,8 +12,8 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count, colour_index, mosaic
 from simgen.base.srgb import LUMINANCE
-from simgen.spec.recipe import Photons, Recipe
-from simgen.spectral.spectra import sensitivity
+from simgen.spec.recipe import Photons, Sensor
+from simgen.spectral.camera_curves import sensitivity
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
@@ -29,19 +29,20 @@ def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
     return (radiance @ LUMINANCE).astype(radiance.dtype)
 
 
-def sensitivities(recipe: Recipe, near: Path) -> np.ndarray | None:
-    """Relative sensitivities (C, N) of the recipe's camera by wavelength, None in RGB mode.
+def sensitivities(sensor: Sensor, near: Path) -> np.ndarray | None:
+    """Relative sensitivities (C, N) of the sensor's camera by wavelength, None in RGB mode.
 
-    `near` is the recipe's folder. A monochrome sensor takes G, or the one curve that there is.
+    A file of sensitivities is looked up in the folder `near`. A monochrome sensor takes G, or the one curve
+    that there is. Raises `InputError` for a camera that is not known or has too few curves.
     """
-    if recipe.sensor.camera is None:
+    if sensor.camera is None:
         return None
-    curves = sensitivity(recipe.sensor.camera, near)
-    if recipe.cfa is None:
+    curves = sensitivity(sensor.camera, near)
+    if sensor.bayer is None:
         return curves[len(curves) // 2 :][:1]
     if len(curves) == 1:
         raise InputError(
-            f"sensor.camera: {recipe.sensor.camera!r} has one curve, and a Bayer sensor needs three; "
+            f"sensor.camera: {sensor.camera!r} has one curve, and a Bayer sensor needs three; "
             "set sensor.cfa to 'none'"
         )
     return curves

@@ -1,7 +1,7 @@
 """What people write, validated: recipes and scenes with their grids, lights, materials, textures, shapes.
 
-camera_grid  The camera grid as a recipe tells it: where cameras ought to stand, how far they are off,
-             their lens.
+camera_grid  The camera grid as a recipe describes it: places of cameras, how far they are off, their
+             lens.
 lights       Lamps and what shines from all around: where they stand, how bright and of what colour they
              are.
 materials    What surfaces do with light: a colour, by a reflectance or a texture, and a finish.

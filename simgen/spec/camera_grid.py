@@ -1,4 +1,4 @@
-"""The camera grid as a recipe tells it: where cameras ought to stand, how far they are off, their lens."""
+"""The camera grid as a recipe describes it: places of cameras, how far they are off, their lens."""
 
 from typing import Annotated, Self
 
@@ -9,7 +9,7 @@ from simgen.base.strict_models import Count, NonNegative, Positive, Real, Strict
 
 
 class CalibrationErrors(Strict):
-    """How far the cameras are off. Whoever opens the dataset is not told; the truth keeps it."""
+    """How far the cameras are off. The truth keeps it; the grid that a dataset opens with does not."""
 
     position_sd_mm: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
     """Standard deviation of each camera's place along X, Y and Z."""

@@ -41,7 +41,7 @@ class Metal(Strict):
 
 class Glass(Strict):
     """Clear and smooth; a card of it is a thin pane. Light passes it in as many segments as it has surfaces,
-    so recipes with glass need a larger `render.max_depth`: 6 for a ball before a lit thing."""
+    so recipes with glass need a larger `render.max_depth`: 6 for a ball in front of a surface."""
 
     type: Literal["glass"] = "glass"
     refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
@@ -94,7 +94,7 @@ Reflectance = Annotated[
 
 
 def _file_or_pattern(given: Any) -> str | None:
-    """Which of the two a texture is, so that an error tells of that one alone."""
+    """Which of the two a texture is, so that an error is about that one alone."""
     if isinstance(given, str):
         return "file"
     return "pattern" if isinstance(given, dict | Strict) else None
@@ -120,7 +120,7 @@ class Material(Strict):
     """An sRGB image file inside the scene's folder, or a pattern such as { type = "star", spokes = 36 };
     laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")
-    """Matt unless told otherwise; { type = "plastic", roughness = 0.1 } adds highlights."""
+    """Matt by default; { type = "plastic", roughness = 0.1 } adds highlights."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:

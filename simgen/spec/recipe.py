@@ -25,7 +25,7 @@ from simgen.base.strict_models import (
     validate,
 )
 from simgen.spec.camera_grid import Grid
-from simgen.spectral.spectra import camera_names
+from simgen.spectral.camera_curves import camera_names
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
 ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
@@ -56,7 +56,7 @@ class FullLight(Strict):
     read_noise_e: NonNegative = 2.0
     """Standard deviation of the noise of reading a pixel, in electrons."""
     adc_bits: Annotated[Whole, Field(ge=1, le=24)] = 12
-    """The full well is told in so many steps of equal size: 2^bits - 1."""
+    """The full well is read in so many steps of equal size: 2^bits - 1."""
 
 
 class Sensor(Strict):
@@ -82,6 +82,16 @@ class Sensor(Strict):
     """A pixel stops at 2^bits - 1 counts; 1 makes it tell only whether there was a photon."""
     full_light: FullLight | None = None
     """Makes the full-light images those of a camera instead of exact radiance."""
+
+    @property
+    def bayer(self) -> str | None:
+        """Bayer pattern, None for a monochrome sensor."""
+        return None if self.cfa == "none" else self.cfa
+
+    @property
+    def is_spectral(self) -> bool:
+        """Whether light is traced as spectra."""
+        return self.camera is not None
 
 
 class Photons(Strict):
@@ -157,7 +167,7 @@ class Analysis(Strict):
     """Where whoever opens the dataset should look; nothing of it is rendered."""
 
     z_mm: tuple[Positive, ...] = ()
-    """Depths of the sections that `pcii run` reconstructs unless told otherwise."""
+    """Depths of the sections that `pcii run` reconstructs by default."""
     z_range_mm: tuple[Positive, Positive] | None = None
     """Nearest and farthest depth that a depth map considers."""
 
@@ -210,10 +220,10 @@ class Recipe(Strict):
     @model_validator(mode="after")
     def _one_aperture(self) -> Self:
         if self.exposure is not None and self.grid.lens is not None:
-            told = self.grid.focal_mm / self.exposure.f_number
-            if abs(self.grid.lens.aperture_mm / told - 1) > APERTURE_TOLERANCE:
+            expected_mm = self.grid.focal_mm / self.exposure.f_number
+            if abs(self.grid.lens.aperture_mm / expected_mm - 1) > APERTURE_TOLERANCE:
                 raise ValueError(
-                    f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {told:g} mm, "
+                    f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {expected_mm:g} mm, "
                     f"and aperture_mm is {self.grid.lens.aperture_mm:g}; make them agree"
                 )
         return self
@@ -221,12 +231,12 @@ class Recipe(Strict):
     @property
     def is_spectral(self) -> bool:
         """Whether light is traced as spectra."""
-        return self.sensor.camera is not None
+        return self.sensor.is_spectral
 
     @property
     def cfa(self) -> str | None:
         """Bayer pattern, None for a monochrome sensor."""
-        return None if self.sensor.cfa == "none" else self.sensor.cfa
+        return self.sensor.bayer
 
 
 def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path]:

@@ -140,8 +140,8 @@ def find_scene(name_or_path: str, near: Path | None = None) -> Path:
         shipped = None
     if shipped is not None:
         return shipped
-    told = shorten(repr(name_or_path), LONGEST_PART)
-    raise InputError(f"scene: there is no scene {told}{suggestion(name_or_path, scene_names())}")
+    shown = shorten(repr(name_or_path), LONGEST_PART)
+    raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, scene_names())}")
 
 
 def scene_names() -> list[str]:

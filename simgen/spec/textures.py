@@ -22,7 +22,7 @@ class _Pattern(Strict):
 
 class _InTwoColours(_Pattern):
     colours: tuple[Colour, Colour] = ((0.2, 0.2, 0.2), (0.95, 0.95, 0.95))
-    """Two sRGB colours; unless told otherwise black ink and white paper."""
+    """Two sRGB colours; by default black ink and white paper."""
 
 
 class Checks(_InTwoColours):

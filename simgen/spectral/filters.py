@@ -52,9 +52,9 @@ class Filters:
             rising = np.append(True, np.diff(running) > 0)
             shares = np.linspace(0, 1, CELLS + 1) * running[-1]
             start = fine_nm[np.flatnonzero(often)[0] - 1] if often[0] == 0 else fine_nm[0]
-            own = np.interp(shares, running[rising], fine_nm[rising])
-            own[0] = start
-            bounds.append(own)
+            bound_nm = np.interp(shares, running[rising], fine_nm[rising])
+            bound_nm[0] = start
+            bounds.append(bound_nm)
         return np.array(bounds, dtype=np.float32)
 
     def draw(self, colour: np.ndarray, wavelength_sample: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -69,8 +69,8 @@ class Filters:
         width = self.wavelength_nm[colour[:, None], cell + 1] - low
         chosen_nm = low + width * (place - cell)
         weight = np.empty(chosen_nm.shape)
-        for own, curve in enumerate(self.sensitivity):
-            here = colour == own
+        for number, curve in enumerate(self.sensitivity):
+            here = colour == number
             weight[here] = np.interp(chosen_nm[here], WAVELENGTH_NM, curve)
         return chosen_nm, weight * width * (CELLS / HEROES)
 

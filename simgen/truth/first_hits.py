@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.cameras.rig import Camera, Cameras, as_rig, centre_camera, sensor_plugin
+from simgen.cameras.rig import Camera, Cameras, as_rig, centre_camera
+from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
 
 IN_FOCUS_PX = 1.0
@@ -26,14 +27,14 @@ class FirstHits:
     normal: np.ndarray
 
 
-def first_hits_at_centre(built: RenderScene, grid: CameraGrid) -> FirstHits:
+def first_hits_at_centre(render_scene: RenderScene, grid: CameraGrid) -> FirstHits:
     """First hits of the virtual centre camera, at X = Y = 0 between the cameras of an even grid."""
-    return _first_hits(built, centre_camera(grid))
+    return _first_hits(render_scene, centre_camera(grid))
 
 
-def first_hits_of_view(built: RenderScene, cameras: Cameras, k: int, l: int) -> FirstHits:
+def first_hits_of_view(render_scene: RenderScene, cameras: Cameras, k: int, l: int) -> FirstHits:
     """First hits of camera (k, l) where it really is; with a lens, those of the rays through its centre."""
-    return _first_hits(built, as_rig(cameras).pinhole(k, l))
+    return _first_hits(render_scene, as_rig(cameras).pinhole(k, l))
 
 
 def in_focus(grid: CameraGrid, z_mm: np.ndarray, planes_mm: Sequence[float]) -> np.ndarray:
@@ -46,22 +47,22 @@ def in_focus(grid: CameraGrid, z_mm: np.ndarray, planes_mm: Sequence[float]) -> 
     farthest_mm = np.abs(as_rig(grid).position_mm).max()
     seen_px = grid.focal_mm * farthest_mm / (np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm)
     back_px = [grid.focal_mm * farthest_mm / (plane * grid.pixel_mm) for plane in planes_mm]
-    masks = [np.abs(seen_px - own) <= IN_FOCUS_PX for own in back_px]
+    masks = [np.abs(seen_px - shift_px) <= IN_FOCUS_PX for shift_px in back_px]
     return np.array(masks, dtype=bool).reshape(len(masks), *seen_px.shape)
 
 
-def _first_hits(built: RenderScene, camera: Camera) -> FirstHits:
+def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
     # Mitsuba's own depth output is ray length from the near clip plane, averaged at edges. Here one
     # ray goes through each pixel's centre (stratified without jitter) and gives the hit's position.
-    mi = built.mi
+    mi = render_scene.mi
     centre_ray = {"type": "stratified", "sample_count": 1, "jitter": False}
     sensor = mi.load_dict(sensor_plugin(mi, camera, centre_ray))
     aovs = "hit:position,normal:geo_normal,shape:shape_index"
     integrator = mi.load_dict({"type": "aov", "aovs": aovs})
-    passes = np.array(mi.render(built.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
+    passes = np.array(mi.render(render_scene.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
     point, normal, shape = passes[..., -7:-4], passes[..., -4:-1], passes[..., -1].astype(np.int64)
     hit = shape > 0  # shape 0 is a miss
     along = ((point - camera.position_mm) * normal).sum(axis=-1)
     facing = normal * np.where(hit, -np.sign(along), 0)[..., None]
     z_mm = np.where(hit, point[..., 2], np.inf)
-    return FirstHits(z_mm.astype(np.float32), built.object_of_shape[shape], facing.astype(np.float32))
+    return FirstHits(z_mm.astype(np.float32), render_scene.object_of_shape[shape], facing.astype(np.float32))

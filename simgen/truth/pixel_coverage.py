@@ -8,13 +8,13 @@ from simgen.renderer.mitsuba_scene import RenderScene
 
 SAMPLES = 233
 """Rays through a pixel, on a Fibonacci lattice. An edge along one of its lines is worst: half of the some
-15 points of a line may be on the wrong side, 3 % of the pixel; most edges are told to 1 %."""
+15 points of a line may be on the wrong side, 3 % of the pixel; most edges are known to 1 %."""
 _GENERATOR = 144
 PART = 1 << 13
 """Pixels that are sampled at once."""
 
 
-def coverage(built: RenderScene, camera: Camera, object_id: np.ndarray) -> np.ndarray:
+def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -> np.ndarray:
     """Share (H, W) float32 of each pixel's square in which rays hit the object that its centre hits first.
 
     Seen by the camera, without its lens, whose `object_id` (H, W) is given; what is no object (id 0)
@@ -27,7 +27,7 @@ def coverage(built: RenderScene, camera: Camera, object_id: np.ndarray) -> np.nd
     for start in range(0, row.size, PART):
         i, j = row[start : start + PART], col[start : start + PART]
         rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)
-        found = first_objects(built, camera.position_mm, rays).reshape(i.size, SAMPLES)
+        found = first_objects(render_scene, camera.position_mm, rays).reshape(i.size, SAMPLES)
         share[i, j] = (found == object_id[i, j, None]).mean(axis=1)
     return share
 

@@ -1,6 +1,7 @@
 """The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,9 @@ import numpy as np
 from pcii.base.progress import Report
 from pcii.io.dataset_layout import TRUTH, TRUTH_LABELS
 from pcii.io.zarr_groups import new_array, new_group_safely
-from simgen.cameras.rig import Rig, centre_camera, rig_of
+from simgen.cameras.rig import Rig, centre_camera
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.spec.recipe import Recipe, ViewPass
+from simgen.spec.recipe import Products, ViewPass
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
 from simgen.truth.pixel_coverage import coverage
 from simgen.truth.visibility import visible_views
@@ -19,30 +20,40 @@ from simgen.truth.visibility import visible_views
 RAYS = "visibility_rays"
 
 
-def write_truth(recipe: Recipe, built: RenderScene, out: Path, report: Report) -> None:
-    """Write what the recipe asks for, unless it is there already; one view in memory at a time."""
+@dataclass(frozen=True)
+class TruthRequest:
+    """What is wanted of the truth: products, planes of which to say what is in focus, poses of cameras."""
+
+    products: Products
+    planes_mm: tuple[float, ...]
+    camera_poses: bool
+
+
+def write_truth(
+    request: TruthRequest, render_scene: RenderScene, rig: Rig, out: Path, report: Report
+) -> None:
+    """Write what is asked for, unless it is there already; one view in memory at a time."""
     if (out / TRUTH).is_dir():
         return
-    rig, products, planes = rig_of(recipe), recipe.products, recipe.analysis.z_mm
-    grid = rig.grid
+    grid, products, planes = rig.grid, request.products, request.planes_mm
     with new_group_safely(out / TRUTH, {}) as group:
         if products.truth:
-            centre = first_hits_at_centre(built, grid)
+            centre = first_hits_at_centre(render_scene, grid)
             for name in ("z_mm", "object_id", "normal"):
                 _store(group, name, getattr(centre, name))
-            _store(group, "coverage", coverage(built, centre_camera(grid), centre.object_id))
+            _store(group, "coverage", coverage(render_scene, centre_camera(grid), centre.object_id))
             if planes:
                 _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
                 group.attrs["in_focus_z_mm"] = list(planes)
-            if recipe.grid.errors is not None:
+            if request.camera_poses:
                 _store(group, "camera_position_mm", rig.position_mm)
                 _store(group, "camera_rotation", rig.rotation)
             if products.visibility:
-                views, rays = visible_views(built, rig, centre, report)
+                views, rays = visible_views(render_scene, rig, centre, report)
                 _store(group, "visible_views", views)
                 group.attrs[RAYS] = rays
         if products.view_truth:
-            _write_views(group, built, rig, products.view_truth, report)
+            _write_views(group, render_scene, rig, products.view_truth, report)
 
 
 def traced_for_visibility(out: Path) -> int | None:
@@ -56,11 +67,11 @@ def traced_for_visibility(out: Path) -> int | None:
 
 
 def _write_views(
-    group: Any, built: RenderScene, rig: Rig, passes: tuple[ViewPass, ...], report: Report
+    group: Any, render_scene: RenderScene, rig: Rig, passes: tuple[ViewPass, ...], report: Report
 ) -> None:
     grid, arrays = rig.grid, dict[str, Any]()
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        for name, image in _view(built, rig, k, l, passes):
+        for name, image in _view(render_scene, rig, k, l, passes):
             if name not in arrays:
                 shape = (grid.rows, grid.cols, *image.shape)
                 label = TRUTH_LABELS[f"view_{name}"]
@@ -70,12 +81,12 @@ def _write_views(
 
 
 def _view(
-    built: RenderScene, rig: Rig, k: int, l: int, passes: tuple[ViewPass, ...]
+    render_scene: RenderScene, rig: Rig, k: int, l: int, passes: tuple[ViewPass, ...]
 ) -> Iterator[tuple[ViewPass, np.ndarray]]:
-    hits: FirstHits = first_hits_of_view(built, rig, k, l)
+    hits: FirstHits = first_hits_of_view(render_scene, rig, k, l)
     for name in passes:
         if name == "coverage":
-            yield name, coverage(built, rig.pinhole(k, l), hits.object_id)
+            yield name, coverage(render_scene, rig.pinhole(k, l), hits.object_id)
         else:
             yield name, getattr(hits, name)
 

@@ -15,7 +15,7 @@ ROUNDING = 1e-6
 
 
 def visible_views(
-    built: RenderScene, cameras: Cameras, hits: FirstHits, report: Report = silent
+    render_scene: RenderScene, cameras: Cameras, hits: FirstHits, report: Report = silent
 ) -> tuple[np.ndarray, int]:
     """Number (H, W) uint16 of cameras that see each first hit of the virtual centre, and rays traced.
 
@@ -33,25 +33,25 @@ def visible_views(
     normal = hits.normal[row, col].astype(np.float64)
     point = centre_camera(grid).towards(row, col) * hits.z_mm[row, col, None].astype(np.float64)
     start = point + normal * (OFF_SURFACE * (1 + np.abs(point).max(axis=1, initial=0)))[:, None]
-    doubtful = _can_be_blocked(built, rig, start)
-    own = (normal * point).sum(axis=1)
+    doubtful = _can_be_blocked(render_scene, rig, start)
+    facing = (normal * point).sum(axis=1)
     count, traced = np.zeros(row.size, dtype=np.uint16), 0
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
         camera = rig.pinhole(k, l)
         # It faces a point if normal . (camera - point) > 0.
-        seen = camera.on_film(point) & (normal @ camera.position_mm > own)
-        asked = np.flatnonzero(seen & doubtful)
-        if asked.size:
-            seen[asked] = ~blocked(built, start[asked], camera.position_mm)
+        seen = camera.on_film(point) & (normal @ camera.position_mm > facing)
+        tested = np.flatnonzero(seen & doubtful)
+        if tested.size:
+            seen[tested] = ~blocked(render_scene, start[tested], camera.position_mm)
         count += seen
-        traced += asked.size
+        traced += tested.size
         report("visibility", done, grid.view_count)
     result = np.zeros((H, W), dtype=np.uint16)
     result[row, col] = count
     return result, traced
 
 
-def _can_be_blocked(built: RenderScene, rig: Rig, start: np.ndarray) -> np.ndarray:
+def _can_be_blocked(render_scene: RenderScene, rig: Rig, start: np.ndarray) -> np.ndarray:
     """Whether a shape's box may reach between points (N, 3) and any camera; never False by mistake.
 
     At depth s the pyramid from a point at depth z to the cameras is a rectangle, whose sides move linearly
@@ -63,7 +63,7 @@ def _can_be_blocked(built: RenderScene, rig: Rig, start: np.ndarray) -> np.ndarr
     doubtful = np.zeros(len(start), dtype=bool)
     z = start[:, 2]
     reach = [(x_mm.min(), x_mm.max()), (y_mm.min(), y_mm.max())]
-    for shape in built.scene.shapes():
+    for shape in render_scene.scene.shapes():
         box = shape.bbox()
         low, high = np.array(box.min, dtype=np.float64), np.array(box.max, dtype=np.float64)
         margin = ROUNDING * np.maximum(np.abs(low), np.abs(high))

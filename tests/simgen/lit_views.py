@@ -14,11 +14,12 @@ from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.io.dataset_layout import write_exr_safely
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, thin_photons
+from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
 from simgen.sensor.mosaic import sensitivities
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spec.scene import Scene
 
@@ -57,7 +58,7 @@ def made(
     if spectral:
         grid = {"rows": 1, "cols": 1, "height": 2, "width": 2}
         recipe = Recipe.model_validate({"scene": "-", "grid": grid, "sensor": {"camera": CAMERA}})
-        curves = sensitivities(recipe, Path())
+        curves = sensitivities(recipe.sensor, Path())
     return build(mi, Scene.model_validate(values), folder, max_depth, curves)
 
 
@@ -72,21 +73,23 @@ def seen(built: RenderScene, grid: CameraGrid, samples: int, seed: int = 1) -> n
     return view.astype(np.float64) / white(built)
 
 
-def thinned(built: RenderScene, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1) -> PhotonList:
-    """Photons, `gain` for each unit of radiance."""
+def thinned(
+    built: RenderScene, grid: CameraGrid, max_depth: int, gain: float, seed: int = 1
+) -> tuple[PhotonTable, dict[str, Any]]:
+    """Photons, `gain` for each unit of radiance, and a log of how they were drawn."""
     setup = Setup(built, grid, "GRBG", max_depth)
     photons = Photons(scope="exposure")
     return thin_photons(setup, photons, seed=seed, photons_per_radiance=gain)
 
 
-def counted(photons: PhotonList, grid: CameraGrid) -> np.ndarray:
+def counted(photons: PhotonTable, grid: CameraGrid) -> np.ndarray:
     counts = np.zeros((grid.height, grid.width))
     np.add.at(counts, (photons.i, photons.j), 1)
     return counts
 
 
 def surprise(
-    photons: PhotonList, radiance: np.ndarray, grid: CameraGrid, gain: float, block_px: int = 4
+    photons: PhotonTable, radiance: np.ndarray, grid: CameraGrid, gain: float, block_px: int = 4
 ) -> float:
     """By how many deviations chi-square of counts exceeds its mean, for rates of gain times a view.
 

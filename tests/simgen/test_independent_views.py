@@ -82,7 +82,7 @@ def one_by_one(folder: Path) -> np.ndarray:
     built = made(
         [], tomllib.loads(SCENE % LAMP)["lights"], backdrop={"z_mm": 500.0, "reflectance": (0.8, 0.8, 0.8)}
     )
-    photons = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
+    photons, _ = thin_photons(Setup(built, grid, "GRBG", 2), Photons(budget=4000), seed=11)
     found = np.zeros((VIEWS, SIDE, SIDE))
     np.add.at(found, (10 * photons.k + photons.l, photons.i, photons.j), 1)
     return found
@@ -119,8 +119,8 @@ def test_one_seed_for_two_views_is_caught(
 ) -> None:
     exact = seeds._sequence
 
-    def slipped(seed: int, view: int, *rest: Any) -> np.random.SeedSequence:
-        return exact(seed, 41 if view == 73 else view, *rest)
+    def slipped(seed: int, stage: seeds.Stage, view: int, *rest: int) -> np.random.SeedSequence:
+        return exact(seed, stage, 41 if view == 73 else view, *rest)
 
     monkeypatch.setattr(seeds, "_sequence", slipped)
     found = likeness(noisy(tmp_path))

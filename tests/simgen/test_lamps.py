@@ -72,7 +72,7 @@ def test_photons_of_a_points_light_fall_off_likewise() -> None:
     place, wanted = PLACES[1], 20_000 if SCALAR else 400_000
     expected = lit_by_a_point(np.array(place), 2.5, fine=8).reshape(32, 8, 32, 8).mean(axis=(1, 3))
     gain = wanted / expected.sum()
-    photons = thinned(made([FLAT], [point(*place, 2.5)]), GRID, 2, gain)
+    photons, _ = thinned(made([FLAT], [point(*place, 2.5)]), GRID, 2, gain)
     assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
     # The fault: the cosine is forgotten.
     y, x = np.indices((32, 32)) - 15.5

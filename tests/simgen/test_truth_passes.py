@@ -14,9 +14,8 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
 from pcii.metrics.scoring import pixel_masks
-from simgen.cameras import rig as cameras
 from simgen.cameras.rig import as_rig, centre_camera
-from simgen.renderer import backend
+from simgen.renderer import backend, mitsuba_camera
 from simgen.truth import visibility
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
 from simgen.truth.pixel_coverage import SAMPLES, coverage
@@ -66,7 +65,7 @@ def test_depth_is_planar_whatever_the_near_clip(
     near_clip_mm: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The renderer's own depth counts from the near clip plane: 10 mm would be an error of 1.5 %.
-    monkeypatch.setattr(cameras, "NEAR_CLIP_MM", near_clip_mm)
+    monkeypatch.setattr(mitsuba_camera, "NEAR_CLIP_MM", near_clip_mm)
     of = grid(2, 2, 96, 120)
     rays = directions(of)
     ball = first_hits_at_centre(built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)]), of)

@@ -15,13 +15,15 @@ from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import project_px
 from simgen.base.strict_models import validate
-from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
+from simgen.cameras.calibration import rig_of, turn
+from simgen.cameras.rig import Cameras, Rig, as_rig
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import PhotonList, thin_photons
+from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
+from simgen.renderer.mitsuba_camera import film_rays
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.renderer.path_tracing import film_rays
 from simgen.renderer.radiance import render_view
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import Lens
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spec.scene import Scene
@@ -52,9 +54,9 @@ def dot(point_mm: tuple[float, float, float], side_mm: float = SIDE_MM) -> Rende
     return build(backend.load(), Scene.model_validate(values), Path(), 2)
 
 
-def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonList:
+def photons(scene: RenderScene, cameras: Cameras, budget: float, seed: int = 1) -> PhotonTable:
     settings = Photons(budget=budget)
-    return thin_photons(Setup(scene, cameras, None, 2), settings, seed=seed)
+    return thin_photons(Setup(scene, cameras, None, 2), settings, seed=seed)[0]
 
 
 def off_places(grid: CameraGrid, seed: int = 3) -> Rig:
@@ -86,7 +88,7 @@ def centres(scene: RenderScene, cameras: Cameras, k: int, l: int) -> dict[str, n
     true = np.argwhere(first_hits_of_view(scene, cameras, k, l).object_id == 1)
     return {
         "dense": np.array([(i * image).sum(), (j * image).sum()]) / image.sum(),
-        "thinned": np.array([drawn.row_px[own].mean(), drawn.col_px[own].mean()]),
+        "thinned": np.array([drawn.i[own].mean(), drawn.j[own].mean()]),
         "truth": true.mean(axis=0),
     }
 
@@ -138,7 +140,7 @@ def recipe(**grid: object) -> Recipe:
 def test_errors_are_drawn_as_asked_for() -> None:
     errors = {"position_sd_mm": (0.5, 0.2, 1.0), "rotation_sd_deg": (0.1, 0.3, 0.2), "pitch_error": 0.02}
     own = recipe(rows=40, cols=40, errors=errors)
-    rig = rig_of(own)
+    rig = rig_of(own.grid, own.seed)
     off_mm = rig.position_mm - 1.02 * as_rig(rig.grid).position_mm
     # 1600 cameras: a standard deviation is known to 1.8 %, a mean to 2.5 % of one.
     np.testing.assert_allclose(off_mm.std(axis=(0, 1)), (0.5, 0.2, 1.0), rtol=0.08)
@@ -146,13 +148,13 @@ def test_errors_are_drawn_as_asked_for() -> None:
     angles = Rotation.from_matrix(rig.rotation.reshape(-1, 3, 3)).as_euler("xyz", degrees=True)
     np.testing.assert_allclose(angles.std(axis=0), (0.1, 0.3, 0.2), rtol=0.08)
     assert np.abs(np.corrcoef(np.column_stack([off_mm.reshape(-1, 3), angles]).T) - np.eye(6)).max() < 0.12
-    again = rig_of(own)
+    again = rig_of(own.grid, own.seed)
     np.testing.assert_array_equal(rig.position_mm, again.position_mm)
     np.testing.assert_array_equal(rig.rotation, again.rotation)
-    other = rig_of(own.model_copy(update={"seed": 6}))
+    other = rig_of(own.grid, 6)
     assert np.abs(rig.rotation - other.rotation).max() > 0
     # Each camera has its own stream: a row fewer changes nothing about the others.
-    fewer = rig_of(recipe(rows=39, cols=40, errors=errors))
+    fewer = rig_of(recipe(rows=39, cols=40, errors=errors).grid, own.seed)
     np.testing.assert_array_equal(fewer.rotation, rig.rotation[:39])
 
 
@@ -161,7 +163,7 @@ def test_the_virtual_centre_is_a_perfect_pinhole() -> None:
     grid = replace(GRID, rows=2, shear_px=(9.0, 9.0))
     hits = np.argwhere(first_hits_at_centre(scene, grid).object_id == 1)
     np.testing.assert_allclose(hits.mean(axis=0), (40.0, 44.5), atol=0.5)
-    rig = rig_of(recipe(errors={"position_sd_mm": (1.0, 1.0, 1.0)}, lens=LENS.model_dump()))
+    rig = rig_of(recipe(errors={"position_sd_mm": (1.0, 1.0, 1.0)}, lens=LENS.model_dump()).grid, 5)
     assert rig.lens == LENS
     assert rig.pinhole(0, 0).lens is None
 
@@ -209,16 +211,16 @@ def test_the_circle_of_confusion_has_the_size_of_the_formula(where: str) -> None
     scene, rig = dot((0.0, 0.0, z_mm), side_px * z_mm / SCALE_PX), replace(as_rig(small), lens=LENS)
     expected = diameter_px**2 / 16 + side_px**2 / 12
     drawn = photons(scene, rig, 4000)
-    down, right = drawn.row_px - 10.0, drawn.col_px - 11.5
-    # 4000 photons tell the variance of such a shape to 2 %, and so do some 4000 samples.
-    np.testing.assert_allclose([down.var(), right.var()], expected, rtol=0.08)
-    # Single precision moves a film point by some 1e-5 px.
-    assert np.hypot(down, right).max() < diameter_px / 2 + side_px / np.sqrt(2) + 1e-3
-    image = render_view(scene, rig, 0, 0, samples_per_pixel=1024, seed=4).sum(axis=2)
-    i, j = np.indices(image.shape)
+    down, right = drawn.i - 10.0, drawn.j - 11.5
     # Counting by whole pixels adds 1/12 to what is smooth (Sheppard); the dot in focus covers rows 9 to 11,
     # the outer ones by half, and columns 11 and 12.
     pixels = (0.5, 0.25) if diameter_px == 0 else (expected + 1 / 12,) * 2
+    # 4000 photons tell the variance of such a shape to 2 %, and so do some 4000 samples.
+    np.testing.assert_allclose([down.var(), right.var()], pixels, rtol=0.08)
+    # A pixel's centre is up to half its diagonal away from where its photon came in.
+    assert np.hypot(down, right).max() < diameter_px / 2 + (side_px + 1) / np.sqrt(2) + 1e-3
+    image = render_view(scene, rig, 0, 0, samples_per_pixel=1024, seed=4).sum(axis=2)
+    i, j = np.indices(image.shape)
     spread = [(offset**2 * image).sum() / image.sum() for offset in (i - 10.0, j - 11.5)]
     np.testing.assert_allclose(spread, pixels, rtol=0.08)
 
@@ -231,7 +233,7 @@ def test_a_lens_leaves_an_even_field_as_bright_as_a_pinhole() -> None:
     image = render_view(scene, rig, 0, 0, samples_per_pixel=4, seed=1)
     np.testing.assert_allclose(image, 100.0, rtol=1e-5)  # corners, 44 degrees off the axis, too
     settings = Photons(scope="exposure")
-    drawn = thin_photons(Setup(scene, rig, None, 2), settings, seed=1, photons_per_radiance=0.1)
+    drawn, _ = thin_photons(Setup(scene, rig, None, 2), settings, seed=1, photons_per_radiance=0.1)
     counts = np.bincount(drawn.i * 40 + drawn.j, minlength=1640)
     assert abs(counts.mean() / 10 - 1) < 4 / np.sqrt(16_400)
     chi_square = ((counts - 10.0) ** 2 / 10.0).sum()
@@ -259,7 +261,7 @@ def test_thinned_counts_fit_the_rendered_rates(name: str) -> None:
         radiance = mosaic(np.stack(views).astype(np.float64), "GRBG")
         return budget * radiance / radiance.sum(axis=(1, 2), keepdims=True)
 
-    drawn = thin_photons(Setup(scene, rig, "GRBG", DEPTH), Photons(budget=budget), seed=3)
+    drawn, _ = thin_photons(Setup(scene, rig, "GRBG", DEPTH), Photons(budget=budget), seed=3)
     counts = np.zeros((4, 33, 31))
     np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
 

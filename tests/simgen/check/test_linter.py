@@ -40,9 +40,9 @@ from simgen.check.linter import findings
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts
 from simgen.check.scene_probe import coarser, probe_scene
 from simgen.check.sight import sight_findings
-from simgen.dataset.prepared import Prepared
+from simgen.dataset.prepared import Prepared, needs_of
 from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes
-from simgen.photons.photon_counting import Plan
+from simgen.photons.counting_plan import Plan
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
 
@@ -65,7 +65,17 @@ def facts(*objects: ObjectFacts, recipe: dict[str, Any] | None = None, **more: A
         "path_s": 1e-7,
         "hit_s": 1e-7,
     }
-    return Facts(recipe=Recipe.model_validate(PAPER | (recipe or {})), objects=objects, **(known | more))
+    full = Recipe.model_validate(PAPER | (recipe or {}))
+    return Facts(
+        grid=full.grid.camera_grid(),
+        sensor=full.sensor,
+        photons=full.photons,
+        render=full.render,
+        analysis=full.analysis,
+        needs=needs_of(full),
+        objects=objects,
+        **(known | more),
+    )
 
 
 def paper_grid(**changes: Any) -> CameraGrid:
@@ -305,14 +315,14 @@ def test_sizes_memory_and_time_by_hand() -> None:
     recipe = {"products": {"radiance": "mosaic", "view_truth": True}, "render": {"samples_per_pixel": 2}}
     known = facts(recipe=recipe)
     pixels = 1024**2
-    sizes = product_bytes(known.recipe, known.plan)
+    sizes = product_bytes(known.needs, known.plan)
     assert sizes == {"counts": 16 * 1e5, "radiance": 400 * pixels, "truth": 6 * 101 * pixels}
-    assert peak_bytes(known.recipe, known.plan) == 4e8 + 165 * pixels  # truth is written view by view
+    assert peak_bytes(known.needs, known.plan) == 4e8 + 165 * pixels  # truth is written view by view
     paths = 1e-7 * (101 * pixels + 200 * pixels)
     assert seconds(known) == pytest.approx(paths + 1e-7 * 1.5 / 0.065 * 1e5)
     plan = Plan(thins=False, samples=5, photons_per_view=1e9, noise=0.0, normaliser_error=0.0)
     dense = facts(recipe={"products": {"truth": False}}, plan=plan)
-    assert product_bytes(dense.recipe, dense.plan) == {
+    assert product_bytes(dense.needs, dense.plan) == {
         "counts": 1600.0 * pixels
     }  # a count in every pixel at most
     assert seconds(dense) == pytest.approx(1e-7 * 500 * pixels)

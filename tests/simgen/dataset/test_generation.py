@@ -13,11 +13,12 @@ from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import MANIFEST, RADIANCE, TRUTH
+from pcii.io.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
 from pcii.io.verification import verify
-from simgen.cameras.rig import rig_of
-from simgen.dataset import generation as module
-from simgen.dataset.generation import MARKER, generate
+from simgen.cameras.calibration import rig_of
+from simgen.dataset import rendered_views
+from simgen.dataset.generation import generate
+from simgen.dataset.prepared import Prepared
 from simgen.spec.recipe import Recipe
 
 pytestmark = pytest.mark.renders
@@ -91,7 +92,7 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, rendered = tmp_path / "killed", []
-    original = module.render_view
+    original = rendered_views.render_view
 
     def dies_at_the_fourth(*args: object, **kwargs: object) -> np.ndarray:
         rendered.append(args[2:4])
@@ -99,7 +100,7 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
             raise KeyboardInterrupt
         return original(*args, **kwargs)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(module, "render_view", dies_at_the_fourth)
+    monkeypatch.setattr(rendered_views, "render_view", dies_at_the_fourth)
     with pytest.raises(KeyboardInterrupt):
         generate(recipe(), Path(), out)
     assert not (out / MANIFEST).exists()
@@ -112,7 +113,7 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
 
 
 def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module.Prepared, "built", lambda _: pytest.fail("rendered again"))
+    monkeypatch.setattr(Prepared, "render_scene", lambda _: pytest.fail("rendered again"))
     before = (made / MANIFEST).stat().st_mtime_ns
     generate(recipe(), Path(), made)
     assert (made / MANIFEST).stat().st_mtime_ns == before
@@ -132,7 +133,7 @@ def test_a_second_run_that_waited_for_the_first_finds_its_dataset(
         original(file, operation)  # type: ignore[arg-type]
 
     monkeypatch.setattr(fcntl, "flock", first_run_ends_now)
-    monkeypatch.setattr(module, "render_view", lambda *_: pytest.fail("rendered again"))
+    monkeypatch.setattr(rendered_views, "render_view", lambda *_: pytest.fail("rendered again"))
     manifest = generate(recipe(), Path(), out)
     assert len(locks) == 2
     assert manifest["timings_s"] == open_dataset(made).manifest["timings_s"]
@@ -216,7 +217,7 @@ def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_pa
     wrong = recipe(grid=TINY["grid"] | {"errors": errors})
     generate(wrong, Path(), tmp_path / "wrong")
     assert open_dataset(tmp_path / "wrong").grid == open_dataset(made).grid
-    truth, rig = zarr.open_group(tmp_path / "wrong" / TRUTH, mode="r"), rig_of(wrong)
+    truth, rig = zarr.open_group(tmp_path / "wrong" / TRUTH, mode="r"), rig_of(wrong.grid, wrong.seed)
     np.testing.assert_array_equal(np.asarray(truth["camera_position_mm"]), rig.position_mm)
     np.testing.assert_array_equal(np.asarray(truth["camera_rotation"]), rig.rotation)
     own, perfect = digest(tmp_path / "wrong"), digest(made)

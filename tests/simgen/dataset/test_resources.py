@@ -11,9 +11,10 @@ from pcii.base import command_line
 from pcii.base.errors import InputError
 from simgen.app import commands as cli
 from simgen.dataset import resources
-from simgen.dataset.resources import check_resources, shortage, tile_count
-from simgen.photons.majorant import frame_for, tile_px_for
-from simgen.photons.photon_counting import Plan
+from simgen.dataset.prepared import needs_of
+from simgen.dataset.resources import Needs, check_resources, shortage, tile_count
+from simgen.photons.counting_plan import Plan
+from simgen.photons.disparity_layers import layers_for, tile_px_for
 from simgen.spec.recipe import Recipe
 
 ROOM = 8e9
@@ -27,8 +28,8 @@ THINS = Plan(
 )
 
 
-def recipe(**values: Any) -> Recipe:
-    return Recipe.model_validate({"scene": "two_objects", **values})
+def needs(**values: Any) -> Needs:
+    return needs_of(Recipe.model_validate({"scene": "two_objects", **values}))
 
 
 HOT = {"hot_pixel_share": 0.01}
@@ -69,31 +70,31 @@ def test_what_does_not_fit_is_told_by_its_field_and_what_is_told_would_fit(
     values: dict[str, Any], field: str, with_value: Callable[[float], dict[str, Any]]
 ) -> None:
     plan = None if field in ("grid.rows", "grid.cols") else THINS  # whose photons grow with the views
-    found = shortage(recipe(**values), plan, ROOM)
+    found = shortage(needs(**values), plan, ROOM)
     assert found is not None
     assert found.field == field
     assert found.bytes > ROOM
     bound, least, number, *_ = found.right.split()
     assert bound == "at"
-    assert shortage(recipe(**with_value(float(number.strip(",")))), plan, ROOM) is None
+    assert shortage(needs(**with_value(float(number.strip(",")))), plan, ROOM) is None
     beyond = float(number.strip(",")) * (1.5 if least == "most" else 1 / 1.5)
     if field != "sensor.hot_pixel_share" or beyond <= 1:
-        assert shortage(recipe(**with_value(beyond)), plan, ROOM) is not None
+        assert shortage(needs(**with_value(beyond)), plan, ROOM) is not None
 
 
 def test_ordinary_recipes_fit() -> None:
-    assert shortage(recipe(), THINS, ROOM) is None
-    assert shortage(recipe(sensor=HOT | {"dark_counts": 1e-3}), THINS, ROOM) is None
+    assert shortage(needs(), THINS, ROOM) is None
+    assert shortage(needs(sensor=HOT | {"dark_counts": 1e-3}), THINS, ROOM) is None
 
 
 def test_photons_are_told_by_their_budget_or_exposure() -> None:
     # Thinned one by one; in rendered views no more than there are pixels: 100 x 1024 x 1024 of 200 B.
     many = Plan(thins=True, samples=1, photons_per_view=1e6, noise=0.0, normaliser_error=0.0)
-    found = shortage(recipe(photons={"budget": 1e6}), many, ROOM)
+    found = shortage(needs(photons={"budget": 1e6}), many, ROOM)
     assert found is not None
     assert (found.bytes, found.field, found.right) == (2e10, "photons.budget", "at most 380000")
     dense = Plan(thins=False, samples=1, photons_per_view=1e15, noise=0.0, normaliser_error=0.0)
-    exposed = recipe(photons={"scope": "exposure"}, exposure={"time_s": 2.0})
+    exposed = needs(photons={"scope": "exposure"}, exposure={"time_s": 2.0})
     found = shortage(exposed, dense, ROOM)
     assert found is not None
     assert (found.bytes, found.field, found.right) == (
@@ -108,17 +109,17 @@ def test_photons_are_told_by_their_budget_or_exposure() -> None:
     [{}, {"rows": 4, "cols": 7, "pixel_mm": 0.01}, {"shear_px": [9.0, -3.0]}, {"pitch_mm": [2.0, 30.0]}],
 )
 def test_tiles_are_counted_as_the_majorant_has_them(grid: dict[str, Any]) -> None:
-    cameras, z_mm = recipe(grid=grid).grid.camera_grid(), np.array([480.0, 500, 503, 640, 2000, np.inf])
-    made = frame_for(cameras, tile_px_for(cameras), z_mm).tiles
+    cameras, z_mm = needs(grid=grid).grid.camera_grid(), np.array([480.0, 500, 503, 640, 2000, np.inf])
+    made = layers_for(cameras, tile_px_for(cameras), z_mm).tiles
     assert tile_count(cameras, z_mm) == pytest.approx(made, rel=0.02)  # shifts there are whole and even
 
 
 def test_a_disk_that_is_too_small_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    wanted = recipe(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
+    wanted = needs(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
     monkeypatch.setattr(resources, "_free_bytes", lambda _: 6e8)
     with pytest.raises(InputError, match=r"products\.radiance: rendered views .* 630 MB .* has 600 MB left"):
         check_resources(wanted, None, tmp_path / "out")
-    check_resources(recipe(), None, tmp_path / "out")
+    check_resources(needs(), None, tmp_path / "out")
 
 
 def test_what_is_rendered_already_needs_no_more_disk(tmp_path: Path) -> None:

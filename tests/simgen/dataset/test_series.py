@@ -78,8 +78,8 @@ def test_what_is_finished_is_left_alone_and_what_is_missing_is_made(
     recipe_file: Path, series: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = []
-    original = module.Prepared.built
-    monkeypatch.setattr(module.Prepared, "built", lambda self: made.append(self) or original(self))
+    original = module.Prepared.render_scene
+    monkeypatch.setattr(module.Prepared, "render_scene", lambda self: made.append(self) or original(self))
     before = [(series / f"seed_{n}" / MANIFEST).stat().st_mtime_ns for n in (7, 8, 9)]
     recipe, near = load_recipe(str(recipe_file))
     assert len(list(generate_series(recipe, near, series, 3))) == 3

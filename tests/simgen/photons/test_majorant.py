@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.photons.majorant import Majorant, Samples, fit, frame_for, tile_px_for
+from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
+from simgen.photons.majorant import Majorant, fit
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
 DIM = np.array([0.02, 0.01, 0.03])
@@ -33,7 +34,7 @@ def pilot(seed: int, number: int = 4000) -> Samples:
 @pytest.fixture
 def majorant() -> Majorant:
     samples = pilot(1)
-    return fit(GRID, frame_for(GRID, tile_px_for(GRID), samples.z_mm), samples, DIM)
+    return fit(GRID, layers_for(GRID, tile_px_for(GRID), samples.z_mm), samples, DIM)
 
 
 def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Majorant) -> None:
@@ -41,9 +42,9 @@ def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Maj
     entry = majorant.owner_of(samples)
     side = majorant.side_px[entry]
     layer = majorant.layer[entry]
-    frame = majorant.frame
-    down = np.where(layer < 0, 0, frame.row_shift[layer, samples.k])
-    right = np.where(layer < 0, 0, frame.col_shift[layer, samples.l])
+    layers = majorant.layers
+    down = np.where(layer < 0, 0, layers.row_shift[layer, samples.k])
+    right = np.where(layer < 0, 0, layers.col_shift[layer, samples.l])
     np.testing.assert_array_equal((samples.row + down) // side, majorant.row[entry])
     np.testing.assert_array_equal((samples.col + right) // side, majorant.col[entry])
     assert (layer[np.isfinite(samples.z_mm)] >= 0).mean() > 0.9
@@ -77,7 +78,7 @@ def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) ->
     over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
     over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
     majorant.lift(over, reach)
-    _, row, col = majorant.frame.split(majorant.frame.tiles_of(over))
+    _, row, col = majorant.layers.split(majorant.layers.tiles_of(over))
     bright = np.flatnonzero(majorant.bound[:, 1] > 40)
     apart = np.maximum(abs(majorant.row[bright] - row), abs(majorant.col[bright] - col))
     assert bright.size == (2 * reach + 1) ** 2
@@ -86,26 +87,26 @@ def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) ->
 
 def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.
-    frame = majorant.frame
+    layers = majorant.layers
     k, l = (index.ravel() for index in np.indices((3, 4)))
     row = 47.5 + 100 * (10.0 - (k - 1) * 5.0) / 300
     col = 63.5 + 100 * (-20.0 - (l - 1.5) * 8.0) / 300
-    layer = frame.layer_of(np.array([300.0]))[0]
-    at_row = (row + frame.row_shift[layer, k]) / frame.tile_px
-    at_col = (col + frame.col_shift[layer, l]) / frame.tile_px
+    layer = layers.layer_of(np.array([300.0]))[0]
+    at_row = (row + layers.row_shift[layer, k]) / layers.tile_px
+    at_col = (col + layers.col_shift[layer, l]) / layers.tile_px
     # Half a tile of blur by the layer's thickness, and shifts are even: half of 2 px more.
-    assert np.ptp(at_row) <= 1 + 2 / frame.tile_px
-    assert np.ptp(at_col) <= 1 + 2 / frame.tile_px
+    assert np.ptp(at_row) <= 1 + 2 / layers.tile_px
+    assert np.ptp(at_col) <= 1 + 2 / layers.tile_px
 
 
 def test_tiles_follow_a_sheared_grid_too() -> None:
     sheared = replace(GRID, shear_px=(9.5, -6.0))
-    frame = frame_for(sheared, tile_px_for(GRID), np.array([300.0, 420.0, np.inf]))
-    assert frame.row_shift.min() == frame.col_shift.min() == 0
+    layers = layers_for(sheared, tile_px_for(GRID), np.array([300.0, 420.0, np.inf]))
+    assert layers.row_shift.min() == layers.col_shift.min() == 0
     k, l = (index.ravel() for index in np.indices((3, 4)))
-    layer = frame.layer_of(np.array([420.0]))[0]
+    layer = layers.layer_of(np.array([420.0]))[0]
     row = 47.5 - 6.0 * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 420
     col = 63.5 + 9.5 * (l - 1.5) + 100 * (-20.0 - (l - 1.5) * 8.0) / 420
     # As without shear: half a tile of blur, and half of 2 px.
-    assert np.ptp((row + frame.row_shift[layer, k]) / frame.tile_px) <= 1 + 2 / frame.tile_px
-    assert np.ptp((col + frame.col_shift[layer, l]) / frame.tile_px) <= 1 + 2 / frame.tile_px
+    assert np.ptp((row + layers.row_shift[layer, k]) / layers.tile_px) <= 1 + 2 / layers.tile_px
+    assert np.ptp((col + layers.col_shift[layer, l]) / layers.tile_px) <= 1 + 2 / layers.tile_px

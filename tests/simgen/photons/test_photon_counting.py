@@ -17,12 +17,16 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
 from pcii.io.verification import verify
-from simgen.photons import photon_counting as module
-from simgen.photons.photon_counting import PROBE_SEED, Plan, draw_from_views, plan, thin, write_counts
+from simgen.dataset.prepared import capture_of, least_samples
+from simgen.photons import counting_plan as module
+from simgen.photons import photon_counting
+from simgen.photons.counting_plan import PROBE_SEED, Plan
+from simgen.photons.photon_counting import draw_from_views, write_counts
 from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.detector import Arrivals, nested_subset
+from simgen.sensor.detector import nested_subset
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PATHS, Recipe
 from simgen.spec.scene import Scene, load_scene
 
@@ -49,8 +53,16 @@ def mosaic_of(k: int, l: int) -> np.ndarray:
     return (1 + 2 * k + l) * ((7 * np.arange(HEIGHT * WIDTH)) % 23.0).reshape(HEIGHT, WIDTH)
 
 
-def dense(made: Recipe) -> Arrivals:
-    return draw_from_views(made, mosaic_of, PLAN, silent)[0]
+def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
+    return module.plan(capture_of(made), render_scene, kind, least_samples(made))
+
+
+def thin(made: Recipe, render_scene: RenderScene) -> PhotonTable:
+    return photon_counting.thin(capture_of(made), render_scene, made.render.max_depth, PLAN)[0]
+
+
+def dense(made: Recipe) -> PhotonTable:
+    return draw_from_views(capture_of(made), mosaic_of, PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
@@ -59,14 +71,14 @@ def two_objects() -> RenderScene:
     return build(backend.load(), found, folder, 3)
 
 
-def counted(counts: Arrivals, made: Recipe) -> np.ndarray:
+def counted(counts: PhotonTable, made: Recipe) -> np.ndarray:
     """Counts per pixel, (V, H, W)."""
     found = np.zeros(made.grid.camera_grid().shape_KLHW, dtype=np.int64)
     np.add.at(found, (counts.k, counts.l, counts.i, counts.j), counts.n)
     return found.reshape(-1, HEIGHT, WIDTH)
 
 
-def subset(arrivals: Arrivals, made: Recipe, budget: float) -> Arrivals:
+def subset(arrivals: PhotonTable, made: Recipe, budget: float) -> PhotonTable:
     if budget == made.photons.budget:
         return arrivals
     return arrivals.take(nested_subset(arrivals, arrivals, made.photons, budget, made.seed))
@@ -113,7 +125,7 @@ def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
 @pytest.mark.skipif(not COMPILED, reason="takes minutes, and the renderer has no part in it")
 def test_totals_of_thinned_nested_budgets_are_poisson(two_objects: RenderScene) -> None:
     made = recipe(20, 30)  # 600 views, whose photons know nothing of each other
-    arrivals = thin(made, two_objects, PLAN)[0]
+    arrivals = thin(made, two_objects)
     found = {budget: by_scope(counted(subset(arrivals, made, budget), made), "view") for budget in BUDGETS}
     for budget in BUDGETS:
         assert is_poisson(found[budget], budget)
@@ -129,7 +141,7 @@ def test_multinomial_totals_of_nested_budgets_are_exact(
     two_objects: RenderScene, scope: str, thins: bool
 ) -> None:
     made = recipe(photons=nested(scope=scope, statistics="multinomial"))
-    arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
+    arrivals = thin(made, two_objects) if thins else dense(made)
     for budget in BUDGETS:
         totals = by_scope(counted(subset(arrivals, made, budget), made), scope)
         assert totals.tolist() == [budget] * {"view": 4, "channel": 12, "scene": 1}[scope]
@@ -140,7 +152,7 @@ def test_multinomial_totals_of_nested_budgets_are_exact(
 @pytest.mark.parametrize("thins", [True, False])
 def test_each_budget_is_a_subset_of_the_next(two_objects: RenderScene, statistics: str, thins: bool) -> None:
     made = recipe(photons=nested(statistics=statistics))
-    arrivals = thin(made, two_objects, PLAN)[0] if thins else dense(made)
+    arrivals = thin(made, two_objects) if thins else dense(made)
     belongs = [nested_subset(arrivals, arrivals, made.photons, budget, made.seed) for budget in (8, 40)]
     assert 0 < belongs[0].sum() < belongs[1].sum() < belongs[1].size
     assert (belongs[0] <= belongs[1]).all()
@@ -148,7 +160,7 @@ def test_each_budget_is_a_subset_of_the_next(two_objects: RenderScene, statistic
     # Budgets that are nearly the same: 100 times the smaller one might get more than the larger.
     side = 4 if thins and not COMPILED else 10
     near = recipe(side, side, photons={"budget": 120, "nested": [38, 40], "statistics": statistics})
-    many = thin(near, two_objects, PLAN)[0] if thins else dense(near)
+    many = thin(near, two_objects) if thins else dense(near)
     less, more = (nested_subset(many, many, near.photons, budget, near.seed) for budget in (38, 40))
     assert (less <= more).all()
     independent = counted(subset(dense(recipe(seed=2)), made, 8), made)
@@ -164,6 +176,7 @@ def test_photons_of_a_smaller_budget_are_spread_like_the_light() -> None:
         arrivals = dense(made)
         found += counted(subset(arrivals, made, 8), made)
         in_order = np.arange(arrivals.k.size)
+        assert arrivals.scope is not None
         start = np.searchsorted(arrivals.scope, np.arange(4))
         first_rows += counted(arrivals.take(in_order - start[arrivals.scope] < 8), made)
     lit = expected > 0
@@ -190,20 +203,20 @@ def test_counts_at_low_light_keep_their_mean() -> None:
     # A thousandth of a photon per pixel in 2500 views of 80 pixels: 200 in all.
     made = recipe(50, 50, photons={"budget": 1e-3 * HEIGHT * WIDTH})
     flat = np.full((HEIGHT, WIDTH), 3.0)
-    counts = counted(draw_from_views(made, lambda *_: flat, PLAN, silent)[0], made)
+    counts = counted(draw_from_views(capture_of(made), lambda *_: flat, PLAN, silent)[0], made)
     assert abs(counts.mean() - 1e-3) < 4 * np.sqrt(1e-3 / counts.size)
     assert abs(2 * counts.mean() - 1e-3) > 4 * np.sqrt(1e-3 / counts.size)  # the fault: doubled
 
 
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
-    arrivals, log = draw_from_views(made, lambda k, l: k * mosaic_of(k, l), PLAN, silent)
+    arrivals, log = draw_from_views(capture_of(made), lambda k, l: k * mosaic_of(k, l), PLAN, silent)
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
         assert by_scope(counted(subset(arrivals, made, budget), made), "view").tolist() == [0, 0] + 2 * [
             budget
         ]
-    black, log = draw_from_views(made, lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
+    black, log = draw_from_views(capture_of(made), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
     assert log["views_without_light"] == 4
     assert subset(black, made, 8).k.size == 0
 
@@ -212,9 +225,9 @@ def test_too_many_photons_to_be_told_apart_are_refused_before_any_view_is_render
     monkeypatch: pytest.MonkeyPatch, two_objects: RenderScene
 ) -> None:
     monkeypatch.setattr(module, "MOST_SINGLE_PHOTONS", 300)
-    plan(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
+    planned(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
     with pytest.raises(InputError, match=r"photons\.nested: .* photons are too many"):
-        plan(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
+        planned(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
 
 
 def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
@@ -237,7 +250,7 @@ FAULTY = {
 @pytest.mark.parametrize("sensor", [{}, {"counter_bits": 1}, FAULTY, FAULTY | {"counter_bits": 2}])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
-    told = write_counts(made, dense(made), tmp_path)
+    told = write_counts(capture_of(made), made.sensor, dense(made), tmp_path, with_origins=True)
     whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
     assert (small <= middle).all()
     assert (middle <= whole).all()
@@ -254,34 +267,34 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
 def test_without_faults_what_arrives_is_what_is_written(tmp_path: Path) -> None:
     made = recipe(photons={"budget": 500})
     arrivals = dense(made)
-    told = write_counts(made, arrivals, tmp_path)
+    told = write_counts(capture_of(made), made.sensor, arrivals, tmp_path, with_origins=True)
     np.testing.assert_array_equal(stored(tmp_path, made), counted(arrivals, made))
     assert told["arrived"] == told["total"] == arrivals.n.sum()
 
 
 def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     lost = recipe(sensor={"quantum_efficiency": (1e-9,) * 3, "dark_counts": 0.5})
-    write_counts(lost, dense(lost), tmp_path)
+    write_counts(capture_of(lost), lost.sensor, dense(lost), tmp_path, with_origins=True)
     whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
     np.testing.assert_array_equal(whole, small)
     assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
 
 
-def from_known_places(made: Recipe) -> Arrivals:
+def from_known_places(made: Recipe) -> PhotonTable:
     """Photons in random order; each of an object and from a depth that tell its pixel."""
     rng = np.random.default_rng(1)
     shape = made.grid.camera_grid().shape_KLHW
     flat = rng.integers(0, np.prod(shape), 900)
     ones = np.ones(flat.size, dtype=np.int64)
     k, l, i, j = np.unravel_index(flat, shape)
-    return Arrivals(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
+    return PhotonTable(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
 
 
 @pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"counter_bits": 2}])
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))
-    write_counts(made, from_known_places(made), tmp_path)
+    write_counts(capture_of(made), made.sensor, from_known_places(made), tmp_path, with_origins=True)
     origins = zarr.open_group(tmp_path / nested_name(PHOTON_TRUTH, budget), mode="r")
     object_id, z_mm = np.asarray(origins["object_id"]), np.asarray(origins["z_mm"])
     counts = stored(tmp_path, made, budget).ravel()
@@ -297,8 +310,8 @@ def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: di
 
 def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
     made = recipe()
-    black = draw_from_views(made, lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
-    told = write_counts(made, black, tmp_path)
+    black = draw_from_views(capture_of(made), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
+    told = write_counts(capture_of(made), made.sensor, black, tmp_path, with_origins=True)
     assert told["total"] == 0
     assert (stored(tmp_path, made, 8) == 0).all()
 
@@ -311,8 +324,8 @@ def test_little_light_is_thinned_and_much_is_rendered(two_objects: RenderScene) 
     little = recipe(grid=PROBED, photons={"budget": 100})
     much = recipe(grid=PROBED, photons={"budget": 1e8})
     for kind in ("llvm", "scalar"):
-        assert plan(little, two_objects, kind).thins
-        assert not plan(much, two_objects, kind).thins
+        assert planned(little, two_objects, kind).thins
+        assert not planned(much, two_objects, kind).thins
 
 
 @pytest.mark.renders
@@ -321,7 +334,7 @@ def test_little_light_is_thinned_and_much_is_rendered(two_objects: RenderScene) 
 )
 def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: dict[str, Any]) -> None:
     # Not only near break-even: the samples of dense views are the same too.
-    plans = [plan(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in range(1, 5)]
+    plans = [planned(recipe(grid=PROBED, seed=seed, **scope), two_objects, "llvm") for seed in range(1, 5)]
     assert plans == plans[:1] * 4
 
 
@@ -329,7 +342,7 @@ def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: d
 def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objects: RenderScene) -> None:
     # Some hundred photons per pixel, whose rates are not known to 1 % of their own noise.
     bright = recipe(grid=PROBED, photons={"budget": 3e5})
-    made = plan(bright, two_objects, "scalar")
+    made = planned(bright, two_objects, "scalar")
     assert made.noise > NOISE_SHARE
     assert made.thins
 
@@ -341,7 +354,7 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
 ) -> None:
     dim = recipe(grid=PROBED, photons={"budget": 0.1, "scope": scope})
     seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", PROBE_SEED)
-    made = plan(dim, two_objects, "llvm")
+    made = planned(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
     assert made.normaliser_error == pytest.approx(error)
     assert error <= NORMALISER_ERROR
@@ -351,7 +364,7 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
 @pytest.mark.renders
 @pytest.mark.parametrize(("scope", "share"), [("view", 1.0), ("channel", 3.0), ("scene", 1 / 6)])
 def test_a_plan_expects_the_photons_of_its_scope(two_objects: RenderScene, scope: str, share: float) -> None:
-    made = plan(recipe(grid=PROBED, photons={"budget": 600, "scope": scope}), two_objects, "llvm")
+    made = planned(recipe(grid=PROBED, photons={"budget": 600, "scope": scope}), two_objects, "llvm")
     assert made.photons_per_view == pytest.approx(600 * share, rel=1e-9)
 
 
@@ -362,13 +375,13 @@ def exposed(built: RenderScene, photons_per_view: float, **changes: Any) -> Reci
         scope = {"scope": "exposure"}
         return recipe(grid=PROBED, photons=scope, exposure={"time_s": time_s}, **changes)
 
-    found = plan(of(1e-9), built, "scalar").photons_per_view
+    found = planned(of(1e-9), built, "scalar").photons_per_view
     return of(1e-9 * photons_per_view / found)
 
 
 @pytest.mark.renders
 def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> None:
-    plans = [plan(exposed(two_objects, n), two_objects, "scalar") for n in (0.1, 10, 40, 1e9)]
+    plans = [planned(exposed(two_objects, n), two_objects, "scalar") for n in (0.1, 10, 40, 1e9)]
     samples = [made.samples for made in plans]
     assert samples[0] == 1
     assert samples[0] < samples[1] < samples[2] < samples[3] == MOST_SAMPLES
@@ -376,7 +389,7 @@ def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> N
     assert plans[3].noise > NOISE_SHARE  # more than is allowed are needed, and it says so
     images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
     with_images = exposed(two_objects, 1, **images)
-    assert plan(with_images, two_objects, "scalar").samples == 33
+    assert planned(with_images, two_objects, "scalar").samples == 33
 
 
 @pytest.mark.renders
@@ -385,7 +398,7 @@ def test_a_plan_asks_for_no_more_paths_than_one_pass_can_count(
 ) -> None:
     monkeypatch.setattr("simgen.photons.rendering_noise.MOST_SAMPLES", 1024)
     large = {"rows": 1, "cols": 1, "height": 2048, "width": 2048, "pixel_mm": 0.0156}
-    made = plan(recipe(grid=large, photons={"budget": 1e12}), two_objects, "scalar")
+    made = planned(recipe(grid=large, photons={"budget": 1e12}), two_objects, "scalar")
     assert 2048 * 2048 * made.samples < MOST_PATHS
     assert 2048 * 2048 * (made.samples + 1) >= MOST_PATHS  # but for the limit it would be more
     assert made.noise > NOISE_SHARE
@@ -397,11 +410,11 @@ def test_darkness_is_planned_too() -> None:
     wall = {"title": "dark", "lights": [light], "backdrop": {"z_mm": 500.0}}
     dark = build(backend.load(), Scene.model_validate(wall), Path(), 3)
     for kind in ("llvm", "scalar"):
-        made = plan(recipe(grid=PROBED), dark, kind)
+        made = planned(recipe(grid=PROBED), dark, kind)
         assert (made.thins, made.samples, made.noise, made.normaliser_error) == (False, 1, 0, 0)
     # What the virtual centre sees says nothing about how large a budget is.
     with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
-        plan(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
+        planned(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
 
 
 def views_of(dataset: Dataset) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Thinned photons are exactly Poisson with the rendered rate; each test plants a fault and sees it caught."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +11,12 @@ from scipy import stats
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.candidates import Setup
-from simgen.photons.thinning import OVERSHOOT_SHARE, PhotonList, thin_photons
+from simgen.photons.thinning import OVERSHOOT_SHARE, thin_photons
 from simgen.renderer import backend
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons
 from simgen.spec.scene import Scene
 
@@ -42,12 +44,16 @@ def radiance(scene: RenderScene) -> np.ndarray:
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
 
 
-def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonList:
+def draw_with_log(scene: RenderScene, seed: int, **photons: object) -> tuple[PhotonTable, dict[str, Any]]:
     settings = Photons.model_validate(photons)
     return thin_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
 
 
-def counted(drawn: PhotonList) -> np.ndarray:
+def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonTable:
+    return draw_with_log(scene, seed, **photons)[0]
+
+
+def counted(drawn: PhotonTable) -> np.ndarray:
     """Photons per pixel, (V, H, W)."""
     counts = np.zeros((4, 32, 32), dtype=np.int64)
     np.add.at(counts, (2 * drawn.k + drawn.l, drawn.i, drawn.j), 1)
@@ -193,6 +199,7 @@ def test_totals_are_those_of_the_scope(scene: RenderScene, scope: str) -> None:
 
 def test_the_first_photons_of_a_scope_are_a_smaller_draw(scene: RenderScene, radiance: np.ndarray) -> None:
     drawn = draw(scene, 6, budget=20_000, statistics="multinomial")
+    assert drawn.rank is not None
     first = drawn.rank < 2000
     counts = np.zeros((4, 32, 32))
     np.add.at(counts, (2 * drawn.k[first] + drawn.l[first], drawn.i[first], drawn.j[first]), 1)
@@ -202,21 +209,48 @@ def test_the_first_photons_of_a_scope_are_a_smaller_draw(scene: RenderScene, rad
     assert stats.chi2.sf(chi, 4 * 63) > 1e-3
 
 
+RAYS_ACROSS = 32
+"""Rays through a pixel along each axis."""
+
+
 def test_each_photon_knows_what_it_came_from(scene: RenderScene) -> None:
-    drawn = draw(scene, 7, budget=20_000)
-    np.testing.assert_array_less(np.abs(drawn.row_px - drawn.i), 0.5 + 1e-5)
-    np.testing.assert_array_less(np.abs(drawn.col_px - drawn.j), 0.5 + 1e-5)
-    # The same rays again, from the contract's formulas and in double precision up to the ray itself.
-    x_mm, y_mm = (drawn.l - 0.5) * GRID.pitch_mm[0], (drawn.k - 0.5) * GRID.pitch_mm[1]
-    across = (drawn.col_px - 15.5) * GRID.pixel_mm / GRID.focal_mm
-    down = (drawn.row_px - 15.5) * GRID.pixel_mm / GRID.focal_mm
-    direction = np.stack([across, down, np.ones_like(down)]) / np.sqrt(1 + across**2 + down**2)
-    object_id, z_mm = hit_by(scene, np.stack([x_mm, y_mm, np.zeros_like(x_mm)]), direction)
-    # Single precision moves a ray by 1e-5 px, which matters to one in a hundred thousand at an outline.
-    agrees = (object_id == drawn.object_id) & (np.abs(z_mm - drawn.z_mm) < 0.05)
-    assert (~agrees).sum() <= 3
+    drawn = draw(scene, 7, budget=4000)
+    assert drawn.object_id is not None
+    assert drawn.z_mm is not None
+    pixels, of_photon = np.unique(np.stack([drawn.k, drawn.l, drawn.i, drawn.j]), axis=1, return_inverse=True)
+    object_id, z_mm = seen_in_pixels(scene, pixels)
+
+    def agrees(own_id: np.ndarray, own_z_mm: np.ndarray) -> np.ndarray:
+        same = object_id[of_photon] == own_id[:, None]
+        near, far = (
+            pick(np.where(same, z_mm[of_photon], beyond), axis=1)
+            for pick, beyond in ((np.min, np.inf), (np.max, -np.inf))
+        )
+        # Rays are 0.75 mm apart at 600 mm: a ball's depth changes more only within 1 mm of its outline.
+        return same.any(axis=1) & (own_z_mm > near - 20) & (own_z_mm < far + 20)
+
+    # An object may cover less of a pixel than lies between rays.
+    assert (~agrees(drawn.object_id, drawn.z_mm)).sum() <= 3
     # The fault: everyone has their neighbour's origin.
-    assert (np.roll(object_id, 1) != drawn.object_id).sum() > 100
+    assert (~agrees(np.roll(drawn.object_id, 1), np.roll(drawn.z_mm, 1))).sum() > 50
+
+
+def seen_in_pixels(scene: RenderScene, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Object id and planar depth (N, M) that rays evenly spread over pixels (4, N) hit first.
+
+    From the contract's formulas, in double precision up to the ray itself.
+    """
+    k, l, i, j = (index[:, None] for index in pixels)
+    cells = np.indices((RAYS_ACROSS, RAYS_ACROSS)).reshape(2, 1, -1)
+    down, right = (cells + 0.5) / RAYS_ACROSS - 0.5
+    across = (j + right - 15.5) * GRID.pixel_mm / GRID.focal_mm
+    down = (i + down - 15.5) * GRID.pixel_mm / GRID.focal_mm
+    direction = np.stack([across, down, np.ones_like(down)]) / np.sqrt(1 + across**2 + down**2)
+    x_mm, y_mm = (l - 0.5) * GRID.pitch_mm[0], (k - 0.5) * GRID.pitch_mm[1]
+    origin = np.stack(np.broadcast_arrays(x_mm, y_mm, 0.0 * across)).copy()
+    origin[2] = 0
+    found = hit_by(scene, origin.reshape(3, -1), direction.reshape(3, -1))
+    return found[0].reshape(across.shape), found[1].reshape(across.shape)
 
 
 def hit_by(scene: RenderScene, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -241,8 +275,8 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
     scene = lit([plastic, gold], [lamp, EVENLY])
     budget = 30_000 if COMPILED else 6000
-    drawn = draw(scene, 1, budget=budget)
-    assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
+    drawn, log = draw_with_log(scene, 1, budget=budget)
+    assert log["overshoot_photons"] <= OVERSHOOT_SHARE * log["kept"]
     views = [
         render_view(scene, GRID, k, l, samples_per_pixel=8192, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
@@ -276,7 +310,7 @@ def test_the_number_of_threads_changes_nothing(scene: RenderScene) -> None:
         alone = draw(scene, 8, budget=900)
     finally:
         dr.set_thread_count(threads)
-    for name in ("k", "l", "i", "j", "row_px", "col_px", "object_id", "z_mm", "scope", "rank"):
+    for name in ("k", "l", "i", "j", "object_id", "z_mm", "scope", "rank"):
         np.testing.assert_array_equal(getattr(many, name), getattr(alone, name))
 
 
@@ -323,8 +357,8 @@ def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
         "luminance_cd_m2": 1e6,
     }
     scene = lit([ball("grey", -150.0, 600.0, (0.5, 0.5, 0.5))], [lamp])
-    drawn = draw(scene, 10, budget=30_000 if COMPILED else 4000)
-    assert drawn.log["overshoot_photons"] <= OVERSHOOT_SHARE * drawn.log["kept"]
+    drawn, log = draw_with_log(scene, 10, budget=30_000 if COMPILED else 4000)
+    assert log["overshoot_photons"] <= OVERSHOOT_SHARE * log["kept"]
     view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=4096, seed=1).astype(float), "GRBG")
     share = view / view.sum()
     peak = share > 0.01
@@ -343,9 +377,9 @@ def test_a_black_scene_gives_no_photons() -> None:
         "backdrop": {"z_mm": 500.0, "reflectance": [0, 0, 0]},
     }
     scene = build(backend.load(), Scene.model_validate(values), Path(), DEPTH)
-    drawn = draw(scene, 1, budget=100)
+    drawn, log = draw_with_log(scene, 1, budget=100)
     assert drawn.k.size == 0
-    assert drawn.log["kept"] == 0
+    assert log["kept"] == 0
 
 
 @pytest.mark.parametrize("light", [{"budget": 300}, {"scope": "exposure"}])

@@ -8,11 +8,12 @@ from scipy import stats
 
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
-from simgen.sensor.detector import NO_OBJECT, Arrivals, detect, full_light_image, saturate
+from simgen.sensor.detector import detect, full_light_image, saturate
+from simgen.sensor.photon_table import NO_OBJECT, PhotonTable
 from simgen.spec.recipe import FullLight, Sensor
 
 EFFICIENCY = (0.3, 0.6, 0.9)
-COLUMNS = [field.name for field in fields(Arrivals)]
+COLUMNS = [field.name for field in fields(PhotonTable)]
 
 
 def films(rows: int, cols: int, height: int, width: int) -> CameraGrid:
@@ -30,22 +31,22 @@ def films(rows: int, cols: int, height: int, width: int) -> CameraGrid:
 GRID = films(2, 3, 50, 60)
 
 
-def arriving(n: np.ndarray) -> Arrivals:
+def arriving(n: np.ndarray) -> PhotonTable:
     """Photons one by one, n (K, L, H, W) of them; all of object 1, at 600 mm."""
     where = np.nonzero(n)
     k, l, i, j = (index.repeat(n[where]) for index in where)
     ones = np.ones(k.size, dtype=np.int64)
-    return Arrivals(k, l, i, j, ones, 0 * ones, np.arange(k.size), ones, np.full(k.size, 600.0))
+    return PhotonTable(k, l, i, j, ones, 0 * ones, np.arange(k.size), ones, np.full(k.size, 600.0))
 
 
-def poisson(rate: float | np.ndarray, seed: int, grid: CameraGrid = GRID) -> Arrivals:
+def poisson(rate: float | np.ndarray, seed: int, grid: CameraGrid = GRID) -> PhotonTable:
     return arriving(np.random.default_rng(seed).poisson(rate, grid.shape_KLHW))
 
 
 DARKNESS = arriving(np.zeros(GRID.shape_KLHW, dtype=np.int64))
 
 
-def counted(counts: Arrivals, grid: CameraGrid = GRID) -> np.ndarray:
+def counted(counts: PhotonTable, grid: CameraGrid = GRID) -> np.ndarray:
     """Counts per pixel, (K, L, H, W)."""
     dense = np.zeros(grid.shape_KLHW, dtype=np.int64)
     np.add.at(dense, (counts.k, counts.l, counts.i, counts.j), counts.n)
@@ -115,9 +116,8 @@ def test_photons_that_come_in_numbers_are_detected_one_by_one() -> None:
     one_by_one = poisson(2.0, seed=4)
     n = counted(one_by_one)
     where = np.nonzero(n)
-    nobody = np.full(where[0].size, -1)
     sensor = Sensor(quantum_efficiency=(0.6, 0.6, 0.6))
-    found = counted(detect(Arrivals(*where, n[where], nobody, nobody), GRID, "GRBG", sensor, seed=5))
+    found = counted(detect(PhotonTable(*where, n[where]), GRID, "GRBG", sensor, seed=5))
     assert is_poisson(found, 1.2)
     assert (found <= n).all()
     whole = n * (np.random.default_rng(5).random(n.shape) < 0.6)  # the fault: all of a pixel's or none
@@ -242,8 +242,7 @@ def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
     np.testing.assert_array_equal(counted(saturate(photons, TEN, bits, seed=1), TEN), expected)
     k, l, i, j = (np.tile(index, 2) for index in np.nonzero(UP_TO_NINE))
     n = UP_TO_NINE[UP_TO_NINE > 0]
-    nobody = np.full(k.size, -1)
-    in_two_lumps = Arrivals(k, l, i, j, np.concatenate([n // 2, n - n // 2]), nobody, nobody)
+    in_two_lumps = PhotonTable(k, l, i, j, np.concatenate([n // 2, n - n // 2]))
     np.testing.assert_array_equal(counted(saturate(in_two_lumps, TEN, bits, seed=1), TEN), expected)
     one_after_the_other = np.minimum(in_two_lumps.n, most)  # the fault: each lump stops by itself
     wrong = counted(replace(in_two_lumps, n=one_after_the_other), TEN)
@@ -259,8 +258,8 @@ def test_no_total_exceeds_the_counter_and_none_below_changes(bits: int) -> None:
 
 
 def test_a_counter_of_32_bits_stops_at_four_thousand_million() -> None:
-    zero, nobody = np.zeros(1, dtype=np.int64), np.full(1, -1)
-    many = Arrivals(zero, zero, zero, zero, np.array([1 << 33]), nobody, nobody)
+    zero = np.zeros(1, dtype=np.int64)
+    many = PhotonTable(zero, zero, zero, zero, np.array([1 << 33]))
     assert saturate(many, TEN, 32, seed=1).n.tolist() == [2**32 - 1]
 
 
@@ -269,13 +268,13 @@ def test_no_counts_stay_none() -> None:
     assert nothing.k.size == 0
 
 
-def companions(n: list[int]) -> Arrivals:
+def companions(n: list[int]) -> PhotonTable:
     """In each of 4096 pixels some counts of each object, n[0] of object 1 and so on; in this order."""
     pixels = films(1, 1, 64, 64)
     flat, ids = np.arange(4096).repeat(len(n)), np.tile(np.arange(len(n)) + 1, 4096)
     k, l, i, j = np.unravel_index(flat, pixels.shape_KLHW)
     nobody = np.full(flat.size, -1)
-    return Arrivals(k, l, i, j, np.tile(n, 4096), nobody, nobody, ids, np.full(flat.size, 600.0))
+    return PhotonTable(k, l, i, j, np.tile(n, 4096), nobody, nobody, ids, np.full(flat.size, 600.0))
 
 
 @pytest.mark.parametrize(("n", "bits"), [([1, 1, 1], 1), ([1, 1, 1, 1, 1], 2), ([1, 9], 1), ([2, 8], 2)])

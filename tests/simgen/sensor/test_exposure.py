@@ -9,22 +9,25 @@ import pytest
 
 from pcii.base.progress import silent
 from pcii.core.bayer import colour_index
-from simgen.photons.photon_counting import Plan, absolute_gain, draw_from_views, plan, thin
+from simgen.dataset.prepared import capture_of
+from simgen.photons.counting_plan import Plan, plan
+from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.detector import Arrivals
 from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
 from simgen.sensor.mosaic import sense
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Exposure, Recipe
 from simgen.spec.scene import Scene
+from simgen.spectral.camera_curves import sensitivity
 from simgen.spectral.filters import filters_for
-from simgen.spectral.spectra import illuminant, integral, observer, patch, sensitivity
+from simgen.spectral.spectra import illuminant, integral, observer, patch
 
 LUMINANCE_CD_M2, F_NUMBER, TIME_S, PIXEL_MM = 100.0, 4.0, 2e-6, 0.02
 BY_HAND = math.pi / (4 * 4.0**2) * (20e-6) ** 2 * 2e-6 * 100 * 4.09e15
 """Photons per pixel: 16 of 555 nm. The 4.09e15 in a lumen second are rounded to 1 in 1000."""
-Draw = Callable[[Recipe, RenderScene], Arrivals]
+Draw = Callable[[Recipe, RenderScene], PhotonTable]
 
 
 def recipe(**changes: object) -> Recipe:
@@ -49,21 +52,21 @@ def planned(thins: bool) -> Plan:
     return Plan(thins=thins, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 
 
-def thinned(made: Recipe, built: RenderScene) -> Arrivals:
-    return thin(made, built, planned(True))[0]
+def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
+    return thin(capture_of(made), built, made.render.max_depth, planned(True))[0]
 
 
-def dense(made: Recipe, built: RenderScene) -> Arrivals:
+def dense(made: Recipe, built: RenderScene) -> PhotonTable:
     grid = made.grid.camera_grid()
 
     def mosaic_of(k: int, l: int) -> np.ndarray:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
         return sense(image, made.cfa)
 
-    return draw_from_views(made, mosaic_of, planned(False), silent)[0]
+    return draw_from_views(capture_of(made), mosaic_of, planned(False), silent)[0]
 
 
-def counted(arrivals: Arrivals) -> np.ndarray:
+def counted(arrivals: PhotonTable) -> np.ndarray:
     counts = np.zeros((2, 64, 80), dtype=np.int64)
     np.add.at(counts, (arrivals.l, arrivals.i, arrivals.j), arrivals.n)
     return counts
@@ -133,12 +136,12 @@ def test_a_longer_exposure_gives_more_photons(lit_evenly: RenderScene, draw: Dra
 
 @pytest.mark.renders
 def test_the_plan_expects_the_photons_by_hand(lit_evenly: RenderScene) -> None:
-    made = plan(recipe(), lit_evenly, "llvm")
+    made = plan(capture_of(recipe()), lit_evenly, "llvm")
     assert made.photons_per_view == pytest.approx(64 * 80 * BY_HAND, rel=1e-3)
     assert made.noise == pytest.approx(0, abs=1e-6)  # single precision: an even light has no noise
     assert made.samples == 1
 
 
 def test_a_budget_knows_no_exposure() -> None:
-    assert absolute_gain(recipe(photons={"budget": 10.0})) is None
-    assert absolute_gain(recipe()) == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)
+    assert capture_of(recipe(photons={"budget": 10.0})).photons_per_radiance is None
+    assert capture_of(recipe()).photons_per_radiance == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)

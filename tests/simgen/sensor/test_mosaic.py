@@ -84,7 +84,9 @@ def test_multinomial_totals_are_exact(scope: str) -> None:
 
 
 def test_streams_are_keyed_and_do_not_collide() -> None:
-    keys = [(s, v, st) for s in (0, 1, 5) for v in (0, 1, 2) for st in ("radiance", "photons", "totals")]
+    keys = [
+        (s, v, st) for s in (0, 1, 5) for v in (0, 1, 2) for st in ("radiance", "photons", "budget totals")
+    ]
     drawn = {seeds.integer(s, view=v, stage=st) for s, v, st in keys}  # type: ignore[arg-type]
     assert len(drawn) == len(keys)
     assert seeds.integer(5, view=2, stage="photons") == seeds.integer(5, view=2, stage="photons")

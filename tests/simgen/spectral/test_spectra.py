@@ -11,6 +11,7 @@ import pytest
 from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.scene import Scene
+from simgen.spectral.camera_curves import sensitivity
 from simgen.spectral.filters import CELLS, Filters, filters_for
 from simgen.spectral.spectra import (
     WAVELENGTH_NM,
@@ -20,7 +21,6 @@ from simgen.spectral.spectra import (
     observer,
     patch,
     patch_names,
-    sensitivity,
     tint,
 )
 
@@ -150,7 +150,7 @@ def test_a_pixel_that_no_lamp_shines_for_is_dark_and_no_fault() -> None:
 
 
 def test_tables_that_end_before_light_does_are_refused() -> None:
-    with pytest.raises(InputError, match="only told from 350 to 690 nm"):
+    with pytest.raises(InputError, match="only known from 350 to 690 nm"):
         illuminant("ISO 7589 Photoflood")
 
 

@@ -54,8 +54,8 @@ def test_every_pass_is_there_and_opens(whole: Path) -> None:
     masks = pixel_masks(dataset.grid, truth, np.array([540.0, 620.0]))
     np.testing.assert_array_equal(array(group, "in_focus"), masks)
     assert masks.any()
-    rays = [line for line in dataset.manifest["skipped"] if line.startswith("visibility where")]
-    assert len(rays) == 1
+    work = {entry["what"]: entry["saved"] for entry in dataset.manifest["skipped"]}
+    assert 0 < work["visibility of some points"] < 6 * 64 * 60
 
 
 def test_passes_of_views_are_each_views_own(whole: Path, tmp_path: Path) -> None:

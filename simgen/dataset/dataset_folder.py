@@ -1,0 +1,95 @@
+"""Whose folder it is: what identifies a dataset, finished ones, and unfinished ones that one run works on."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import locked
+from pcii.io.dataset_layout import FORMAT_VERSION, MANIFEST, MARKER, REMEDY, read_manifest
+from pcii.io.sealed_json import check_file, hash_file
+from simgen.base.asset_names import asset
+from simgen.dataset.prepared import Prepared
+from simgen.spec.scene import scene_files
+
+
+def identity_of(prepared: Prepared) -> str:
+    """Hash of all that decides the dataset's content, but for the machine."""
+    scene, folder, curves = prepared.scene, prepared.folder, prepared.curves
+    assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
+    content = {
+        "recipe": prepared.recipe.model_dump(mode="json"),
+        "scene": scene.model_dump(mode="json"),
+        "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
+        "sensitivities": None if curves is None else curves.tolist(),
+        "format_version": FORMAT_VERSION,
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def finished(out: Path, identity: str) -> dict[str, Any] | None:
+    """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
+
+    `InputError` for a file, or for a folder that holds anything else.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: this is a file; name a folder for the dataset")
+    if not out.is_dir() or not any(out.iterdir()) or (out / MARKER).is_file():
+        return None
+    if not (out / MANIFEST).is_file():
+        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    return whole(out, identity)
+
+
+def whole(out: Path, identity: str) -> dict[str, Any]:
+    """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
+    manifest = read_manifest(out)
+    if manifest.get("identity") != identity:
+        raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
+    for name, entry in manifest["files"].items():
+        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=True)
+    return manifest
+
+
+@contextmanager
+def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
+    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark."""
+    out.mkdir(parents=True, exist_ok=True)
+    marker = out / MARKER
+    try:
+        with locked(marker, wait=False) as file:
+            text = file.read()
+            if text:
+                _check_begun(marker, text, identity, engine)
+            else:
+                file.write(json.dumps({"identity": identity, "backend": engine}).encode())
+                file.flush()
+                os.fsync(file.fileno())
+            yield marker
+    except BlockingIOError:
+        raise InputError(f"{out}: another run is writing this dataset") from None
+
+
+def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
+    """Raise `InputError` unless the dataset was begun for the same recipe on the same backend."""
+    decisive = ("variant", "mitsuba", "drjit")
+    try:
+        begun = json.loads(text)
+        known, before = begun["identity"], {key: begun["backend"][key] for key in decisive}
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"{marker}: damaged; delete the folder {marker.parent} to start again") from None
+    if known != identity:
+        raise InputError(
+            f"{marker.parent}: holds the unfinished dataset of another recipe or scene; "
+            "name a new or empty folder"
+        )
+    if before != {key: engine[key] for key in decisive}:
+        raise InputError(
+            f"{marker.parent}: was begun with {before['variant']}, and this machine now runs "
+            f"{engine['variant']}, whose pixels differ; delete the folder {marker.parent} to start again, "
+            "or set SIMGEN_BACKEND"
+        )

@@ -1,0 +1,76 @@
+"""Radiance images of every view on disk: products of a dataset, or what its photon counts are drawn from."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from pcii.base.progress import Report
+from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
+from simgen.base import random_streams as seeds
+from simgen.cameras.rig import Rig
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.radiance import render_view
+from simgen.sensor.detector import full_light_image
+from simgen.sensor.exposure import photons_per_radiance
+from simgen.sensor.mosaic import sense
+from simgen.spec.recipe import Exposure, Sensor
+
+RENDERED = ".rendered"
+"""Folder of exact views that are no product in themselves; gone when the dataset is finished."""
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedViews:
+    """The rendered views of the dataset in the folder `out`: of which cameras, and what is kept of them.
+
+    `radiance` is the product: "rgb" is all colours, "mosaic" the pixel's own. With `sensor.full_light` it is
+    what a camera with this `exposure` reads, else exact radiance.
+    """
+
+    rig: Rig
+    sensor: Sensor
+    exposure: Exposure | None
+    radiance: Literal["none", "mosaic", "rgb"]
+    samples_per_pixel: int
+    seed: int
+    out: Path
+
+    def render(self, render_scene: RenderScene, report: Report) -> None:
+        """Write every view that is not on disk yet."""
+        grid, cfa = self.rig.grid, self.sensor.bayer
+        for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
+            number, exact = k * grid.cols + l, self._exact_file(k, l)
+            if not exact.is_file():
+                image = render_view(
+                    render_scene,
+                    self.rig,
+                    k,
+                    l,
+                    samples_per_pixel=self.samples_per_pixel,
+                    seed=seeds.integer(self.seed, view=number, stage="radiance"),
+                )
+                write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, cfa)[..., None])
+            if self.sensor.full_light is not None and self.radiance != "none":
+                assert self.exposure is not None
+                measured = full_light_image(
+                    read_exr(exact),
+                    cfa,
+                    photons_per_radiance(self.exposure, grid.pixel_mm),
+                    self.sensor,
+                    seeds.generator(self.seed, view=number, stage="full light"),
+                )
+                write_exr_safely(self.out / radiance_name(k, l), measured)
+            report("views", done, grid.view_count)
+
+    def mosaic(self, k: int, l: int) -> np.ndarray:
+        """Radiance that each of the sensor's pixels gets in a view that is on disk, (H, W)."""
+        image = read_exr(self._exact_file(k, l))
+        return sense(image, self.sensor.bayer) if image.shape[2] == 3 else image[..., 0]
+
+    def _exact_file(self, k: int, l: int) -> Path:
+        """Where a view's exact radiance is kept while the dataset is made; in the end, if it is a product."""
+        name = radiance_name(k, l)
+        is_product = self.radiance != "none" and self.sensor.full_light is None
+        return self.out / (name if is_product else name.replace(RADIANCE, RENDERED, 1))

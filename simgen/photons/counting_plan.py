@@ -1,0 +1,120 @@
+"""How photon counts will be made: thinned one by one or drawn from rendered views, and what led to it."""
+
+from dataclasses import dataclass
+
+from pcii.base.errors import InputError
+from pcii.core.bayer import channel_count
+from pcii.core.camera_grid import CameraGrid
+from simgen.cameras.rig import Rig
+from simgen.photons.rendering_noise import NOISE_SHARE, Probe, depths_seen, probe
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.spec.recipe import MOST_PATHS, Photons
+
+PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
+"""Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
+`make bench` on two cores; only their ratios matter."""
+SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST = 77.0, 0.3
+"""The same without a compiled backend."""
+PROBE_SEED = 0
+"""The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
+nothing else are made alike: all with the origins of photons or all without."""
+MOST_SINGLE_PHOTONS = 1 << 25
+"""So many photons are kept one by one at most; each takes some 200 bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Capture:
+    """What decides which photons arrive where: cameras, Bayer pattern, budget or exposure, and the seed.
+
+    `photons_per_radiance` are those that a pixel catches of a unit of radiance; None unless photons are
+    counted over an exposure.
+    """
+
+    rig: Rig
+    cfa: str | None
+    photons: Photons
+    photons_per_radiance: float | None
+    seed: int
+
+    @property
+    def grid(self) -> CameraGrid:
+        """The cameras as they ought to be."""
+        return self.rig.grid
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How the counts will be made, and what led to it."""
+
+    thins: bool
+    samples: int
+    """Samples per pixel of the dense views, if the counts are drawn from such."""
+    photons_per_view: float
+    noise: float
+    """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
+    normaliser_error: float
+    """Standard error of the light that a dense view's budget is divided by, as a share of it."""
+    depths_mm: tuple[float, ...] = ()
+    """Some of the depths that the corner cameras see, if photons are thinned."""
+
+
+def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: int = 1) -> Plan:
+    """Thin, or render densely, whichever takes less time for counts without rendering noise.
+
+    Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
+    each needs, which are more the more light there is. Where it cannot take enough, photons are thinned
+    as long as there is memory for them. The seed has no part in it (see `PROBE_SEED`). `kind` is that of the
+    backend; views that are rendered in any case have `least_samples` per pixel. Raises `InputError` for
+    nested budgets of too many photons.
+    """
+    grid = capture.grid
+    pixels = grid.height * grid.width
+    probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
+    per_view, gain = _photons(capture, probed)
+    scope_pixels = _scope_pixels(capture)
+    samples = probed.samples_for(gain, scope_pixels)
+    samples = min(max(samples, least_samples), (MOST_PATHS - 1) // pixels)
+    photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
+    if kind == "scalar":
+        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+    noise = probed.photon_noise(gain, samples)
+    cheaper = photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
+    few = per_view * grid.view_count <= MOST_SINGLE_PHOTONS
+    if capture.photons.nested and not few:
+        raise InputError(
+            f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
+            f"at most {MOST_SINGLE_PHOTONS} can be"
+        )
+    # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
+    thins = few and probed.mean > 0 and (cheaper or noise > NOISE_SHARE)
+    return Plan(
+        thins=thins,
+        samples=samples,
+        photons_per_view=per_view,
+        noise=noise,
+        normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
+        depths_mm=depths_seen(render_scene, grid) if thins else (),
+    )
+
+
+def _photons(capture: Capture, probed: Probe) -> tuple[float, float]:
+    """Photons that a view is expected to have, and those of a pixel and a unit of radiance.
+
+    For a budget the second is estimated from what the virtual centre sees, for an exposure the first.
+    """
+    grid, gain = capture.grid, capture.photons_per_radiance
+    pixels = grid.height * grid.width
+    if gain is not None:
+        return gain * probed.mean * pixels, gain
+    scopes = {"view": 1.0, "channel": float(channel_count(capture.cfa)), "scene": 1 / grid.view_count}
+    per_view = capture.photons.budget * scopes[capture.photons.scope]
+    return per_view, per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
+
+
+def _scope_pixels(capture: Capture) -> int | None:
+    """Pixels over which a budget is counted, of the rarest colour at worst; None without a budget."""
+    grid = capture.grid
+    pixels = grid.height * grid.width
+    by_colour = max(pixels // 4, 1) if capture.cfa is not None else pixels
+    scopes = {"view": pixels, "channel": by_colour, "scene": pixels * grid.view_count}
+    return scopes.get(capture.photons.scope)

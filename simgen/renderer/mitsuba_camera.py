@@ -1,0 +1,92 @@
+"""Cameras as Mitsuba's: its sensors, and rays through points of their films."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
+from simgen.cameras.rig import Camera, Rig
+from simgen.renderer.backend import load_drjit
+from simgen.renderer.mitsuba_scene import RenderScene
+
+# The pinhole is the origin of every ray, so nothing nearer than this is ever cut away in practice.
+NEAR_CLIP_MM = 0.01
+FAR_CLIP_MM = 1e7
+
+
+def sensor_plugin(mi: Any, camera: Camera, sampler: dict[str, Any]) -> dict[str, Any]:
+    """A camera as Mitsuba's sensor, whose own axes point left, up and forward."""
+    grid, to_world = camera.grid, np.eye(4)
+    to_world[:3, :3] = camera.rotation * (-1.0, -1.0, 1.0)
+    to_world[:3, 3] = camera.position_mm
+    plugin = {
+        "type": "perspective",
+        "fov": 2 * math.degrees(math.atan(grid.width * grid.pixel_mm / (2 * grid.focal_mm))),
+        "fov_axis": "x",
+        "near_clip": NEAR_CLIP_MM,
+        "far_clip": FAR_CLIP_MM,
+        "to_world": mi.ScalarTransform4f(to_world + 0.0),  # adding 0 turns -0 into 0
+        "film": {
+            "type": "hdrfilm",
+            "width": grid.width,
+            "height": grid.height,
+            "pixel_format": "rgb",
+            "component_format": "float32",  # the default, float16, turns 1e6 into infinity
+            "rfilter": {"type": "box"},  # the only filter whose sums repeat bit for bit
+        },
+        "sampler": sampler,
+    }
+    if camera.lens is not None:
+        radius_mm = camera.lens.aperture_mm / 2
+        return plugin | {
+            "type": "thinlens",
+            "aperture_radius": radius_mm,
+            "focus_distance": camera.lens.focus_mm,
+        }
+    # In shares of the film, and positive where the axis is left of (above) the film's centre.
+    return plugin | {
+        "principal_point_offset_x": -camera.shift_px[0] / grid.width,
+        "principal_point_offset_y": -camera.shift_px[1] / grid.height,
+    }
+
+
+def film_rays(
+    render_scene: RenderScene, rig: Rig, k: Any, l: Any, row_px: Any, col_px: Any, lens_point: Any = None
+) -> Any:
+    """Rays through points of the film, and of the lens (in mm) if there is one; see `Rig.rays`.
+
+    All are the renderer's arrays, an element for each ray.
+    """
+    mi, dr, grid = render_scene.mi, load_drjit(), rig.grid
+    camera = k * grid.cols + l
+
+    def of_camera(values: np.ndarray) -> Any:
+        if (values == values.flat[0]).all():
+            return float(values.flat[0])  # what all cameras share needs no look-up
+        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
+
+    def turned(*vector: Any) -> list[Any]:
+        columns = range(len(vector))
+        return [_dot([of_camera(rig.rotation[..., row, col]) for col in columns], vector) for row in range(3)]
+
+    axis_px = of_camera(rig.axis_px[..., 0]), of_camera(rig.axis_px[..., 1])
+    x, y = film_slopes(grid, row_px, col_px, axis_px)
+    origin = mi.Point3f(*(of_camera(rig.position_mm[..., axis]) for axis in range(3)))
+    if rig.lens is not None:
+        x, y = slopes_behind_lens((x, y), rig.lens, (lens_point.x, lens_point.y))
+        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
+    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
+    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
+
+
+def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:
+    """Sum of products, but for what is multiplied by a plain 0 or 1."""
+    parts = zip(row, vector, strict=True)
+    terms = [part if isinstance(f, float) and f == 1 else f * part for f, part in parts if not _is_zero(f)]
+    return sum(terms[1:], terms[0]) if terms else 0
+
+
+def _is_zero(factor: Any) -> bool:
+    return isinstance(factor, float) and factor == 0
