@@ -1,7 +1,7 @@
-"""How commands behave: one sentence for bad input, and what Ctrl-C does.
+"""Running of command lines: error messages of one sentence, exit codes, and Ctrl-C.
 
-Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted, 141 output
-no longer read. Set PCII_TRACEBACK=1 to see tracebacks.
+Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted, 141 standard output closed by its reader.
+With PCII_TRACEBACK=1 in the environment tracebacks are shown.
 """
 
 import os
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
     from cyclopts import App, Token
 
 STOP_AGAIN_S = 1.0
-"""Time enough to tidy up, after which a stop that nobody heeded is repeated."""
+"""An interruption is raised again after this time, in case the first exception was lost."""
 
 
 def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collection[str] = ()) -> int:
     """Run a command line and return its exit code; the only place where errors become messages.
 
-    A command that returns a number leaves with that exit code. `resuming` names the commands that go on where
-    they were stopped when they are given again.
+    A whole number that a command returns is the exit code. `resuming` names the commands that continue an
+    interrupted run when they are repeated; the message after Ctrl-C says so.
     """
     from cyclopts import CycloptsError
 
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    app.suppress_keyboard_interrupt = False  # else it would end the process without a word
+    app.suppress_keyboard_interrupt = False  # by default cyclopts exits without a message
     with _stops() as stops, shown_by(Stages()):
         try:
             code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         except (Exception, KeyboardInterrupt) as fault:
-            if stops:  # what was stopped may take its time to end, and is not to be stopped in that
+            if stops:  # the remaining cleaning up is not interrupted again
                 signal.setitimer(signal.ITIMER_REAL, 0)
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
             if stops or isinstance(fault, KeyboardInterrupt):
-                on = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
-                return _leave(130, f"stopped{on}")
+                hint = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
+                return _leave(130, f"stopped{hint}")
             if isinstance(fault, CycloptsError):
                 return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
             return _failed(fault)
@@ -50,20 +50,22 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
 
 @contextmanager
 def _stops() -> Iterator[list[int]]:
-    """Signals of Ctrl-C as they come, of which a KeyboardInterrupt need not be left.
+    """The list of Ctrl-C signals received within the block, in which KeyboardInterrupt is repeated.
 
-    Raised during an import or in a foreign library it can become another error, and in a callback or a
-    finaliser it is dropped. So it is raised again until the block ends.
+    A KeyboardInterrupt that is raised during an import or in another library can become another exception,
+    and in a callback or a finaliser it is dropped. So it is raised again every second until the block ends.
     """
     stops: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:
         stops.append(number)
-        sys.unraisablehook = lambda _: None  # what is half made need not tell how it ends
+        sys.unraisablehook = lambda _: None  # no tracebacks from finalisers of half-built objects
         signal.setitimer(signal.ITIMER_REAL, STOP_AGAIN_S)
         signal.default_int_handler(number, frame)
 
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:  # another sees to it, or none shall
+    if (
+        signal.getsignal(signal.SIGINT) is not signal.default_int_handler
+    ):  # the calling program handles or ignores Ctrl-C
         yield stops
         return
     signal.signal(signal.SIGINT, stop)
@@ -78,10 +80,10 @@ def _stops() -> Iterator[list[int]]:
 
 
 def _failed(fault: Exception) -> int:
-    """Tell what went wrong, and the exit code."""
+    """Print a message for the exception and return the exit code."""
     if isinstance(fault, InputError):
         return _fail(2, str(fault))
-    if isinstance(fault, BrokenPipeError):  # whoever read the output has read enough, such as `| head`
+    if isinstance(fault, BrokenPipeError):  # the reader closed the pipe, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     if isinstance(fault, MemoryError):
@@ -94,6 +96,7 @@ def _fail(code: int, sentence: str) -> int:
 
 
 def _leave(code: int, sentence: str) -> int:
+    """Print the sentence on standard error and return the code; for PCII_TRACEBACK raise the exception."""
     if os.environ.get("PCII_TRACEBACK"):
         raise
     print(sentence, file=sys.stderr, flush=True)
@@ -101,7 +104,7 @@ def _leave(code: int, sentence: str) -> int:
 
 
 def whole(_: object, tokens: Sequence["Token"]) -> int:
-    """Converter of a parameter to a whole number, and not to one that would have to be rounded."""
+    """Convert the token of a parameter to an int; raises ValueError for anything else, such as 2.5."""
     text = tokens[0].value
     try:
         return int(text)
@@ -110,5 +113,5 @@ def whole(_: object, tokens: Sequence["Token"]) -> int:
 
 
 def say(text: str) -> None:
-    """One line of result or log on standard output."""
+    """Print one line of a result or a log on standard output."""
     print(text, flush=True)

@@ -1,15 +1,15 @@
-"""How loops are compiled: with Numba, which needs no system library.
+"""Compilation of loops with Numba, which needs no system library.
 
-Modules of loops are imported where a loop is about to run and not with the package: loading the compiler
-takes longer than all else. Compiled code is kept beside these files, or in the user's cache where that is
-not writable, so each loop is compiled once per machine. That takes a minute and more for all, so commands
-report it (`progress`).
+Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
+longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
+that is not writable, so each loop is compiled once per machine. All loops together take more than a minute,
+so commands report it (`progress`).
 """
 
 import os
 
-# Threads that spin while they wait slow everything down where other programs use the machine; asleep they
-# cost some microseconds a loop. It is read when the compiler is loaded; who has set it is heard.
+# OpenMP threads that spin while they wait slow down every other program on the machine; threads that sleep
+# cost some microseconds per loop. The variable is read at Numba's import; a value set by the user stays.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba as nb
@@ -18,19 +18,20 @@ from numba.core import event
 from pcii.base.progress import report_compiling
 
 compiled = nb.njit(parallel=True, nogil=True, cache=True)
+"""Decorator of a loop that is run by several threads."""
 helper = nb.njit(nogil=True, cache=True)
-"""For what compiled loops call: one thread's part."""
+"""Decorator of a function that compiled loops call within one thread."""
 
 
 class _CompilingListener(event.Listener):
-    """Numba calls it for each loop that it compiles, not for those that it finds compiled."""
+    """Reports each loop that Numba compiles; loops read from the cache are not reported."""
 
     def __init__(self) -> None:
         self.loops, self.nested = 0, 0
 
     def on_start(self, event: event.Event) -> None:
         self.nested += 1
-        if self.nested == 1:  # else it is part of another
+        if self.nested == 1:  # a nested compilation is part of the outer one
             self.loops += 1
             report_compiling(self.loops, running=True)
 
@@ -44,5 +45,5 @@ event.register("numba:compile", _CompilingListener())
 
 
 def threads() -> int:
-    """How many a loop is shared among."""
+    """Number of threads that run a compiled loop."""
     return nb.get_num_threads()

@@ -1,8 +1,8 @@
-"""The one exception that means: what you gave us cannot be used, and here is why."""
+"""The exception that is raised for invalid input."""
 
 
 class InputError(ValueError):
-    """Bad input, told in one sentence that names the argument, field or file and what would be right.
+    """Invalid input, described in one sentence that names the argument, field or file and what is expected.
 
-    The commands print the sentence and leave with exit code 2.
+    The commands print the sentence and exit with code 2.
     """

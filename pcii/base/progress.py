@@ -1,4 +1,4 @@
-"""Progress of long work: bars with time left on a terminal, plain lines in a log, "compiling" where it is."""
+"""Progress of long work, compilation included: bars on a terminal, plain lines in a log."""
 
 import sys
 import time
@@ -14,7 +14,7 @@ LOG_EVERY_S = 10.0
 
 
 class Stages(AbstractContextManager["Stages"]):
-    """Progress of named stages: bars with time left on a terminal, else a line now and then.
+    """Progress of named stages: bars with time left on a terminal, else a line every ten seconds.
 
     Call it as stages(name, done, total); a stage ends when done reaches total.
     """
@@ -77,7 +77,7 @@ class Stages(AbstractContextManager["Stages"]):
             print(f"{stage}: {done}/{total}, {elapsed:.1f} s{left}", file=sys.stderr, flush=True)
 
     def compiling(self, loops: int, running: bool) -> None:
-        """Report loops compiled up to now, the last maybe still `running`; nobody knows how many follow."""
+        """Report how many loops were compiled, the last of which may be `running`; the total is unknown."""
         if self._rich is not None:
             if COMPILING not in self._tasks:
                 self._tasks[COMPILING] = self._rich.add_task(COMPILING, total=None)
@@ -96,12 +96,12 @@ class Stages(AbstractContextManager["Stages"]):
 
 COMPILING = "compiling (once per machine)"
 _showing: list[Stages] = []
-"""Progress that is shown now; compiling is reported to the last. Empty where `pcii` is used as a library."""
+"""Active progress displays; compilation is reported to the last. Empty where `pcii` is used as a library."""
 
 
 @contextmanager
 def shown_by(stages: Stages) -> Iterator[None]:
-    """Compiling is reported by `stages` for the length of the block."""
+    """Let `stages` report compilation within the block."""
     _showing.append(stages)
     try:
         yield
@@ -110,14 +110,14 @@ def shown_by(stages: Stages) -> Iterator[None]:
 
 
 def report_compiling(loops: int, *, running: bool) -> None:
-    """Report to whoever runs a command that a loop is being compiled, or has been; `loops` counts them."""
+    """Report to a running command that loop number `loops` is being compiled (`running`), or has been."""
     for stages in _showing[-1:]:
         stages.compiling(loops, running)
 
 
 def silent(stage: str, done: int, total: int) -> None:
-    """The progress of whoever does not want any."""
+    """Report nothing: the default where progress is optional."""
 
 
 Report = Callable[[str, int, int], None]
-"""Called as report(stage, done, total) by whatever takes long."""
+"""Type of a progress callback: report(stage, done, total)."""

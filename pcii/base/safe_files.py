@@ -1,6 +1,6 @@
-"""Writing that survives a kill: whatever has its final name is whole.
+"""Atomic writing of files and folders: whatever has its final name is complete.
 
-A file or folder is written beside its place under the name `.NAME.*.tmp`, flushed to disk and renamed.
+A file or folder is written beside its destination as `.NAME.*.tmp`, flushed to disk and renamed.
 """
 
 import json
@@ -14,7 +14,7 @@ from typing import IO, Any
 
 
 def write_bytes_safely(path: Path, content: bytes) -> None:
-    """Write a file so that it is either whole under its name or not there at all."""
+    """Write a file so that it is complete or, if interrupted, keeps its former content."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
     try:
@@ -44,7 +44,7 @@ def write_json_safely(path: Path, value: Any) -> None:
 
 @contextmanager
 def new_folder_safely(folder: Path) -> Iterator[Path]:
-    """An empty folder to fill, which takes the place of `folder` once the block has ended without fault."""
+    """An empty folder to fill, which replaces `folder` when the block ends without an exception."""
     with temporary_folder(folder) as temporary:
         yield temporary
         replace_folder(temporary, folder)
@@ -52,7 +52,7 @@ def new_folder_safely(folder: Path) -> Iterator[Path]:
 
 @contextmanager
 def temporary_folder(folder: Path) -> Iterator[Path]:
-    """An empty folder beside `folder`, gone at the end of the block unless it was renamed by then."""
+    """An empty folder beside `folder`, removed at the end of the block unless it was renamed by then."""
     temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.", suffix=".tmp"))
     try:
         yield temporary
@@ -61,20 +61,20 @@ def temporary_folder(folder: Path) -> Iterator[Path]:
 
 
 def replace_folder(new: Path, folder: Path) -> None:
-    """Flush `new` to disk and rename it to `folder`; what was there is renamed first and deleted last."""
+    """Flush `new` to disk and rename it to `folder`; a former folder is renamed first and deleted last."""
     new.chmod(0o755)
     for file in new.rglob("*"):
         if file.is_file():
             with file.open("rb") as opened:
                 os.fsync(opened.fileno())
     with temporary_folder(folder) as old:
-        was_there = folder.exists()
-        if was_there:
-            folder.replace(old)  # `old` is empty: a folder may take its place
+        replaces = folder.exists()
+        if replaces:
+            folder.replace(old)  # allowed since `old` is empty
         try:
             new.replace(folder)
         except OSError:
-            if was_there:
+            if replaces:
                 old.replace(folder)
             raise
         sync_folder(folder.parent)
@@ -90,7 +90,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def sweep_temporaries(root: Path) -> None:
-    """Remove what a killed run left half written in `root` and in its folders."""
+    """Remove temporary files and folders that an interrupted run left in `root` and its folders."""
     for path in [*root.glob(".*.tmp"), *root.glob("*/.*.tmp")]:
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
@@ -100,24 +100,24 @@ def sweep_temporaries(root: Path) -> None:
 
 @contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
-    """The file `path`, made if it is not there, open to read and append, with other processes kept out.
+    """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
-    Whoever holds the lock may delete the file. Raises BlockingIOError if another process holds it and
+    The holder of the lock may delete the file. Raises BlockingIOError if another process holds it and
     `wait` is false.
     """
-    import fcntl  # not everywhere, and only writers need it
+    import fcntl  # not available on every system, and needed by writers only
 
     while True:
         with path.open("a+b") as file:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-            # The last holder may have deleted the file between opening and locking; then this is another.
-            if _is_at(file, path):
+            # The last holder may have deleted the file between opening and locking; then try again.
+            if _is_same_file(file, path):
                 file.seek(0)
                 yield file
                 return
 
 
-def _is_at(file: IO[bytes], path: Path) -> bool:
+def _is_same_file(file: IO[bytes], path: Path) -> bool:
     try:
         return os.path.samestat(os.fstat(file.fileno()), path.stat())
     except FileNotFoundError:

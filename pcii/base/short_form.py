@@ -1,4 +1,4 @@
-"""What values with large contents say of themselves: one line, and in notebooks a small table."""
+"""Short representations of objects that hold large arrays: one line, and a small table in notebooks."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -8,7 +8,7 @@ import numpy as np
 from pcii.base.plain_text import in_html, visible
 
 LONGEST = 119
-"""Characters of the line: it fits where one of code would."""
+"""Most characters of the line."""
 MOST = 4
 """Longer lists are abbreviated to their first and last value and their length."""
 
@@ -18,7 +18,7 @@ class Brief(ABC):
 
     @abstractmethod
     def _facts(self) -> Mapping[str, object]:
-        """What distinguishes this value from others of its kind, by importance; None is left out."""
+        """Names and values of what distinguishes this object, most important first; None is left out."""
 
     def _known_facts(self) -> list[tuple[str, object]]:
         return [(name, fact) for name, fact in self._facts().items() if fact is not None]
@@ -33,7 +33,7 @@ class Brief(ABC):
 
 
 def table(caption: str, rows: Sequence[Sequence[object]], header: Sequence[str] = ()) -> str:
-    """A table in HTML, whatever its cells say; four digits of numbers, a dash for None."""
+    """A table in HTML with escaped cells; four significant digits of numbers, a dash for None."""
     names = "".join(f"<th>{in_html(name)}</th>" for name in header)
     body = "".join(
         f"<tr>{''.join(f'<td>{in_html(_figure(cell))}</td>' for cell in row)}</tr>" for row in rows
@@ -48,18 +48,30 @@ def _figure(value: object) -> object:
 
 
 def times(shape: Sequence[int]) -> str:
-    """A shape such as 10 x 10 x 64 x 64."""
+    """A shape as text.
+
+    >>> times((10, 10, 64, 64))
+    '10 x 10 x 64 x 64'
+    """
     return " x ".join(map(str, shape))
 
 
 def span(values: np.ndarray) -> str | None:
-    """From the least value to the greatest; None for none."""
+    """The range of the values as text; None for an empty array.
+
+    >>> span(np.array([620.0, 540.0, 580.0]))
+    '540 to 620'
+    """
     return f"{values.min():g} to {values.max():g}" if values.size else None
 
 
 def listed(values: Sequence[object]) -> str:
-    """A list such as [540, 620], or [450 .. 750: 30 in all] for a long one."""
-    told = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
-    if len(told) <= MOST:
-        return f"[{', '.join(told)}]"
-    return f"[{told[0]} .. {told[-1]}: {len(told)} in all]"
+    """A list as text, abbreviated if it has more than four values.
+
+    >>> listed([540.0, 620.0]), listed(range(30))
+    ('[540, 620]', '[0 .. 29: 30 in all]')
+    """
+    texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
+    if len(texts) <= MOST:
+        return f"[{', '.join(texts)}]"
+    return f"[{texts[0]} .. {texts[-1]}: {len(texts)} in all]"

@@ -1,4 +1,4 @@
-"""What everything rests on: types, Bayer masks, geometry, errors, progress, compiled loops, safe files.
+"""Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes, sRGB.
 
 arrays         Checks that every type makes of its arrays.
 bayer          Bayer colour filter arrays: which colour each pixel sees.
@@ -11,5 +11,6 @@ photon_counts  Photon counts: what a camera delivers when light is scarce, as sp
                stack.
 section_stack  Sections: the scene reconstructed at several depths, with how many samples meet at each
                voxel.
+srgb           Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens.
 truth          What is really there, as far as a dataset knows it.
 """

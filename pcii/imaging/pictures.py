@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.core.estimates import Segmented
+from pcii.core.srgb import linear_to_srgb
 from pcii.core.truth import Truth
 
 AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
@@ -15,8 +16,7 @@ AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
 
 def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
     """Linear values (H, W) or (H, W, C) as 8-bit sRGB (H, W, 3); `white` and above become 255."""
-    x = np.clip(np.nan_to_num(linear) / max(white, 1e-30), 0, 1)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+    encoded = linear_to_srgb(np.nan_to_num(linear) / max(white, 1e-30))
     image = np.round(255 * encoded).astype(np.uint8)
     if image.ndim == 2:
         image = image[..., None]
