@@ -1,16 +1,15 @@
 """Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes, sRGB.
 
-arrays         Checks that every type makes of its arrays.
-bayer          Bayer colour filter arrays: which colour each pixel sees.
-camera_grid    The grid of cameras: where they stand, how they see.
-estimates      What methods answer, and how right that was: in-focus masks, depth maps, scores.
+arrays         Checks of arrays that all types share.
+bayer          Bayer colour filter arrays: which colour each pixel records.
+camera_grid    The grid of cameras: positions and intrinsic parameters.
+estimates      Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy.
 focal_planes   Focal planes: the depths of sections, and by how much the views shift for each.
-geometry       Parallel-camera geometry: where a point appears, and its disparity.
+geometry       Geometry of parallel cameras: the image of a point, disparity and depth.
 images         Elemental images: the radiance of every view.
-photon_counts  Photon counts: what a camera delivers when light is scarce, as sparse events or as a dense
-               stack.
-section_stack  Sections: the scene reconstructed at several depths, with how many samples meet at each
+photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack.
+section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
 srgb           Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens.
-truth          What is really there, as far as a dataset knows it.
+truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
 """

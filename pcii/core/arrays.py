@@ -1,4 +1,4 @@
-"""Checks that every type makes of its arrays.
+"""Checks of arrays that all types share.
 
 Axes, always in this order: (K, L, H, W, C) for views, (Z, H, W, C) for sections; C is R, G, B.
 Lengths are millimetres and carry `_mm`; `z` is planar depth from the camera plane, never ray length.
@@ -10,14 +10,20 @@ from pcii.base.errors import InputError
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """A view of `array` that refuses to be written to."""
+    """A view of `array` that cannot be written to."""
     view = array.view()
     view.flags.writeable = False
     return view
 
 
 def check_z_mm(z_mm: object) -> np.ndarray:
-    """Depths as a float64 array (Z,); each must be a finite number above 0, at least one."""
+    """Depths in mm as a float64 array (Z,), from one number or a list.
+
+    Raises `InputError` for no depth, or one that is not a finite number above 0.
+
+    >>> check_z_mm(540)
+    array([540.])
+    """
     try:
         z = np.atleast_1d(np.asarray(z_mm, dtype=np.float64))
     except (TypeError, ValueError):

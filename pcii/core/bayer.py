@@ -1,4 +1,4 @@
-"""Bayer colour filter arrays: which colour each pixel sees.
+"""Bayer colour filter arrays: which colour each pixel records.
 
 A pattern is named by its first two rows, read left to right, top to bottom: in ``GRBG`` the pixel
 (0, 0) is green, (0, 1) red, (1, 0) blue and (1, 1) green (Muniraj et al. 2017, Fig. 3).
@@ -23,14 +23,17 @@ def check_cfa(cfa: str | None) -> str | None:
 
 
 def channel_count(cfa: str | None) -> int:
-    """Number of colours behind the pattern: 3, or 1 for a monochrome sensor."""
+    """Number of colours of a pattern: 3, or 1 for a monochrome sensor (None)."""
     return 1 if cfa is None else 3
 
 
 def colour_cells(cfa: str | None) -> np.ndarray:
     """Colour of each cell of the 2 x 2 pattern, shape (2, 2), int; 0, 1, 2 = R, G, B.
 
-    A monochrome sensor has the single colour 0 everywhere.
+    A monochrome sensor has the single colour 0 everywhere. Raises `InputError` for an unknown pattern.
+
+    >>> colour_cells("GRBG").tolist()
+    [[1, 0], [2, 1]]
     """
     check_cfa(cfa)
     if cfa is None:
@@ -39,18 +42,28 @@ def colour_cells(cfa: str | None) -> np.ndarray:
 
 
 def sites_of_colours(cfa: str | None) -> np.ndarray:
-    """How many of the 2 x 2 cells are of each colour, (C,) float64."""
+    """How many of the 2 x 2 cells are of each colour, (C,) float64.
+
+    >>> sites_of_colours("GRBG")
+    array([1., 2., 1.])
+    """
     return np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa)).astype(np.float64)
 
 
 def colour_index(height: int, width: int, cfa: str | None) -> np.ndarray:
-    """Colour seen by each pixel, shape (height, width), uint8; 0, 1, 2 = R, G, B."""
+    """Colour that each pixel records, shape (height, width), uint8; 0, 1, 2 = R, G, B."""
     cells = colour_cells(cfa).astype(np.uint8)
     return np.tile(cells, ((height + 1) // 2, (width + 1) // 2))[:height, :width]
 
 
 def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
-    """What a Bayer sensor keeps of a colour image: (..., H, W, 3) to (..., H, W), same dtype."""
+    """Bayer mosaic (..., H, W) of a colour image (..., H, W, 3), same dtype: one colour of each pixel.
+
+    Raises `InputError` for another shape or an unknown pattern.
+
+    >>> mosaic(np.array([[[1, 2, 3], [4, 5, 6]]]), "GRBG")
+    array([[2, 4]])
+    """
     if rgb.ndim < 3 or rgb.shape[-1] != 3:
         raise InputError(f"rgb: expected an array (..., H, W, 3), got shape {rgb.shape}")
     raw = np.empty(rgb.shape[:-1], dtype=rgb.dtype)

@@ -1,4 +1,4 @@
-"""The grid of cameras: where they stand, how they see."""
+"""The grid of cameras: positions and intrinsic parameters."""
 
 import math
 from dataclasses import dataclass
@@ -32,9 +32,15 @@ class CameraGrid:
     Y = (k - (rows-1)/2) pitch_y. `pitch_mm` is (pitch_x, pitch_y). Each image has `height` x `width`
     square pixels of `pixel_mm`, `focal_mm` behind the pinhole; the optical axis meets pixel
     ((height-1)/2, (width-1)/2). In a sheared grid `shear_px` (x, y) is not 0: each camera's axis meets it
-    further right (down) by so many px per camera step, counted from the centre of the grid, so that what
-    has that much disparity stands still. Raises `InputError` for a size below 1, a length not above 0 or
-    a shear that is not finite.
+    further right (down) by so many px per camera step, counted from the centre of the grid, so that a point
+    whose parallax equals the shear appears at the same pixel of all views. Raises `InputError` for a size
+    below 1, a length not above 0 or a shear that is not finite.
+
+    >>> grid = CameraGrid(
+    ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.0352, height=1024, width=1024
+    ... )
+    >>> grid.view_count, grid.shape_KLHW
+    (100, (10, 10, 1024, 1024))
     """
 
     rows: int

@@ -1,4 +1,4 @@
-"""What methods answer, and how right that was: in-focus masks, depth maps, scores."""
+"""Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,9 +16,10 @@ from pcii.core.section_stack import Sections
 class Segmented(Brief):
     """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
 
-    `steps` holds the named intermediate maps (Z, H, W) of the method, for looking at. A method that decides
-    about single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
-    (`PhotonCounts.events`, in their order) come from what is in focus in each plane; else that is None.
+    `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
+    single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
+    (`PhotonCounts.events`, in their order) come from points in focus in each plane; else that is None.
+    Raises `InputError` for an array of another shape or dtype.
     """
 
     in_focus: np.ndarray
@@ -58,15 +59,15 @@ class Segmented(Brief):
 
     @property
     def cleaned(self) -> np.ndarray:
-        """Section estimates with what is defocused set to zero, (Z, H, W, C)."""
+        """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
         return self.sections.estimate * self.in_focus[..., None]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DepthMap(Brief):
-    """Depth per pixel of the virtual centre: `z_mm` (H, W), NaN where the method abstains.
+    """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
-    `confidence` (H, W) is in [0, 1]: 0 where it abstains.
+    `confidence` (H, W) is in [0, 1]: 0 where no depth is given. Raises `InputError` if the shapes differ.
     """
 
     z_mm: np.ndarray
@@ -86,7 +87,7 @@ class DepthMap(Brief):
 
 @dataclass(frozen=True, repr=False)
 class Score(Brief):
-    """What `score.json` holds: rows per plane, entropies per object, errors of the depth map, bounds."""
+    """Content of `score.json`: rows per plane, entropies per object, errors of the depth map, bounds."""
 
     planes: tuple[Mapping[str, Any], ...]
     objects: tuple[Mapping[str, Any], ...]

@@ -1,7 +1,7 @@
 """Focal planes: the depths of sections, and by how much the views shift for each.
 
-Depths are validated and turned into disparities and shifts once, here; whoever makes or reads sections takes
-the planes. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
+Depths are validated and converted to disparities and shifts once, here; functions that make or read sections
+take the planes. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ class FocalPlanes(Brief):
     """Planes in which a camera grid is focused: `z_mm` (Z,) and `total_disparity_px` (Z,), both float64.
 
     Make it with `at_depths`, `at_total_disparity` or `between`. The total disparity is the parallax over the
-    longer axis of the grid, without shear. Raises `InputError` for no plane at all, for a depth that is not
+    longer axis of the grid, without shear. Raises `InputError` for an empty list, for a depth that is not
     finite or not above 0, and for one so near that views shift by 2^31 pixels.
     """
 
@@ -58,7 +58,14 @@ class FocalPlanes(Brief):
 
     @classmethod
     def at_total_disparity(cls, grid: CameraGrid, total_disparity_px: object) -> "FocalPlanes":
-        """Planes of these total disparities in px, (Z,) or one number, each above 0."""
+        """Planes of these total disparities in px, (Z,) or one number, each above 0.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
+        ... )
+        >>> FocalPlanes.at_total_disparity(grid, [20, 10]).z_mm
+        array([ 500., 1000.])
+        """
         total = np.atleast_1d(np.asarray(total_disparity_px, dtype=np.float64))
         return cls(grid, depth_of_total_disparity_mm(grid, total), total)
 
@@ -76,11 +83,11 @@ class FocalPlanes(Brief):
         return self.z_mm.size
 
     def take(self, which: slice | np.ndarray | Sequence[int]) -> "FocalPlanes":
-        """Some of the planes, by slice, indices or mask."""
+        """The planes chosen by a slice, indices or a mask."""
         return FocalPlanes(self.grid, self.z_mm[which], self.total_disparity_px[which])
 
     def followed_by(self, total_disparity_px: Sequence[float]) -> "FocalPlanes":
-        """These planes, then those of these total disparities in px."""
+        """These planes, followed by planes of the given total disparities in px."""
         if not len(total_disparity_px):
             return self
         others = FocalPlanes.at_total_disparity(self.grid, total_disparity_px)
@@ -94,7 +101,8 @@ class FocalPlanes(Brief):
     def exact_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
         """Shifts of the rows (Z, K) and columns (Z, L) of cameras, float64, to the virtual centre.
 
-        What camera row k sees in row i belongs to row i + (k - (K-1)/2) d, with a fraction in general.
+        A point of the plane that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual
+        centre, d the disparity; not a whole number in general.
         """
         across, down = disparity_px(self.grid, self.z_mm)
         K, L = self.grid.rows, self.grid.cols
@@ -103,12 +111,12 @@ class FocalPlanes(Brief):
 
     @cached_property
     def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The same to the nearest whole pixel, floor(x + 1/2), int32."""
+        """The shifts of rows (Z, K) and columns (Z, L) to the nearest whole pixel, floor(x + 1/2), int32."""
         rows, cols = self.nearest_shifts_px(1)
         return read_only(rows.astype(np.int32)), read_only(cols.astype(np.int32))
 
     def nearest_shifts_px(self, step_px: int) -> tuple[np.ndarray, np.ndarray]:
-        """The same to the nearest multiple of `step_px`, int64.
+        """The shifts of rows (Z, K) and columns (Z, L) to the nearest multiple of `step_px`, int64.
 
         `floor(x + 1/2)` and not `round`, which rounds half to even and makes half-pixel shifts alternate.
         """
@@ -119,8 +127,8 @@ class FocalPlanes(Brief):
         """Voxel rows (Z, K, H) and columns (Z, L, W), int32, to which pixels of each camera belong.
 
         With `subpixel` = 1 every camera moves by a multiple of `step_px` pixels; with M > 1 the centre of
-        pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M). What is beside the section has an index
-        below 0, or not below its size.
+        pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M). Pixels that fall outside the section
+        have an index below 0, or not below its size.
         """
         height, width = self.grid.height, self.grid.width
         if subpixel == 1:
@@ -132,7 +140,7 @@ class FocalPlanes(Brief):
                 np.floor((np.arange(size) + 0.5 + shifts[..., None]) * subpixel)
                 for size, shifts in ((height, rows), (width, cols))
             )
-        # Far beside the section indices may exceed 32 bits.
+        # Far outside the section indices may exceed 32 bits.
         row, col = (
             np.clip(index, -1, size * subpixel).astype(np.int32)
             for index, size in zip(indices, (height, width), strict=True)
@@ -150,9 +158,9 @@ class FocalPlanes(Brief):
 
 
 def planes_at(grid: CameraGrid, z_mm: object) -> FocalPlanes:
-    """Planes of `grid` at the depths `z_mm`; planes that are ready are passed on.
+    """Planes of `grid` at the depths `z_mm`; `FocalPlanes` are returned as they are.
 
-    Raises `InputError` for planes of another grid.
+    Raises `InputError` for an invalid depth, or for planes of another grid.
     """
     if not isinstance(z_mm, FocalPlanes):
         return FocalPlanes.at_depths(grid, z_mm)

@@ -1,4 +1,4 @@
-"""Parallel-camera geometry: where a point appears, and its disparity.
+"""Geometry of parallel cameras: the image of a point, disparity and depth.
 
 Notation: d disparity in px per camera step; (k, l) camera; (K, L) grid; z planar depth; s shear.
 A point (X, Y, Z) appears in camera (k, l) at column (W-1)/2 + (l - (L-1)/2) s + (focal / pixel)
@@ -23,7 +23,7 @@ def project_px(
     k: float,
     l: float,
 ) -> tuple[float, float]:
-    """(row, column) at which camera (k, l) sees the point (X, Y, Z), pixel centres at integers."""
+    """(row, column) of the image of the point (X, Y, Z) in camera (k, l), pixel centres at integers."""
     X, Y, Z = point_mm
     x_camera, y_camera = camera_position_mm(grid, k, l)
     scale_px = grid.focal_mm / grid.pixel_mm
@@ -33,7 +33,7 @@ def project_px(
 
 
 def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """(horizontal, vertical) disparity at depth z that the cameras' distance makes, in px per camera step."""
+    """(horizontal, vertical) disparity at depth z due to the camera pitch alone, in px per camera step."""
     scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
     return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
 
@@ -45,16 +45,23 @@ def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray
 
 
 def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray:
-    """Total parallax over the longer axis of the grid in px, (N - 1) d: the scale of depth errors."""
+    """Parallax between the outermost cameras of the longer axis of the grid in px: (N - 1) d, without shear.
+
+    >>> grid = CameraGrid(
+    ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
+    ... )
+    >>> total_disparity_px(grid, np.array([500.0, 1000.0]))
+    array([20., 10.])
+    """
     d_x, d_y = parallax_px(grid, z_mm)
     return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
 
 
 def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
-    """Half-extent in px of the blur that a point at z has in the section at z0."""
+    """Half-extent in px of the blur of a point at z in the section at z0: |difference of total disparity| / 2."""
     return np.abs(total_disparity_px(grid, z_mm) - total_disparity_px(grid, z0_mm)) / 2
 
 
 def depth_of_total_disparity_mm(grid: CameraGrid, total_px: np.ndarray) -> np.ndarray:
-    """Depths in mm at which the total parallax over the longer axis of the grid is `total_px`."""
+    """Depths in mm whose total disparity is `total_px`: the inverse of `total_disparity_px`."""
     return float(total_disparity_px(grid, 1.0)) / np.asarray(total_px, dtype=np.float64)

@@ -13,7 +13,7 @@ from pcii.core.camera_grid import CameraGrid
 
 
 class ArrayLike5D(Protocol):
-    """What `Views` needs of its pixels: a shape and one view at a time, so that they may stay on disk."""
+    """What `Views` reads of an array: its shape and one view at a time, so that views may stay on disk."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -27,7 +27,13 @@ class Views(Brief):
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel
     holds all C channels. `radiance` may be any object with `shape` and `[k, l]` (an array, or a
-    reader that loads one view at a time).
+    reader that loads one view at a time). Raises `InputError` for another shape or an unknown pattern.
+
+    >>> grid = CameraGrid(
+    ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
+    ... )
+    >>> Views(np.ones((1, 2, 4, 6, 3)), grid)
+    Views(shape=1 x 2 x 4 x 6 x 3)
     """
 
     radiance: ArrayLike5D
@@ -51,11 +57,11 @@ class Views(Brief):
 
     @property
     def channel_count(self) -> int:
-        """Colours that sections of these views will have."""
+        """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
 
     def view(self, k: int, l: int) -> np.ndarray:
-        """Image (H, W, C) of camera (k, l); raises `InputError` if it holds NaN or infinity."""
+        """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""
         image = np.asarray(self.radiance[k, l])
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")

@@ -1,4 +1,4 @@
-"""Photon counts: what a camera delivers when light is scarce, as sparse events or as a dense stack."""
+"""Photon counts of the elemental images, as sparse events or as a dense stack."""
 
 import math
 from dataclasses import dataclass, field
@@ -14,12 +14,12 @@ from pcii.core.camera_grid import CameraGrid
 
 LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40
-"""Photons in a pixel; millions of such pixels still add up in 64 bits."""
+"""Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 
 
 @dataclass(frozen=True, repr=False)
 class PhotonEvents(Brief):
-    """Pixels that caught photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,)."""
+    """Pixels with photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,) of integers."""
 
     k: np.ndarray
     l: np.ndarray
@@ -36,7 +36,7 @@ class PhotonCounts(Brief):
     """Photon counts of every elemental image, as sparse events or as a dense stack.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.
-    There is no truth in it: this is all that a camera would deliver.
+    It holds what a camera would deliver, and no ground truth.
     """
 
     grid: CameraGrid
@@ -48,7 +48,16 @@ class PhotonCounts(Brief):
     def from_dense(
         cls, counts_KLHW: np.ndarray, grid: CameraGrid, *, cfa: str | None = None
     ) -> "PhotonCounts":
-        """Counts from a dense stack (K, L, H, W) of whole numbers >= 0; raises `InputError`."""
+        """Counts from a dense stack (K, L, H, W) of whole numbers >= 0.
+
+        Raises `InputError` for another shape, and for negative, fractional or too large counts.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
+        ... )
+        >>> PhotonCounts.from_dense(np.ones((1, 2, 4, 6), dtype=np.uint16), grid, cfa="GRBG")
+        PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, kept=dense)
+        """
         check_cfa(cfa)
         _check_grid(grid)
         counts = _whole_counts("counts", counts_KLHW)
@@ -73,10 +82,17 @@ class PhotonCounts(Brief):
 
         A pixel may appear more than once; its photons add up. Raises `InputError` for an index
         outside the grid, a negative or fractional count, or lists of different lengths.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
+        ... )
+        >>> counts = PhotonCounts.from_events([0, 0], [0, 1], [3, 3], [5, 4], [1, 2], grid)
+        >>> counts.total, counts.view(0, 1)[3].tolist()
+        (3, [0, 0, 0, 0, 2, 0])
         """
         check_cfa(cfa)
         _check_grid(grid)
-        where: dict[str, np.ndarray] = {}
+        indices: dict[str, np.ndarray] = {}
         for (name, values), limit in zip(
             {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
         ):
@@ -85,12 +101,12 @@ class PhotonCounts(Brief):
                 raise InputError(f"{name}: expected a one-dimensional list")
             if column.size and column.max() >= limit:
                 raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
-            where[name] = column.astype(np.int32)
+            indices[name] = column.astype(np.int32)
         photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
-        if len({column.shape for column in (*where.values(), photons)}) != 1:
+        if len({column.shape for column in (*indices.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         _check_total("n", photons)
-        return cls(grid, cfa, _events=_canonical_events(tuple(where.values()), photons, grid))
+        return cls(grid, cfa, _events=_canonical_events(tuple(indices.values()), photons, grid))
 
     def _facts(self) -> dict[str, object]:
         kept = "events" if self.is_sparse else "dense"
@@ -103,26 +119,25 @@ class PhotonCounts(Brief):
 
     @property
     def dense(self) -> np.ndarray:
-        """The counts (K, L, H, W) as they are kept; `InputError` if they are sparse."""
+        """The dense stack of counts (K, L, H, W); raises `InputError` if they are kept as events."""
         if self._dense is None:
             raise InputError("dense: these counts are kept as events; use .view(k, l) or .events")
         return self._dense
 
     @cached_property
-    def lit_share(self) -> float:
-        """Share of the pixels that caught photons."""
-        lit = self.events.n.size if self._dense is None else int(np.count_nonzero(self._dense))
-        return lit / math.prod(self.grid.shape_KLHW)
+    def occupied_share(self) -> float:
+        """Share of the pixels that have photons."""
+        occupied = self.events.n.size if self._dense is None else int(np.count_nonzero(self._dense))
+        return occupied / math.prod(self.grid.shape_KLHW)
 
     @cached_property
     def events(self) -> PhotonEvents:
-        """The counts as events, one per pixel that caught photons, in (k, l, i, j) order."""
+        """The counts as events, one per pixel with photons, in (k, l, i, j) order."""
         if self._events is not None:
             return self._events
         assert self._dense is not None
-        where = np.nonzero(self._dense)
-        n = self._dense[where].astype(np.int64)
-        return _events(where, n)
+        pixels = np.nonzero(self._dense)
+        return _events(pixels, self._dense[pixels].astype(np.int64))
 
     @cached_property
     def event_colours(self) -> np.ndarray:
@@ -131,12 +146,12 @@ class PhotonCounts(Brief):
 
     @cached_property
     def view_starts(self) -> np.ndarray:
-        """Where each view's events begin, (K L + 1,) int64: view k L + l ends where the next begins."""
+        """Index of the first event of each view k L + l, then the number of events; (K L + 1,) int64."""
         view = self.events.k.astype(np.int64) * self.grid.cols + self.events.l
         return read_only(np.searchsorted(view, np.arange(self.grid.view_count + 1)))
 
     def view(self, k: int, l: int) -> np.ndarray:
-        """Dense counts (H, W) of camera (k, l); `InputError` if there is none such."""
+        """Dense counts (H, W) of camera (k, l); raises `InputError` for a camera outside the grid."""
         if not (0 <= k < self.grid.rows and 0 <= l < self.grid.cols):
             raise InputError(
                 f"view: there is no camera ({k}, {l}) in a grid of {self.grid.rows} x {self.grid.cols}"
@@ -146,35 +161,35 @@ class PhotonCounts(Brief):
         events = self.events
         image = np.zeros((self.grid.height, self.grid.width), dtype=np.int64)
         number = k * self.grid.cols + l
-        here = slice(self.view_starts[number], self.view_starts[number + 1])
-        image[events.i[here], events.j[here]] = events.n[here]
+        of_view = slice(self.view_starts[number], self.view_starts[number + 1])
+        image[events.i[of_view], events.j[of_view]] = events.n[of_view]
         return image
 
     @cached_property
     def total(self) -> int:
-        """Photons in all views together."""
+        """Number of photons of all views."""
         if self._dense is not None:
             return int(self._dense.sum(dtype=np.int64))
         return int(self.events.n.sum())
 
     @property
     def channel_count(self) -> int:
-        """Colours that sections of these counts will have: 3, or 1 for monochrome."""
+        """Number of colours of sections of these counts: 3, or 1 for monochrome."""
         return channel_count(self.cfa)
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.
 
-        The number that is kept is binomial with mean `most`: Poisson counts stay Poisson counts. Counts of no
-        more than `most` photons are returned as they are.
+        The number of photons kept is binomial with mean `most`; thinned Poisson counts are Poisson counts. Counts
+        of no more than `most` photons are returned as they are.
         """
         if self.total <= most:
             return self
         events = self.events
         n = rng.binomial(events.n, most / self.total)
         kept = n > 0
-        where = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
-        return PhotonCounts(self.grid, self.cfa, _events=_events(where, n[kept]))
+        pixels = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
+        return PhotonCounts(self.grid, self.cfa, _events=_events(pixels, n[kept]))
 
 
 def check_depth_counts(value: object) -> None:
@@ -191,7 +206,7 @@ def _check_grid(value: object) -> None:
 
 
 def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
-    """Counts as they are if integer and >= 0, floats only if whole; else `InputError`."""
+    """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
     array = np.asarray(values)
     if array.dtype.kind == "f":
         whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
@@ -221,15 +236,15 @@ def _check_total(name: str, counts: np.ndarray) -> None:
 
 
 def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
-    """Sort by (k, l, i, j), add up repeats, drop zeros: one form per content."""
+    """Events sorted by (k, l, i, j), one per pixel, without zeros: equal counts have equal events."""
     flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
-    where, inverse = np.unique(flat, return_inverse=True)
-    photons = np.zeros(where.size, dtype=np.int64)
+    occupied, inverse = np.unique(flat, return_inverse=True)
+    photons = np.zeros(occupied.size, dtype=np.int64)
     np.add.at(photons, inverse, n)
-    where, photons = where[photons > 0], photons[photons > 0]
-    return _events(np.unravel_index(where, grid.shape_KLHW), photons)
+    occupied, photons = occupied[photons > 0], photons[photons > 0]
+    return _events(np.unravel_index(occupied, grid.shape_KLHW), photons)
 
 
-def _events(where: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
-    k, l, i, j = (read_only(index.astype(np.int32)) for index in where)
+def _events(pixels: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
+    k, l, i, j = (read_only(index.astype(np.int32)) for index in pixels)
     return PhotonEvents(k, l, i, j, read_only(n))

@@ -1,4 +1,4 @@
-"""Sections: the scene reconstructed at several depths, with how many samples meet at each voxel."""
+"""Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,9 +22,10 @@ class Sections(Brief):
     """Sections of the scene at `planes`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
-    real numbers for radiance. `coverage` (Z, H, W, C) is how many samples that was. With `subpixel` = M
-    the voxel grid is M times finer in both axes. `variance` is that of the samples of each voxel, if it
-    was asked for. `cfa` is the Bayer pattern of sections that are mosaics themselves (of even shifts).
+    real numbers for radiance. `coverage` (Z, H, W, C) is the number of these samples. With `subpixel` = M
+    the voxel grid is M times finer in both axes. `variance` (Z, H, W, C) is that of the samples of each
+    voxel, or None. `cfa` is the Bayer pattern of sections that are mosaics themselves (of even shifts).
+    Raises `InputError` if the shapes differ. `pcii.reconstruct` makes them.
     """
 
     planes: FocalPlanes

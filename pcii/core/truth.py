@@ -1,4 +1,4 @@
-"""What is really there, as far as a dataset knows it."""
+"""Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from pcii.core.arrays import read_only
 
 @dataclass(frozen=True, repr=False)
 class PhotonTruth(Brief):
-    """Where each detected photon came from: five arrays and a depth, (N,).
+    """Origin of each detected photon: six arrays (N,).
 
-    Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of what its path hit first.
+    Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of the first surface on its path.
     """
 
     k: np.ndarray
@@ -30,15 +30,15 @@ class PhotonTruth(Brief):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth(Brief):
-    """What the virtual centre camera really sees, from first hits at pixel centres.
+    """Surfaces in the image of the virtual centre camera, from first hits of rays through pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
     backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
 
-    More is there if the dataset has it. `normal` (H, W, 3) float32: unit normal of the surface in world axes,
-    on the side that the camera sees; 0 where nothing is hit. `coverage` (H, W) float32: the share of the
-    pixel's square that belongs to the object (or to none) that its centre hits. `visible_views` (H, W)
-    uint16: how many cameras of the grid see the point; 0 where nothing is hit.
+    The other maps are None where the dataset lacks them. `normal` (H, W, 3) float32: unit normal of the
+    surface in world axes, towards the camera; 0 where nothing is hit. `coverage` (H, W) float32: the share
+    of the pixel's square that belongs to the object (or to none) that its centre hits. `visible_views`
+    (H, W) uint16: how many cameras of the grid see the point; 0 where nothing is hit.
     """
 
     z_mm: np.ndarray
@@ -71,7 +71,7 @@ class Truth(Brief):
         return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
 
     def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
-        """An optional map, made read-only; lengths of 1 may be rounded by 1e-6."""
+        """Check an optional map and make it read-only; values may exceed the range by rounding, 1e-6."""
         values = getattr(self, name)
         if values is None:
             return

@@ -66,7 +66,7 @@ def reconstruct(
     else:
         coverage = _coverage(planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
-        if not data.is_sparse and subpixel == 1 and data.lit_share > MUCH_LIGHT:
+        if not data.is_sparse and subpixel == 1 and data.occupied_share > MUCH_LIGHT:
             sums = sum_counts(data, planes, shifts)
         else:
             sums = _scatter(data, data.events.n, shape, rows, cols)
