@@ -58,7 +58,7 @@ def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray
 
 
 def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
-    """Half-extent in px of the blur of a point at z in the section at z0: |difference of total disparity| / 2."""
+    """Half-extent in px of the blur of a point at z in the section at z0: total disparity's change / 2."""
     return np.abs(total_disparity_px(grid, z_mm) - total_disparity_px(grid, z0_mm)) / 2
 
 

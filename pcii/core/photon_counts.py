@@ -180,8 +180,8 @@ class PhotonCounts(Brief):
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.
 
-        The number of photons kept is binomial with mean `most`; thinned Poisson counts are Poisson counts. Counts
-        of no more than `most` photons are returned as they are.
+        The number of photons kept is binomial with mean `most`; Poisson counts stay Poisson counts. Counts of
+        no more than `most` photons are returned as they are.
         """
         if self.total <= most:
             return self

@@ -1,16 +1,15 @@
 """Files: datasets and lists of results, sealed and checked, and what a dataset's recipe suggests.
 
-dataset           Opening a dataset folder: counts, truth and radiance as the package's types, checked as
-                  read.
-dataset_layout    The dataset folder on disk: its layout, and what may be in its manifest.
-manifest_schema   What a manifest must hold, as pydantic models; what they do not name is allowed and not
-                  looked at.
-results_list      results.json: whose results a folder holds, and every file of them with size and
-                  SHA-256.
-sealed_json       JSON documents that list the files of a folder and carry a checksum of themselves.
-stored_radiance   Radiance that stays on disk, one EXR file a view, until a view is looked at.
-suggested_depths  The depths that a dataset's recipe suggests to look at.
-verification      Whether a dataset, or a folder of results, is what was written: every file, and no more.
+dataset           Datasets: counts, truth and radiance of a dataset folder, checked when they are read.
+dataset_layout    The dataset folder on disk: its files, their arrays and its manifest.
+manifest_schema   Pydantic models of the manifests; members that they do not name are allowed and ignored.
+results_list      The file results.json: the dataset of the results in a folder, and their files with size
+                  and SHA-256.
+sealed_json       JSON documents that list the files of a folder and end in a checksum of the document
+                  itself.
+stored_radiance   Radiance on disk, one EXR file per view, each read when it is used.
+suggested_depths  Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
+verification      Comparison of all files of a dataset, or of a folder of results, with its manifest.
 zarr_groups       Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and
                   meaning.
 """

@@ -1,4 +1,4 @@
-"""Opening a dataset folder: counts, truth and radiance as the package's types, checked as read."""
+"""Datasets: counts, truth and radiance of a dataset folder, checked when they are read."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -33,20 +33,20 @@ from pcii.io.sealed_json import check_file
 from pcii.io.stored_radiance import StoredRadiance
 from pcii.io.zarr_groups import Label, read_array
 
-MORE_TRUTH = ("normal", "coverage", "visible_views")
-"""Maps of the truth that a dataset may lack: old ones do."""
+OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
+"""Maps of the truth that a dataset may lack."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dataset(Brief):
-    """A finished dataset folder; its parts are read, and their hashes checked, on first use."""
+    """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
 
     path: Path
     manifest: Mapping[str, Any]
     grid: CameraGrid
     cfa: str | None
     budget: float | None = None
-    """Nested photon budget that `counts` are of; None for the recipe's own."""
+    """Nested photon budget of `counts`; None for the budget of the recipe."""
 
     def _facts(self) -> dict[str, object]:
         parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
@@ -61,18 +61,18 @@ class Dataset(Brief):
 
     @property
     def budgets(self) -> tuple[float | None, ...]:
-        """Photon budgets that it has counts of: nested ones, then the recipe's own; None for an exposure."""
-        own = self.manifest.get("recipe", {}).get("photons", {})
-        whole = None if own.get("scope") == "exposure" else own.get("budget")
-        return (*sorted(own.get("nested") or []), whole)
+        """Photon budgets of the stored counts: nested ones, then that of the recipe, None for an exposure."""
+        photons = self.manifest.get("recipe", {}).get("photons", {})
+        largest = None if photons.get("scope") == "exposure" else photons.get("budget")
+        return (*sorted(photons.get("nested") or []), largest)
 
     def at_budget(self, budget: float | None) -> "Dataset":
-        """The same dataset with the photons of a smaller, nested budget; `InputError` if it has none."""
-        *nested, whole = self.budgets
-        if budget == whole:
+        """The dataset with the photons of one of its `budgets`; raises `InputError` for another."""
+        *nested, largest = self.budgets
+        if budget == largest:
             return replace(self, budget=None)
         if budget is None or budget not in nested:
-            known = ", ".join(f"{n:g}" for n in (whole, *nested) if n is not None)
+            known = ", ".join(f"{n:g}" for n in (largest, *nested) if n is not None)
             asked = "none" if budget is None else f"{budget:g}"
             raise InputError(f"{self.path}: no photons of budget {asked} here; there are {known or 'none'}")
         return replace(self, budget=budget)
@@ -84,17 +84,17 @@ class Dataset(Brief):
 
     @property
     def analysis(self) -> Mapping[str, Any]:
-        """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests, if it does."""
+        """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests; empty if none."""
         return self.manifest.get("analysis") or {}
 
     @property
-    def _counts(self) -> str:
+    def _counts_name(self) -> str:
         return nested_name(COUNTS, self.budget)
 
     @cached_property
     def counts(self) -> PhotonCounts:
-        """The photon counts; `InputError` if the recipe asked for none."""
-        part = self._counts
+        """The photon counts; raises `InputError` if the dataset has none."""
+        part = self._counts_name
         if not self.has(part):
             raise InputError(f"{self.path}: this dataset has no counts; its recipe left them out")
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
@@ -108,11 +108,11 @@ class Dataset(Brief):
 
     @cached_property
     def truth(self) -> Truth | None:
-        """Depth and object of every pixel of the virtual centre, or None where it is not known."""
+        """Ground truth of the virtual centre camera, or None if the dataset has none."""
         if not self.has(f"{TRUTH}/z_mm"):
             return None
-        more = tuple(name for name in MORE_TRUTH if self.has(f"{TRUTH}/{name}"))
-        arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *more))
+        optional = tuple(name for name in OPTIONAL_MAPS if self.has(f"{TRUTH}/{name}"))
+        arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
         photons = self._photon_truth()
         try:
@@ -124,16 +124,18 @@ class Dataset(Brief):
         part = nested_name(PHOTON_TRUTH, self.budget)
         if not self.has(part):
             return None
-        known = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
+        origins = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
         events = self.counts.events
-        if known["z_mm"].shape != (self.counts.total,) or known["object_id"].shape != (self.counts.total,):
+        if origins["z_mm"].shape != (self.counts.total,) or origins["object_id"].shape != (
+            self.counts.total,
+        ):
             raise InputError(f"{self.path / part}: does not belong to the counts beside it")
-        where = {name: getattr(events, name).repeat(events.n) for name in "klij"}
-        return PhotonTruth(**where, **known)
+        pixels = {name: getattr(events, name).repeat(events.n) for name in "klij"}
+        return PhotonTruth(**pixels, **origins)
 
     @cached_property
     def views(self) -> Views | None:
-        """Radiance of the views, read from disk one view at a time, or None if not stored."""
+        """Radiance of the views, read from disk one view at a time, or None if the dataset has none."""
         if not self.has(RADIANCE):
             return None
         channels = self.manifest.get("radiance_channels")
@@ -146,11 +148,11 @@ class Dataset(Brief):
         return Views(StoredRadiance(shape, lambda k, l: self.check(radiance_name(k, l))), self.grid, cfa)
 
     def has(self, part: str) -> bool:
-        """Whether the manifest lists files under `part`."""
+        """Whether the manifest lists the file `part`, or files of a folder of this name."""
         return lists_part(self.manifest["files"], part)
 
     def check(self, name: str, *, content: bool = True) -> Path:
-        """Path of a listed file, after its size (and hash, if `content`) were compared."""
+        """Path of a listed file after a check of its size (and hash, if `content`); raises `InputError`."""
         entry = self.manifest["files"].get(name)
         if entry is None:
             raise InputError(f"{self.path}: the manifest lists no {name}")
@@ -170,11 +172,20 @@ class Dataset(Brief):
 
 
 def open_dataset(path: str | Path) -> Dataset:
-    """Open a dataset folder; every listed file must be there and have the size it was written with.
+    """Open a dataset folder, after a check that every listed file exists and has the listed size.
 
-    Contents are compared with their SHA-256 when they are read. What the manifest does not list is not
-    read. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since it
-    was written, or a file that is missing or truncated.
+    Contents are compared with their SHA-256 when they are read; files that the manifest does not list are
+    ignored. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since
+    it was written, or a file that is missing or truncated.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> from pcii.io.dataset_layout import write_manifest
+    >>> grid = dict(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_manifest(Path(folder), {"grid": grid, "cfa": "GRBG", "files": {}})
+    ...     dataset = open_dataset(folder)
+    >>> dataset.grid.view_count, dataset.cfa, dataset.truth
+    (2, 'GRBG', None)
     """
     root = Path(path)
     manifest = read_manifest(root)

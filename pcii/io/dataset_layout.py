@@ -1,4 +1,4 @@
-"""The dataset folder on disk: its layout, and what may be in its manifest.
+"""The dataset folder on disk: its files, their arrays and its manifest.
 
     manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
                              its own checksum (see `pcii.io.sealed_json`)
@@ -28,7 +28,7 @@ FORMAT = "photon-integral-imaging dataset"
 FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
 MARKER = ".unfinished.json"
-"""In a dataset's folder while it is made."""
+"""Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
@@ -87,12 +87,20 @@ TRUTH_LABELS = {
 
 
 def radiance_name(k: int, l: int) -> str:
-    """Path of one view's radiance inside the dataset."""
+    """Path of the radiance of a view in the dataset.
+
+    >>> radiance_name(0, 12)
+    'radiance/view_00_12.exr'
+    """
     return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
 
 
 def nested_name(part: str, budget: float | None) -> str:
-    """Name of a part of the dataset for a smaller photon budget; the part's own name for None."""
+    """Name of an array group for a nested photon budget; unchanged for None.
+
+    >>> nested_name("counts.zarr", 300.0)
+    'counts-300.zarr'
+    """
     if budget is None:
         return part
     stem, suffix = part.rsplit(".", 1)
@@ -100,14 +108,14 @@ def nested_name(part: str, budget: float | None) -> str:
 
 
 def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
-    """Write the manifest of a dataset, with its checksum; from then on the dataset is finished."""
+    """Write the manifest of a dataset, with its checksum, which makes the dataset a finished one."""
     write_sealed(root / MANIFEST, {"format": FORMAT, "format_version": FORMAT_VERSION, **manifest})
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
-    """The manifest of a finished dataset, every field that this package uses checked.
+    """The manifest of a finished dataset, with all fields checked that this package uses.
 
-    Raises `InputError` if there is none, if it was changed since it was written, or if it is not one.
+    Raises `InputError` if it is missing, was changed since it was written, or has an invalid field.
     """
     from pcii.io.manifest_schema import DatasetManifest, validate
 
@@ -131,12 +139,12 @@ def read_manifest(root: Path) -> dict[str, Any]:
 
 
 def lists_part(files: Iterable[str], part: str) -> bool:
-    """Whether any of the listed files is `part` or in it."""
+    """Whether any of the listed files is `part`, or lies in the folder of this name."""
     return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
 def write_exr_safely(path: Path, image: np.ndarray) -> None:
-    """A float32 image (H, W, C), C = 1 or 3, as EXR with ZIP compression."""
+    """Write an image (H, W, C), C = 1 or 3, as float32 EXR with ZIP compression, atomically."""
     import OpenEXR
 
     names = ("Y",) if image.shape[2] == 1 else ("R", "G", "B")
@@ -159,8 +167,8 @@ def write_exr_safely(path: Path, image: np.ndarray) -> None:
 def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
     """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B.
 
-    Raises `InputError` if it cannot be read or, where `shape` is given, has another; that is seen in its
-    header, before there is memory asked for its pixels.
+    Raises `InputError` if it cannot be read or its shape is not `shape`, if given; the shape is checked in
+    the header, before memory is allocated for the pixels.
     """
     import OpenEXR
 
@@ -178,7 +186,7 @@ def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
 
 
 def _exr_shape(path: Path) -> tuple[int, int, int]:
-    """Shape (H, W, C) that an EXR file's header tells."""
+    """Shape (H, W, C) according to the header of an EXR file."""
     import OpenEXR
 
     with OpenEXR.File(str(path), header_only=True) as file:

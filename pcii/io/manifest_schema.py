@@ -1,4 +1,4 @@
-"""What a manifest must hold, as pydantic models; what they do not name is allowed and not looked at.
+"""Pydantic models of the manifests; members that they do not name are allowed and ignored.
 
 Imported when a manifest is read, not with the package: pydantic takes a tenth of a second to load.
 """
@@ -17,7 +17,7 @@ from pcii.core.camera_grid import CameraGrid
 
 MOST_FILE_BYTES = 1 << 50
 MOST_PHOTONS = 1 << 62
-"""More cannot be added up in 64 bits."""
+"""Sums of more may not fit in 64 bits."""
 
 
 def _relative(path: str) -> str:
@@ -28,13 +28,13 @@ def _relative(path: str) -> str:
 
 
 def _text(value: Any) -> str:
-    # pydantic's own str refuses names of files whose bytes are no characters.
+    # The str of pydantic rejects names of files with bytes that are not valid characters.
     if not isinstance(value, str):
         raise ValueError(f"expected text, got {type(value).__name__}")
     return value
 
 
-class _Part(BaseModel):
+class _Model(BaseModel):
     model_config = ConfigDict(strict=True, extra="allow", frozen=True, allow_inf_nan=False)
 
 
@@ -47,21 +47,21 @@ FileName = Annotated[str, AfterValidator(_relative)]
 ObjectKey = Annotated[str, Field(pattern=re.compile(r"\A-?[0-9]{1,9}\Z"))]
 
 
-class FileEntry(_Part):
+class FileEntry(_Model):
     """Size and hash of a file."""
 
     bytes: Annotated[int, Field(ge=0, le=MOST_FILE_BYTES)]
     sha256: Annotated[str, Field(pattern=re.compile(r"\A[0-9a-f]{64}\Z"))]
 
 
-class Analysis(_Part):
+class Analysis(_Model):
     """Depths that the recipe suggests."""
 
     z_mm: Annotated[list[Depth] | None, Field(max_length=10_000)] = None
     z_range_mm: Annotated[list[Depth] | None, Field(min_length=2, max_length=2)] = None
 
 
-class RecipePhotons(_Part):
+class RecipePhotons(_Model):
     """Photon budgets of the recipe."""
 
     scope: str | None = None
@@ -69,14 +69,14 @@ class RecipePhotons(_Part):
     nested: list[Photons] | None = None
 
 
-class RecipeRender(_Part):
+class RecipeRender(_Model):
     """How the recipe asked for radiance."""
 
     samples_per_pixel: int | None = None
 
 
-class Recipe(_Part):
-    """What is read of the recipe."""
+class Recipe(_Model):
+    """The fields of the recipe that this package reads."""
 
     scene: str | None = None
     seed: int | None = None
@@ -84,14 +84,14 @@ class Recipe(_Part):
     render: RecipeRender | None = None
 
 
-class Backend(_Part):
-    """What rendered the data."""
+class Backend(_Model):
+    """The renderer that made the data."""
 
     variant: str
     mitsuba: str
 
 
-class PhotonLog(_Part):
+class PhotonLog(_Model):
     """How the photons were drawn."""
 
     method: str | None = None
@@ -102,8 +102,8 @@ class PhotonLog(_Part):
     rendering_noise: Real | None = None
 
 
-class SkippedWork(_Part):
-    """Work that was not done: what, why, and how much that saved."""
+class SkippedWork(_Model):
+    """Work that was skipped: what, why, and how much of `unit` that saved."""
 
     what: Text
     why: Text
@@ -111,8 +111,8 @@ class SkippedWork(_Part):
     unit: Text
 
 
-class Grid(_Part):
-    """The members of a `CameraGrid`, which looks at their values itself."""
+class Grid(_Model):
+    """The fields of a `CameraGrid`, which checks their values."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -126,7 +126,7 @@ class Grid(_Part):
     shear_px: Any = (0.0, 0.0)
 
 
-class DatasetManifest(_Part):
+class DatasetManifest(_Model):
     """The manifest of a dataset."""
 
     title: Text | None = None
@@ -144,7 +144,7 @@ class DatasetManifest(_Part):
     files: dict[FileName, FileEntry]
 
 
-class ResultsManifest(_Part):
+class ResultsManifest(_Model):
     """The manifest of a folder of results."""
 
     dataset: Text
@@ -154,7 +154,7 @@ class ResultsManifest(_Part):
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:
-    """Raise `InputError` for the first member that is not as the model says; it names path and member."""
+    """Raise `InputError`, naming path and member, for the first member that does not fit the model."""
     try:
         model.model_validate(document)
         if model is DatasetManifest:
@@ -162,8 +162,8 @@ def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, re
             check_cfa(document["cfa"])
     except ValidationError as fault:
         first = fault.errors(include_url=False)[0]
-        where = ".".join(str(step) for step in first["loc"] if step != "[key]")
-        sentence = f"{where}: {first['msg'].removeprefix('Value error, ')}"
+        member = ".".join(str(step) for step in first["loc"] if step != "[key]")
+        sentence = f"{member}: {first['msg'].removeprefix('Value error, ')}"
         raise InputError(f"{path}: {visible(sentence)}; {remedy}") from None
     except InputError as fault:
         raise InputError(f"{path}: {visible(str(fault))}; {remedy}") from None

@@ -1,4 +1,4 @@
-"""results.json: whose results a folder holds, and every file of them with size and SHA-256."""
+"""The file results.json: the dataset of the results in a folder, and their files with size and SHA-256."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,20 +12,20 @@ FORMAT = "photon-integral-imaging results"
 FORMAT_VERSION = 2
 
 
-def write_results(out: Path, told: Mapping[str, Any]) -> None:
+def write_results(out: Path, content: Mapping[str, Any]) -> None:
     """Write the list of a folder of results: `dataset`, `identity`, `budget` and `files`."""
-    write_sealed(out / RESULTS, {"format": FORMAT, "format_version": FORMAT_VERSION, **told})
+    write_sealed(out / RESULTS, {"format": FORMAT, "format_version": FORMAT_VERSION, **content})
 
 
 def read_results(out: Path) -> dict[str, Any]:
-    """The list of a folder of results, checked; `InputError` if there is none or it was changed."""
+    """The list of a folder of results, checked; raises `InputError` if it is missing or was changed."""
     from pcii.io.manifest_schema import ResultsManifest, validate
 
     path, remedy = out / RESULTS, "delete the folder and make the results again"
     if not path.is_file():
         raise InputError(f"{out}: not a folder of results (no {RESULTS}); name one that `pcii run` made")
-    held = read_sealed(path, remedy)
-    if held.get("format") != FORMAT or held.get("format_version") != FORMAT_VERSION:
+    content = read_sealed(path, remedy)
+    if content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
         raise InputError(f"{path}: not the list of {FORMAT} of version {FORMAT_VERSION}; {remedy}")
-    validate(ResultsManifest, held, path, remedy)
-    return held
+    validate(ResultsManifest, content, path, remedy)
+    return content

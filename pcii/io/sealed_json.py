@@ -1,4 +1,4 @@
-"""JSON documents that list the files of a folder and carry a checksum of themselves.
+"""JSON documents that list the files of a folder and end in a checksum of the document itself.
 
 The last member of such a document is "sha256": the SHA-256 of the file's bytes with 64 zeros in its place.
 """
@@ -21,13 +21,13 @@ _SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"\n\}\n\Z')
 
 
 def write_sealed(path: Path, document: Mapping[str, Any]) -> None:
-    """Write `document` with its checksum, safely."""
+    """Write `document` with its checksum, atomically."""
     blank = json_bytes({**document, "sha256": _BLANK.decode()})
     write_bytes_safely(path, _with_seal(blank, hashlib.sha256(blank).hexdigest().encode()))
 
 
 def read_sealed(path: Path, remedy: str) -> dict[str, Any]:
-    """The members of a sealed document; `InputError`, ending in `remedy`, if its checksum is not right."""
+    """Members of a document whose checksum is right; else raises `InputError`, which ends in `remedy`."""
     content = read_small(path, LARGEST_DOCUMENT_BYTES, remedy)
     found = _SEAL.search(content)
     if found is None:
@@ -45,7 +45,7 @@ def _with_seal(content: bytes, seal: bytes) -> bytes:
 
 
 def read_small(path: Path, limit: int, remedy: str) -> bytes:
-    """Content of a regular file of at most `limit` bytes; else `InputError`."""
+    """Content of a regular file of at most `limit` bytes; raises `InputError` for any other."""
     if not path.is_file():
         raise InputError(f"{path}: missing; {remedy}")
     try:
@@ -59,7 +59,7 @@ def read_small(path: Path, limit: int, remedy: str) -> bytes:
 
 
 def parse_json(content: bytes, path: Path, remedy: str) -> dict[str, Any]:
-    """The JSON object in `content`; `InputError` that names `path` for anything else."""
+    """The JSON object in `content`; raises `InputError`, naming `path`, for anything else."""
 
     def refuse(constant: str) -> None:
         raise ValueError(f"{constant} is no JSON")
@@ -110,15 +110,15 @@ def check_file(root: Path, name: str, entry: Mapping[str, Any], remedy: str, *, 
 
 
 def strays(root: Path, listed: Iterable[str]) -> list[str]:
-    """What is in the folder `root` and is neither listed nor a folder of what is, by path relative to it."""
+    """Files and folders in `root` that are not listed and have no listed files in them, as relative paths."""
     files = set(listed)
     folders = {parent.as_posix() for name in files for parent in Path(name).parents}
     found: list[str] = []
     for top, inner, names in os.walk(root):
-        here = Path(top).relative_to(root)
-        found += [name for name in ((here / n).as_posix() for n in names) if name not in files]
+        folder_path = Path(top).relative_to(root)
+        found += [name for name in ((folder_path / n).as_posix() for n in names) if name not in files]
         for folder in list(inner):
-            name = (here / folder).as_posix()
+            name = (folder_path / folder).as_posix()
             if name not in folders or (root / name).is_symlink():
                 inner.remove(folder)
                 found.append(f"{name}/")

@@ -1,4 +1,4 @@
-"""Radiance that stays on disk, one EXR file a view, until a view is looked at."""
+"""Radiance on disk, one EXR file per view, each read when it is used."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from pcii.io.dataset_layout import read_exr
 class StoredRadiance:
     """Radiance (K, L, H, W, C), float32: [k, l] reads one view (H, W, C), `np.asarray` all of them.
 
-    `file_of` (k, l) gives the checked file of a view.
+    `file_of` (k, l) returns the path of the file of a view, which it has checked.
     """
 
     def __init__(self, shape: tuple[int, int, int, int, int], file_of: Callable[[int, int], Path]) -> None:
@@ -22,18 +22,22 @@ class StoredRadiance:
 
     def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
         K, L = self.shape[:2]
-        whole = isinstance(index, tuple) and all(isinstance(n, int | np.integer) for n in index)
-        if not whole or len(index) != 2 or not (0 <= index[0] < K and 0 <= index[1] < L):
+        is_pair = (
+            isinstance(index, tuple)
+            and len(index) == 2
+            and all(isinstance(n, int | np.integer) for n in index)
+        )
+        if not is_pair or not (0 <= index[0] < K and 0 <= index[1] < L):
             raise InputError(
                 f"radiance: read one view of {K} x {L} by [k, l], or all by numpy.asarray; got {index!r}"
             )
         return read_exr(self._file_of(*index), self.shape[2:])
 
     def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
-        """All views, read into memory; `ValueError` if NumPy asks for them without a copy."""
+        """All views, read into memory; raises `ValueError` if NumPy asks for them without a copy."""
         if copy is False:
             raise ValueError("radiance: it is on disk, and only a copy can be in memory")
-        whole = np.empty(self.shape, self.dtype if dtype is None else dtype)
+        views = np.empty(self.shape, self.dtype if dtype is None else dtype)
         for k, l in np.ndindex(*self.shape[:2]):
-            whole[k, l] = self[k, l]
-        return whole
+            views[k, l] = self[k, l]
+        return views

@@ -1,4 +1,4 @@
-"""The depths that a dataset's recipe suggests to look at."""
+"""Depths to reconstruct: those given, or those that the recipe of a dataset suggests."""
 
 from collections.abc import Sequence
 
@@ -8,17 +8,17 @@ from pcii.io.dataset import Dataset
 
 
 def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
-    """The planes to reconstruct: those asked for, else those that the recipe names."""
-    asked = z_mm or dataset.analysis.get("z_mm") or ()
-    if not len(asked):
+    """Focal planes at `z_mm`, else at the depths of the recipe; raises `InputError` if there are none."""
+    depths = z_mm or dataset.analysis.get("z_mm") or ()
+    if not len(depths):
         raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
-    return FocalPlanes.at_depths(dataset.grid, asked)
+    return FocalPlanes.at_depths(dataset.grid, depths)
 
 
 def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
-    """Nearest and farthest depth to consider: the recipe's, else 4/5 to 5/4 of the planes' depths."""
-    named = dataset.analysis.get("z_range_mm")
-    if named:
-        return float(named[0]), float(named[1])
+    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths."""
+    suggested = dataset.analysis.get("z_range_mm")
+    if suggested:
+        return float(suggested[0]), float(suggested[1])
     z = planes_of(dataset, z_mm).z_mm
     return 0.8 * float(z.min()), 1.25 * float(z.max())

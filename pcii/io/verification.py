@@ -1,4 +1,4 @@
-"""Whether a dataset, or a folder of results, is what was written: every file, and no more."""
+"""Comparison of all files of a dataset, or of a folder of results, with its manifest."""
 
 from pathlib import Path
 
@@ -8,15 +8,15 @@ from pcii.io.dataset_layout import MANIFEST, REMEDY, read_manifest
 from pcii.io.results_list import RESULTS, read_results
 from pcii.io.sealed_json import check_file, strays
 
-MOST_TOLD = 5
-"""At most so many unlisted files are named."""
+MOST_NAMED = 5
+"""Most unlisted files that an error names."""
 
 
 def verify(path: Path, report: Report = silent) -> int:
-    """Compare every file of a dataset or of results with its manifest; the number of files.
+    """Compare every file of a dataset or of results with its manifest, and return the number of files.
 
-    Raises `InputError` that names the faults: files that are missing, truncated or changed, and what is
-    there although the manifest does not list it.
+    Raises `InputError` that names the faults: files that are missing, truncated or changed, or that the
+    manifest does not list.
     """
     is_results = (path / RESULTS).exists() and not (path / MANIFEST).exists()
     name, remedy = (RESULTS, "make them again") if is_results else (MANIFEST, REMEDY)
@@ -33,6 +33,6 @@ def verify(path: Path, report: Report = silent) -> int:
         raise InputError(f"{faults[0]}{more}")
     extra = strays(path, [name, *files])
     if extra:
-        named = ", ".join(extra[:MOST_TOLD]) + (", ..." if len(extra) > MOST_TOLD else "")
+        named = ", ".join(extra[:MOST_NAMED]) + (", ..." if len(extra) > MOST_NAMED else "")
         raise InputError(f"{path}: not listed in {name}, and read by nothing: {named}; move it away")
     return len(files)

@@ -1,8 +1,8 @@
 """Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and meaning.
 
-Files may come from strangers. An array is read only after its metadata were found to be what is written
-here and every chunk to be there, listed, of the right hash and of the right size once unpacked: Zarr itself
-would read a missing chunk as zeros, and unpack 65 kB into as many bytes as its header asks for.
+Files may be untrusted. An array is read only if its metadata are such as are written here, and if every
+chunk exists, is listed, has the right hash and will have the right size once unpacked: Zarr itself would
+read a missing chunk as zeros, and unpack 65 kB into as many bytes as its header asks for.
 """
 
 import math
@@ -30,7 +30,7 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 @dataclass(frozen=True)
 class Label:
-    """What an array on disk says of itself: the names of its axes, its unit ("1" for none), its meaning."""
+    """Description stored with an array: the names of its axes, its meaning, its unit ("1" for none)."""
 
     dims: tuple[str, ...]
     meaning: str
@@ -43,7 +43,7 @@ def write_arrays_safely(
     labels: Mapping[str, Label],
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a group of arrays as a whole: all of it or nothing. `labels` has one for each array."""
+    """Write a group of arrays atomically. `labels` has one for each array."""
     with new_folder_safely(folder) as temporary:
         write_arrays(temporary, arrays, labels, attributes)
 
@@ -54,7 +54,7 @@ def write_arrays(
     labels: Mapping[str, Label],
     attributes: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a group of arrays to a new folder, for callers that put it in its place safely themselves."""
+    """Write a group of arrays to a new folder, for callers that see to atomic writing themselves."""
     group = _new_group(folder, attributes or {})
     for name, array in arrays.items():
         stored = new_array(group, name, array.shape, array.dtype, labels[name])
@@ -64,7 +64,7 @@ def write_arrays(
 
 @contextmanager
 def new_group_safely(folder: Path, attributes: Mapping[str, Any]) -> Iterator[Any]:
-    """A new Zarr v3 group to write to, which stands in `folder` once the block has ended without fault."""
+    """A new Zarr v3 group to write to, which becomes `folder` when the block ends without an exception."""
     with new_folder_safely(folder) as temporary:
         yield _new_group(temporary, attributes)
 
@@ -92,12 +92,16 @@ def new_array(group: Any, name: str, shape: tuple[int, ...], dtype: Any, label: 
 
 
 def chunk_shape(shape: Iterable[int]) -> tuple[int, ...]:
-    """Whole trailing axes (a view) up to the chunk size; single steps of the leading ones."""
+    """Shape of a chunk: whole trailing axes (a view) up to the chunk size, single steps of leading axes.
+
+    >>> chunk_shape((10, 10, 1024, 1024)), chunk_shape((5_000_000,))
+    ((1, 1, 1024, 1024), (1048576,))
+    """
     chunks: list[int] = []
-    room = CHUNK_ELEMENTS
+    elements_left = CHUNK_ELEMENTS
     for size in reversed(tuple(shape)):
-        chunks.insert(0, max(1, min(size, room)))
-        room //= max(1, size)
+        chunks.insert(0, max(1, min(size, elements_left)))
+        elements_left //= max(1, size)
     return tuple(chunks)
 
 
@@ -111,35 +115,37 @@ def read_array(
 ) -> np.ndarray:
     """The array `name` (group/array) of the folder `root`, whose `files` have these sizes and hashes.
 
-    `sizes` tells how long the axes of `label` are, as far as that is known. Raises `InputError`, which ends
-    in `remedy`, for a file that is missing or changed, and for an array that is not as it would be written.
+    `sizes` are the lengths of the axes of `label` by name, as far as they are known. Raises `InputError`,
+    which ends in `remedy`, for a missing or changed file, and for metadata other than `new_array` writes.
     """
     import zarr
 
-    path, lead = root / name, f"{name}/"
-    metadata = f"{lead}{METADATA}"
+    path, prefix = root / name, f"{name}/"
+    metadata = f"{prefix}{METADATA}"
     if metadata not in files:
         raise InputError(f"{path}: the manifest lists no such array; {remedy}")
     for listed, entry in files.items():
-        if listed.startswith(lead):
+        if listed.startswith(prefix):
             check_file(root, listed, entry, remedy, content=True)
     shape, dtype = _shape_and_dtype(path / METADATA, label, sizes, remedy)
     chunk = chunk_shape(shape)
     steps = [-(-size // step) for size, step in zip(shape, chunk, strict=True)]
-    if math.prod(steps) != sum(listed.startswith(f"{lead}c/") or listed == f"{lead}c" for listed in files):
+    if math.prod(steps) != sum(
+        listed.startswith(f"{prefix}c/") or listed == f"{prefix}c" for listed in files
+    ):
         raise InputError(
             f"{path}: {math.prod(steps)} chunks are expected, the manifest lists others; {remedy}"
         )
     unpacked = math.prod(chunk) * dtype.itemsize
     for index in product(*map(range, steps)):
-        part = path.joinpath("c", *map(str, index))
-        if part.relative_to(root).as_posix() not in files:
-            raise InputError(f"{part}: missing in the manifest; {remedy}")
-        if unpacked_bytes(part) != unpacked:
-            raise InputError(f"{part}: not a chunk of {unpacked} bytes; {remedy}")
+        chunk_file = path.joinpath("c", *map(str, index))
+        if chunk_file.relative_to(root).as_posix() not in files:
+            raise InputError(f"{chunk_file}: missing in the manifest; {remedy}")
+        if unpacked_bytes(chunk_file) != unpacked:
+            raise InputError(f"{chunk_file}: not a chunk of {unpacked} bytes; {remedy}")
     try:
         array = np.asarray(zarr.open_array(path, mode="r", zarr_format=3)[...])
-    except Exception as fault:  # whatever a decoder makes of damaged content
+    except Exception as fault:  # decoders raise various exceptions for damaged content
         raise InputError(f"{path}: cannot be read ({visible(str(fault))}); {remedy}") from None
     return array
 
@@ -147,9 +153,9 @@ def read_array(
 def _shape_and_dtype(
     path: Path, label: Label, sizes: Mapping[str, int], remedy: str
 ) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape and type that the metadata of an array tell, if they are such as `new_array` writes."""
-    told = parse_json(read_small(path, LARGEST_METADATA_BYTES, remedy), path, remedy)
-    shape, dtype = told.get("shape"), told.get("data_type")
+    """Shape and dtype in the metadata of an array; raises `InputError` if `new_array` does not write such."""
+    metadata = parse_json(read_small(path, LARGEST_METADATA_BYTES, remedy), path, remedy)
+    shape, dtype = metadata.get("shape"), metadata.get("data_type")
     if not isinstance(shape, list) or not all(type(size) is int and size >= 0 for size in shape):
         raise InputError(f"{path}: shape: expected a list of whole numbers; {remedy}")
     expected = [sizes.get(dim) for dim in label.dims]
@@ -162,7 +168,7 @@ def _shape_and_dtype(
         raise InputError(f"{path}: shape: expected ({wanted}), got {tuple(shape)}; {remedy}")
     if dtype not in DTYPES:
         raise InputError(f"{path}: data_type: expected one of {', '.join(DTYPES)}, got {dtype!r}; {remedy}")
-    codecs = told.get("codecs")
+    codecs = metadata.get("codecs")
     names = (
         [codec.get("name") for codec in codecs if isinstance(codec, dict)] if isinstance(codecs, list) else []
     )
@@ -174,7 +180,7 @@ def _shape_and_dtype(
         "storage_transformers": [],
     }
     for key, value in fixed.items():
-        if told.get(key, []) != value:
+        if metadata.get(key, []) != value:
             raise InputError(f"{path}: {key}: expected {value}; {remedy}")
     if names != ["bytes", "zstd", "crc32c"]:
         raise InputError(f"{path}: codecs: expected bytes, zstd, crc32c; {remedy}")
@@ -182,9 +188,9 @@ def _shape_and_dtype(
 
 
 def unpacked_bytes(chunk: Path) -> int | None:
-    """Length that a chunk file claims to have once unpacked; None if its header is no zstd frame's.
+    """Unpacked length according to the header of a chunk file; None if it is not that of a zstd frame.
 
-    RFC 8878, section 3.1.1.1: after the magic number a byte tells which fields follow, the length last.
+    RFC 8878, section 3.1.1.1: after the magic number a byte of flags, then optional fields, the length last.
     """
     with chunk.open("rb") as file:
         head = file.read(18)
