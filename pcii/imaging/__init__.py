@@ -1,9 +1,9 @@
-"""Plain image tools without photons in them: outlines, bright regions, watersheds, pictures.
+"""Image processing: bright regions, outlines, watersheds, pictures.
 
-bright_regions    Where a section is bright: an outline that runs along the strongest edges.
-mask_outlines     Outlines of masks, located within pixels, and how well two of them agree.
-pictures          Pictures of sections, masks and depth: linear values to 8-bit sRGB, cropped to what
-                  matters.
-watershed_pieces  Cut what is bright into pieces along the ridges of its edges, and give each piece one
-                  plane.
+bright_regions    Bright regions of a section, with outlines along the strongest edges; operations on
+                  masks.
+mask_outlines     Outlines of masks with subpixel accuracy, and their agreement.
+pictures          Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.
+watershed_pieces  Division of bright regions into pieces along the ridges of edges, and the choice of a
+                  plane for each piece.
 """

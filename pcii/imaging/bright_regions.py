@@ -1,21 +1,21 @@
-"""Where a section is bright: an outline that runs along the strongest edges.
+"""Bright regions of a section, with outlines along the strongest edges; operations on masks.
 
-Both methods use this. Roberts' cross (Muniraj et al. 2017, Eq. 8) finds how steep the section is, and
-the outline settles where it is steepest. Levels follow from the photon noise.
+The three-step and the likelihood method use it. The gradient is that of Roberts' cross (Muniraj et al. 2017,
+Eq. 8), and the outline follows its ridges. Levels follow from the photon noise.
 """
 
 import numpy as np
 
 DARK_SIGMAS = 2.0
 BRIGHT_SIGMAS = 6.0
-"""How far from the dark, in standard deviations of its noise, a pixel is surely dark or bright."""
+"""Markers: pixels below or above the background by this many standard deviations of its noise."""
 NEARBY_PX = 25
-SKIRT_SHARE = 1 / 3
-"""What is below 1/3 of the brightest nearby (1/9 of its photons) may be its blurred skirt."""
+BLUR_SHARE = 1 / 3
+"""A pixel below 1/3 of the brightest nearby (1/9 of its photons) may be part of the blur of that one."""
 EDGE_SMOOTHING_PX = 1.0
 SMALLEST_REGION_PX = 100
 MARGIN_PX = 40
-"""What is shown or looked at around a thing, so that its outline may move."""
+"""Margin around an object that is shown or searched, so that its outline may move."""
 
 
 def roberts_magnitude(image: np.ndarray) -> np.ndarray:
@@ -23,6 +23,9 @@ def roberts_magnitude(image: np.ndarray) -> np.ndarray:
 
     The kernels are [[1, 0], [0, -1]] and [[0, 1], [-1, 0]] (Fig. 5). The result belongs to the
     corner between four pixels and is kept at their upper left one; borders continue the image.
+
+    >>> float(roberts_magnitude(np.array([[0.0, 4.0], [0.0, 3.0]]))[0, 0])
+    5.0
     """
     padded = np.pad(image, ((0, 1), (0, 1)), mode="edge")
     down = padded[:-1, :-1] - padded[1:, 1:]
@@ -31,22 +34,22 @@ def roberts_magnitude(image: np.ndarray) -> np.ndarray:
 
 
 def brightness(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
-    """Photons of all colours of a pooled section (H, W, C), on a scale where their noise is uniform.
+    """Photons of all colours of a pooled section (H, W, C), on a scale of uniform noise, (H, W).
 
     The square root of a Poisson count has the variance 1/4 whatever its mean (Anscombe), so levels
-    and gradients mean the same in bright and in dark places. One colour's share does not matter.
+    and gradients mean the same in bright and in dark places.
     """
     return np.sqrt(pooled.mean(axis=-1) * samples_per_window)
 
 
 def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.ndarray:
-    """What stands out of the dark, (H, W) bool; its outline runs along the ridges of `edges`.
+    """Mask of what is brighter than the background, (H, W) bool; its outline follows the ridges of `edges`.
 
-    `bright` is from `brightness`, `edges` the Roberts magnitude of it. Pixels that are surely dark
-    and pixels that are surely not are flooded along the edges until they meet (watershed). The dark
-    is the lower quintile of the picture; its noise on the square-root scale is 1/2. Surely bright is
-    what exceeds it by `BRIGHT_SIGMAS` and is no mere skirt of something brighter nearby. Lengths in pixels
-    are `subpixel` times as many voxels.
+    `bright` is from `brightness`, `edges` the Roberts magnitude of it. A watershed grows markers of the
+    background and of the foreground until they meet. The level of the background is the lower quintile of
+    the picture; its noise on the square-root scale is 1/2. A marker of the foreground exceeds it by
+    `BRIGHT_SIGMAS` and cannot be the blur of something brighter nearby. Lengths in pixels are `subpixel`
+    times as many voxels.
     """
     from scipy.ndimage import gaussian_filter, maximum_filter, uniform_filter
     from skimage.segmentation import watershed
@@ -55,7 +58,7 @@ def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.n
     nearby = maximum_filter(above, NEARBY_PX * subpixel)
     markers = np.zeros(bright.shape, dtype=np.int32)
     markers[above < DARK_SIGMAS] = 1
-    markers[(above > BRIGHT_SIGMAS) & (above > SKIRT_SHARE * nearby)] = 2
+    markers[(above > BRIGHT_SIGMAS) & (above > BLUR_SHARE * nearby)] = 2
     # Roberts' cross belongs to corners: the mean of a pixel's four corners belongs to the pixel.
     steepness = gaussian_filter(uniform_filter(edges, 2), EDGE_SMOOTHING_PX * subpixel)
     return watershed(steepness, markers) == 2
@@ -64,7 +67,7 @@ def foreground(bright: np.ndarray, edges: np.ndarray, subpixel: int = 1) -> np.n
 def outlined(
     pooled: np.ndarray, samples_per_window: float, smallest_px: int, subpixel: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Roberts magnitude of one pooled section (H, W, C), and what stands out in it, both (H, W).
+    """Roberts magnitude of one pooled section (H, W, C), and its foreground without specks, both (H, W).
 
     With `subpixel` = M these are of voxels that are M times finer; `smallest_px` still counts pixels.
     """
@@ -74,9 +77,9 @@ def outlined(
 
 
 def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
-    """The mask without connected pieces, and without holes, of fewer than `smallest_px` pixels.
+    """The mask without connected components, and without holes, of fewer than `smallest_px` pixels.
 
-    The dark around everything is no hole, however small the picture.
+    An empty mask stays empty, however small the picture.
     """
     if not mask.any():
         return mask
@@ -84,25 +87,29 @@ def without_specks(mask: np.ndarray, smallest_px: int) -> np.ndarray:
 
 
 def dilated(mask: np.ndarray, steps: int) -> np.ndarray:
-    """The mask and what is within so many steps of it along rows and columns."""
+    """The mask dilated `steps` times by the four neighbours of a pixel."""
     from scipy.ndimage import binary_dilation
 
     return np.asarray(binary_dilation(mask, iterations=steps), dtype=bool)
 
 
-def box_around(mask: np.ndarray, room: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:
-    """Rows and columns around a mask, with room above and below, left and right; all if it is empty."""
+def box_around(mask: np.ndarray, margin_px: tuple[int, int] = (MARGIN_PX, MARGIN_PX)) -> tuple[slice, slice]:
+    """Rows and columns of a mask with margins (vertical, horizontal), inside the frame; all if it is empty.
+
+    >>> box_around(np.eye(9, dtype=bool)[:5], (1, 2))
+    (slice(0, 5, None), slice(0, 7, None))
+    """
     if not mask.any():
         return slice(0, mask.shape[0]), slice(0, mask.shape[1])
     box = []
     for axis, size in enumerate(mask.shape):
-        there = np.flatnonzero(mask.any(axis=1 - axis))
-        box.append(slice(max(int(there[0]) - room[axis], 0), min(int(there[-1]) + 1 + room[axis], size)))
+        inside, margin = np.flatnonzero(mask.any(axis=1 - axis)), margin_px[axis]
+        box.append(slice(max(int(inside[0]) - margin, 0), min(int(inside[-1]) + 1 + margin, size)))
     return box[0], box[1]
 
 
 def connected_pieces(mask: np.ndarray) -> np.ndarray:
-    """Number of the connected piece (by edges) that each pixel belongs to, from 1; 0 outside."""
+    """Number of the connected component (of four neighbours) of each pixel, from 1; 0 outside; int32."""
     from scipy.ndimage import label
 
     pieces = np.zeros(mask.shape, dtype=np.int32)
@@ -111,7 +118,7 @@ def connected_pieces(mask: np.ndarray) -> np.ndarray:
 
 
 def large_pieces(mask: np.ndarray, smallest_px: float) -> np.ndarray:
-    """The mask without connected pieces of fewer than `smallest_px` pixels."""
+    """The mask without connected components of fewer than `smallest_px` pixels."""
     pieces = connected_pieces(mask)
     keep = np.bincount(pieces.ravel()) >= smallest_px
     keep[0] = False

@@ -1,4 +1,4 @@
-"""Pictures of sections, masks and depth: linear values to 8-bit sRGB, cropped to what matters."""
+"""Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files."""
 
 import base64
 import io
@@ -15,7 +15,11 @@ AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
 
 
 def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
-    """Linear values (H, W) or (H, W, C) as 8-bit sRGB (H, W, 3); `white` and above become 255."""
+    """Linear values (H, W) or (H, W, C) as 8-bit sRGB (H, W, 3); `white` and above become 255.
+
+    >>> to_srgb8(np.array([[0.0, 0.5, 1.0]]), white=1.0)[0, :, 0].tolist()
+    [0, 188, 255]
+    """
     encoded = linear_to_srgb(np.nan_to_num(linear) / max(white, 1e-30))
     image = np.round(255 * encoded).astype(np.uint8)
     if image.ndim == 2:
@@ -24,19 +28,19 @@ def to_srgb8(linear: np.ndarray, white: float) -> np.ndarray:
 
 
 def white_level(linear: np.ndarray, box: tuple[slice, slice]) -> float:
-    """The level to show as white: the brightest but for one value in 50 of what is lit."""
-    part = linear[box]
-    lit = part[part > 0]
-    return float(np.quantile(lit, 0.98)) if lit.size else 1.0
+    """The level to show as white in a box: the 98th percentile of the values above 0; 1 if there are none."""
+    values = linear[box]
+    positive = values[values > 0]
+    return float(np.quantile(positive, 0.98)) if positive.size else 1.0
 
 
 def mask_image(mask: np.ndarray) -> np.ndarray:
-    """A mask (H, W) as black and white."""
+    """A mask (H, W) in black and white, 8-bit RGB (H, W, 3)."""
     return np.repeat(np.where(mask, 255, 0).astype(np.uint8)[..., None], 3, axis=2)
 
 
 def agreement_image(claimed: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Masks compared: agreed light grey, missed blue, wrongly claimed red-orange."""
+    """Comparison of masks, 8-bit RGB (H, W, 3): agreed light grey, missed blue, wrongly claimed red."""
     image = np.zeros((*true.shape, 3), np.uint8)
     image[claimed & true] = AGREED
     image[~claimed & true] = MISSED
@@ -45,12 +49,12 @@ def agreement_image(claimed: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def depth_image(z_mm: np.ndarray, near_mm: float, far_mm: float) -> np.ndarray:
-    """Depth in viridis from near (bright) to far (dark); no answer and nothing hit are black."""
+    """Depth in viridis from near (bright) to far (dark), 8-bit RGB (H, W, 3); black where not finite."""
     from matplotlib import colormaps
 
     known = np.isfinite(z_mm)
-    place = (far_mm - np.where(known, z_mm, far_mm)) / max(far_mm - near_mm, 1e-9)
-    image = (colormaps["viridis"](np.clip(place, 0, 1))[..., :3] * 255).astype(np.uint8)
+    nearness = (far_mm - np.where(known, z_mm, far_mm)) / max(far_mm - near_mm, 1e-9)
+    image = (colormaps["viridis"](np.clip(nearness, 0, 1))[..., :3] * 255).astype(np.uint8)
     image[~known] = 0
     return image
 
@@ -77,7 +81,7 @@ def write_png(path: Path, image: np.ndarray) -> None:
 
 
 def interesting_part(truth: Truth | None, focus: list[Segmented]) -> np.ndarray:
-    """Where to look, (H, W) bool: the objects if known, else whatever a method found."""
+    """Mask (H, W) of the true objects; if there are none, of all points that a method found in focus."""
     if truth is not None and (truth.object_id > 0).any():
         return truth.object_id > 0
-    return np.logical_or.reduce([one.in_focus.any(axis=0) for one in focus])
+    return np.logical_or.reduce([segmented.in_focus.any(axis=0) for segmented in focus])
