@@ -209,8 +209,8 @@ def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
     array = np.asarray(values)
     if array.dtype.kind == "f":
-        whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
-        if not whole or (array.size and np.abs(array).max() > 2**53):
+        is_whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
+        if not is_whole or (array.size and np.abs(array).max() > 2**53):
             raise InputError(f"{name}: photon counts must be whole numbers")
         array = array.astype(np.int64)
     if array.dtype.kind not in "iub":

@@ -1,8 +1,8 @@
-"""Demosaicing of Bayer images: Laroche and Prescott's gradient based interpolation, and others to compare.
+"""Demosaicing of Bayer images: the gradient-based interpolation of Laroche and Prescott, and three others.
 
-Muniraj et al. 2017, Eqs. 4-6, with their misprints put right: Eq. 4's second case is the vertical
+Muniraj et al. 2017, Eqs. 4-6, with their misprints corrected: Eq. 4's second case is the vertical
 pair (G33 + G53) / 2, Eq. 5's (G24 + G44) / 2, and Eq. 6 is three kinds of site, not three cases of
-one. Written for the site, not for the pattern, so all four Bayer patterns are one code. Bilinear
+one. The code distinguishes sites, not patterns, so it serves all four Bayer patterns. Bilinear
 interpolation, Malvar et al. 2004 and Menon et al. 2007 come from the package colour-demosaicing.
 """
 
@@ -24,8 +24,10 @@ def demosaic(
     reflection about the border pixels, which keeps the Bayer phase.
     Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity.
 
-    >>> demosaic(np.ones((4, 4)), cfa="GRBG").shape
-    (4, 4, 3)
+    >>> from pcii.core.bayer import mosaic
+    >>> image = demosaic(mosaic(np.full((4, 6, 3), [1.0, 2.0, 3.0]), "GRBG"), cfa="GRBG")
+    >>> image.shape, image[1, 2].tolist()
+    ((4, 6, 3), [1.0, 2.0, 3.0])
     """
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method: no demosaicing named {method!r}; use {', '.join(METHODS)}")
@@ -67,14 +69,14 @@ def menon(raw: np.ndarray, cfa: str) -> np.ndarray:
 
 
 BORDER_PX = 8
-"""Further than any of these looks; even, so that the Bayer phase stays."""
+"""Larger than the reach of any of these methods; even, so that the Bayer phase stays."""
 
 
 def _by_package(name: str, raw: np.ndarray, cfa: str) -> np.ndarray:
-    """A method of colour-demosaicing on the image continued by reflection: its own borders mix colours."""
+    """A method of colour-demosaicing, on the image continued by reflection: its borders mix colours."""
     printing = np.get_printoptions()
     package = import_module("colour_demosaicing")
-    np.set_printoptions(**printing)  # which the package changes for everyone
+    np.set_printoptions(**printing)  # which importing the package changes
     image = getattr(package, name)(np.pad(raw, BORDER_PX, mode="reflect"), cfa)
     return np.ascontiguousarray(image[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX])
 

@@ -8,16 +8,16 @@ from pcii.sections.image_moves import Groups, Moves, Running
 from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
 
 BAND = 16
-"""Rows of a section that are summed at a time when all views are at hand: their sums stay in the cache."""
+"""Rows of a section that are summed at a time when all views are in memory: their sums stay in the cache."""
 
 
 @compiled
 def sum_views(
     sums: np.ndarray, variance: np.ndarray, images: np.ndarray, moves: Moves, groups: Groups
 ) -> bool:
-    """A section of images (V, H, N) that are all at hand: `add_views` and `merge_groups` band by band.
+    """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
 
-    `variance` is empty if it is not asked for. Returns whether all sums and all images are finite.
+    `variance` is empty if it is not wanted. Returns whether all sums and all images are finite.
     """
     height, width = images.shape[1:]
     bad = bad_rows(images, moves)
@@ -42,7 +42,7 @@ def sum_views(
 def add_views(running: Running, images: np.ndarray, moves: Moves) -> bool:
     """Add shifted images (V, H, N) to running sums of their groups.
 
-    Returns whether all pixels that fall beside the section are finite.
+    Returns whether all pixels that fall outside the section are finite.
     """
     bad = bad_rows(images, moves)
     height = running.total.shape[1]
@@ -53,7 +53,7 @@ def add_views(running: Running, images: np.ndarray, moves: Moves) -> bool:
 
 @compiled
 def merge_groups(sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups) -> bool:
-    """Sums and, if asked for, variances (H, W, C) from the running sums of the groups.
+    """Sums and, unless it is empty, variances (H, W, C) from the running sums of the groups.
 
     Returns whether all sums are finite.
     """

@@ -3,8 +3,8 @@
 A view moves by whole pixels, so each of its rows is added to a row of the section in one run; bilinear
 shifts are up to four such moves of each view, with weights. For mosaics the moves are sorted into four
 groups by the parities of their shifts: within a group all samples of a voxel have one colour, and rows are
-added without looking at colours. Variances are sums of squared differences from the first sample, in
-double precision, which keeps them right to 1e-6 where the mean is a million deviations.
+added without regard to colours. Variances are sums of squared differences from the first sample, in
+double precision, whose relative error is 1e-6 where the mean is a million standard deviations.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ from pcii.core.section_stack import Shifts
 from pcii.sections.image_moves import Moves, Running, axis_moves, groups_of, moves_of
 
 BATCH = 8
-"""Views that are held at a time when they are read from disk."""
+"""Views in memory at a time when they are read from disk."""
 
 
 def sum_views(
@@ -34,17 +34,17 @@ def sum_views(
     """
     kind = _dtype(data)
     planes = [_Plane(data, focal_planes, p, shifts, kind, variance) for p in range(len(focal_planes))]
-    everything = _in_memory(data)
-    if everything is not None:
-        numbers = np.arange(data.grid.view_count)
-        finite = all(plane.sum(numbers, everything) for plane in planes)
+    images = _in_memory(data)
+    if images is not None:
+        views = np.arange(data.grid.view_count)
+        finite = all(plane.sum(views, images) for plane in planes)
     else:
         for plane in planes:
             plane.start()
         finite = all(plane.add(*batch) for batch in _batches(data) for plane in planes)
         finite = finite and all(plane.finish() for plane in planes)
     if not finite:
-        _name_the_bad_one(data)
+        _raise_not_finite(data)
     sums = _stacked([plane.sums for plane in planes])
     return sums, _stacked([plane.variance for plane in planes]) if variance else None
 
@@ -92,7 +92,7 @@ def _stacked(planes: list[np.ndarray]) -> np.ndarray:
 
 
 class _Plane:
-    """One section in the making: its result, and running sums where views come some at a time."""
+    """The section at one plane while it is summed: its result, and running sums if views come in batches."""
 
     def __init__(
         self,
@@ -109,18 +109,18 @@ class _Plane:
         self.is_mosaic, self.with_variance = cfa is not None, variance
         self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
         self.groups = groups_of(self.row_moves, self.col_moves, grid, cfa)
-        # One block of memory: an allocator hands back what is freed in one piece sooner than in two.
-        whole = np.empty((1 + variance, grid.height, grid.width, C), dtype)
-        self.sums, self.variance = whole[0], whole[1] if variance else whole[:0, 0]
+        # One block of memory: allocators return one large block to the system sooner than two smaller ones.
+        block = np.empty((1 + variance, grid.height, grid.width, C), dtype)
+        self.sums, self.variance = block[0], block[1] if variance else block[:0, 0]
 
     def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
-        """Make the section of images (V, H, N) of all views; whether it and the images are finite."""
+        """Make the section of images (V, H, N) of all views; returns whether it and the images are finite."""
         from pcii.sections import dense_kernels
 
         return dense_kernels.sum_views(self.sums, self.variance, images, self._moves(views), self.groups)
 
     def start(self) -> None:
-        """Begin a section of views that come some at a time."""
+        """Begin a section of views that come in batches."""
         H, W, _ = self.sums.shape
         shape = (self.group_count, H, W * self.channels)
         self.total = np.zeros(shape)
@@ -128,13 +128,13 @@ class _Plane:
         self.first = np.full(self.squares.shape, np.nan)
 
     def add(self, views: np.ndarray, images: np.ndarray) -> bool:
-        """Add images (V, H, N) of these views; whether what falls beside the section is finite."""
+        """Add images (V, H, N) of these views; returns whether the pixels outside the section are finite."""
         from pcii.sections import dense_kernels
 
         return dense_kernels.add_views(self._running(), images, self._moves(views))
 
     def finish(self) -> bool:
-        """Bring the running sums to the result; whether it is finite."""
+        """Compute the result from the running sums; returns whether it is finite."""
         from pcii.sections import dense_kernels
 
         return dense_kernels.merge_groups(self.sums, self.variance, self._running(), self.groups)
@@ -147,35 +147,35 @@ class _Plane:
 
 
 def colours_apart(data: Views | PhotonCounts, shifts: Shifts) -> tuple[str | None, int]:
-    """The pattern by which samples are told apart, and into how many colours: with even shifts by none."""
+    """The Bayer pattern and number of colours that are summed apart: none and 1 for even shifts."""
     return (None, 1) if shifts == "even" else (data.cfa, data.channel_count)
 
 
 def _dtype(data: Views) -> np.dtype:
-    """float32 stays; what has more digits, is an integer or is unknown becomes float64."""
+    """Type of the sums: float32 for float16 and float32 data, float64 for all others."""
     kind = getattr(data.radiance, "dtype", None)
     return np.dtype(np.float32) if kind in (np.float16, np.float32) else np.dtype(np.float64)
 
 
 def _in_memory(data: Views) -> np.ndarray | None:
-    """All images (V, H, N) if they are in memory as they are needed."""
-    whole = data.radiance
-    if isinstance(whole, np.ndarray) and whole.dtype == _dtype(data) and whole.flags.c_contiguous:
-        return whole.reshape(data.grid.view_count, data.grid.height, -1)
+    """All images (V, H, N) if they are a contiguous array in memory of the type of the sums, else None."""
+    radiance = data.radiance
+    if isinstance(radiance, np.ndarray) and radiance.dtype == _dtype(data) and radiance.flags.c_contiguous:
+        return radiance.reshape(data.grid.view_count, data.grid.height, -1)
     return None
 
 
 def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """View numbers (V,) and images (V, H, N), some at a time."""
+    """Batches of view numbers (V,) and images (V, H, N)."""
     K, L, H, W = data.grid.shape_KLHW
-    held = np.empty((min(BATCH, K * L), H, W * data.radiance.shape[4]), dtype=_dtype(data))
-    for part in np.split(np.arange(K * L), range(BATCH, K * L, BATCH)):
-        for place, view in enumerate(part.tolist()):
-            held[place] = np.asarray(data.radiance[view // L, view % L]).reshape(H, -1)
-        yield part, held[: part.size]
+    images = np.empty((min(BATCH, K * L), H, W * data.radiance.shape[4]), dtype=_dtype(data))
+    for views in np.split(np.arange(K * L), range(BATCH, K * L, BATCH)):
+        for number, view in enumerate(views.tolist()):
+            images[number] = np.asarray(data.radiance[view // L, view % L]).reshape(H, -1)
+        yield views, images[: views.size]
 
 
-def _name_the_bad_one(data: Views) -> None:
+def _raise_not_finite(data: Views) -> None:
     for k, l in np.ndindex(data.grid.rows, data.grid.cols):
-        data.view(k, l)  # raises for the first that holds one
+        data.view(k, l)  # raises for a view with NaN or infinity
     raise InputError("radiance: values are too large for their sum to be a number")

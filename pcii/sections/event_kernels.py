@@ -20,9 +20,9 @@ def scatter(
 ) -> None:
     """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
 
-    `rows` (Z, K, h) and `cols` (Z, L, w) say where each pixel of each camera belongs; `starts` (K L + 1,)
-    where each view's photons begin, which are sorted by row. The sections are cut into `bands` of rows
-    each; a thread clears a band and looks through the photons that fall there.
+    `rows` (Z, K, h) and `cols` (Z, L, w) are the voxels of the pixels of each camera; `starts` (K L + 1,) is
+    where each view's photons begin, which are sorted by row. Each section is divided into `bands` of rows;
+    a thread clears a band and adds the photons that fall in it.
     """
     planes, height, width, _ = counts.shape
     across = cols.shape[1]
@@ -50,7 +50,7 @@ def scatter(
 
 @compiled
 def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
-    """Each row of `target` (N, M) is one of the few `rows` (P, M), by its `kinds` (N,)."""
+    """Set each row n of `target` (N, M) to row `kinds[n]` of `rows` (P, M)."""
     for row in nb.prange(target.shape[0]):
         target[row] = rows[kinds[row]]
 
@@ -69,12 +69,12 @@ def window_samples(
 ) -> None:
     """Number, sum and sum of squares of each window's samples that are not zero, (H, W) int64, from zeros.
 
-    A sample is the sum of one view's photons in a window of `window` x `window` cells about a cell. `row`,
+    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
     `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
     thread owns a band of rows. The cost follows the photons times the cells of a window.
     """
     height, width = number.shape
-    above = (window - 1) // 2  # of an even window the larger half lies above and left of its cell
+    above = (window - 1) // 2  # the window of a cell reaches further above and left of it if its size is even
     below = window // 2
     for band in nb.prange(bands):
         first, last = height * band // bands, height * (band + 1) // bands
@@ -87,9 +87,9 @@ def window_samples(
             for e in range(starts[view], starts[view + 1]):
                 for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
                     for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
-                        here = sample[i - first, j]
-                        if here > 0:  # else another photon of the window has been here
+                        value = sample[i - first, j]
+                        if value > 0:  # 0 once this cell's sample has been counted
                             number[i, j] += 1
-                            total[i, j] += here
-                            squares[i, j] += here * here
+                            total[i, j] += value
+                            squares[i, j] += value * value
                             sample[i - first, j] = 0

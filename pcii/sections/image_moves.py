@@ -1,6 +1,6 @@
 """Whole-pixel moves of whole images: by how much each view moves, with what weight, in what order.
 
-What the compiled loops of `dense_kernels` take, without the compiler.
+The arguments of the compiled loops of `dense_kernels`, made without importing the compiler.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ class Moves(NamedTuple):
 class Running(NamedTuple):
     """Running sums of groups of images, (G, H, N) float64, N columns times channels.
 
-    `total` and `squares` sum differences from the `first` sample of each place, NaN before there is one;
+    `total` and `squares` sum differences from the `first` sample of each voxel, NaN before there is one;
     `squares` and `first` may be empty: then the samples themselves are summed.
     """
 
@@ -43,11 +43,11 @@ class Running(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Which samples the groups hold.
+    """Samples that the groups of images contain.
 
     Group 2 p + q of a mosaic are the views whose row and column shifts have the parities p and q, so that
     all of its samples at a voxel have one colour. `by_row` (2, H) and `by_col` (2, W) are how many rows and
-    columns of cameras have an even and an odd shift and see the voxel; `phases` (4, 2) are the Bayer cells of
+    columns of cameras with an even and an odd shift reach the voxel; `phases` (4, 2) are the Bayer cells of
     red, blue and twice green, empty where every pixel holds all colours and there is one group.
     """
 
@@ -58,17 +58,17 @@ class Groups(NamedTuple):
 
 @dataclass(frozen=True)
 class AxisMoves:
-    """Whole pixels by which each row (or column) of cameras is moved, int64, and with what weight."""
+    """Whole pixels by which each row (or column) of cameras is moved, int64, and the weights of the moves."""
 
     px: np.ndarray
     weight: np.ndarray
 
 
 def axis_moves(planes: FocalPlanes, plane: int, shifts: Shifts) -> tuple[list[AxisMoves], list[AxisMoves]]:
-    """Moves of the rows (K,) and of the columns (L,) of cameras; they add up to each camera's shift."""
+    """Moves of the rows (K,) and of the columns (L,) of cameras: one, or two for bilinear shifts."""
     if shifts != "bilinear":
-        whole = planes.nearest_shifts_px(step_px(shifts))
-        rows, cols = ([AxisMoves(px[plane], np.ones(px[plane].size))] for px in whole)
+        nearest = planes.nearest_shifts_px(step_px(shifts))
+        rows, cols = ([AxisMoves(px[plane], np.ones(px[plane].size))] for px in nearest)
         return rows, cols
     axes = []
     for shifts_px in planes.exact_shifts_px:
@@ -79,7 +79,7 @@ def axis_moves(planes: FocalPlanes, plane: int, shifts: Shifts) -> tuple[list[Ax
 
 
 def step_px(shifts: Shifts) -> int:
-    """Of what number of pixels whole shifts are multiples."""
+    """The number of pixels of which whole shifts are multiples."""
     return 2 if shifts == "even" else 1
 
 
@@ -95,14 +95,14 @@ def moves_of(
     source, down, right, weight = [], [], [], []
     for row, col in product(row_moves, col_moves):
         share = row.weight[views // columns] * col.weight[views % columns]
-        some = np.flatnonzero(share)
-        source.append(some)
-        weight.append(share[some])
-        down.append(row.px[views[some] // columns])
-        right.append(col.px[views[some] % columns])
+        used = np.flatnonzero(share)
+        source.append(used)
+        weight.append(share[used])
+        down.append(row.px[views[used] // columns])
+        right.append(col.px[views[used] % columns])
     down, right = np.concatenate(down), np.concatenate(right)
     group = 2 * (down % 2) + right % 2 if is_mosaic else np.zeros_like(down)
-    # What moves least shows most of a section, so it comes first.
+    # The images that move least cover most of a section, so they come first.
     order = np.lexsort((np.abs(down) + np.abs(right), group))
     ends = np.searchsorted(group[order], np.arange(4 if is_mosaic else 1), side="right")
     source, weight = np.concatenate(source)[order], np.concatenate(weight)[order]
@@ -112,7 +112,7 @@ def moves_of(
 def groups_of(
     row_moves: Sequence[AxisMoves], col_moves: Sequence[AxisMoves], grid: CameraGrid, cfa: str | None
 ) -> Groups:
-    """The groups of views that move by whole pixels; bilinear moves are never told apart."""
+    """The groups of views that move by whole pixels, by parity of their shifts if `cfa` is a pattern."""
     by_row, by_col = (
         _cameras_by_parity(moves[0].px, size)
         for moves, size in ((row_moves, grid.height), (col_moves, grid.width))
@@ -124,7 +124,7 @@ def groups_of(
 
 
 def _cameras_by_parity(shift: np.ndarray, size: int) -> np.ndarray:
-    """How many cameras of even and of odd shift see each voxel row (or column), (2, size)."""
-    place = np.arange(size) - shift[:, None]
-    inside = (place >= 0) & (place < size)
+    """How many cameras of even and of odd shift reach each voxel row (or column), (2, size)."""
+    pixel = np.arange(size) - shift[:, None]
+    inside = (pixel >= 0) & (pixel < size)
     return np.array([inside[shift % 2 == parity].sum(axis=0) for parity in (0, 1)])

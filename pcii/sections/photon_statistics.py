@@ -1,4 +1,4 @@
-"""Statistics of photon counts: pooled samples, entropy, and what Poisson noise alone would give.
+"""Statistics of photon counts: pooled samples, entropy, and the variance of Poisson noise.
 
 At 1000 photons per view a voxel's own samples are degenerate: nine voxels of ten have no photon and
 hardly any has two different non-zero samples. So samples are pooled over small neighbourhoods, which
@@ -17,7 +17,7 @@ from pcii.core.section_stack import Sections
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
 PHOTONS_PER_WINDOW = 64.0
-SMALLEST_WINDOW_PX = 3  # below that a Bayer colour may have no site in the window
+SMALLEST_WINDOW_PX = 3  # smaller windows may have no site of a Bayer colour
 LARGEST_WINDOW_PX = 15
 
 
@@ -39,9 +39,9 @@ def entropy_bits(values: np.ndarray, top: float) -> float:
 
 
 def section_window_px(sections: Sections) -> int:
-    """Odd side of the square over which sections are pooled before edges and entropies are taken.
+    """Odd side of the square window over which sections are pooled for edges and entropies, 3 to 15 px.
 
-    It holds about 64 photons where the photons are: a relative noise of 1/8.
+    It holds about 64 photons where there are objects: a relative noise of 1/8.
     """
     rate = photons_around_a_photon(sections)
     side = np.sqrt(PHOTONS_PER_WINDOW / rate) if rate > 0 else LARGEST_WINDOW_PX
@@ -49,9 +49,9 @@ def section_window_px(sections: Sections) -> int:
 
 
 def photons_around_a_photon(sections: Sections) -> float:
-    """How many photons a voxel holds where the photons are, over all colours: the rate that a photon sees.
+    """Mean number of photons per voxel, over all colours, in which voxels are weighted by their photons K.
 
-    That is sum K (K - 1) / sum K, which Poisson noise does not bias; 0 without photons.
+    It is sum K (K - 1) / sum K, a ratio that Poisson noise does not bias; 0 without photons.
     """
     photons = squares = 0.0
     for plane in sections.counts:
@@ -66,7 +66,7 @@ def photons_around_a_photon(sections: Sections) -> float:
 def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
     """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
 
-    Sums before it divides, so that each sample weighs the same; a window that no sample reaches is 0.
+    Sums are divided, so all samples have the same weight; a window that no sample reaches is 0.
     """
     from scipy.ndimage import uniform_filter
 
@@ -74,7 +74,7 @@ def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
     options = {"size": size[1:3], "axes": (1, 2), "mode": "constant"}
     counts = uniform_filter(sections.counts.astype(np.float64), **options)
     samples = uniform_filter(sections.coverage.astype(np.float64), **options)
-    # Running sums leave a residue of rounding where there is nothing.
+    # The filter's running sums leave rounding errors where the window is empty.
     floor = 0.5 / window_px**2
     mean = np.zeros_like(counts)
     np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
@@ -84,8 +84,8 @@ def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
 def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:
     """Entropy of one section inside a region (H, W), the mean over its colours.
 
-    `pooled` (H, W, C) is one plane of `pooled_estimate`; `tops` (C,) the brightest level of each
-    colour, the same for all planes that are to be compared.
+    `pooled` (H, W, C) is one plane of `pooled_estimate`; `tops` (C,) is the highest level of each
+    colour, the same for all planes that are compared.
     """
     bits = [entropy_bits(pooled[..., c][region], tops[c]) for c in range(pooled.shape[-1])]
     return float(np.mean(bits))
@@ -93,7 +93,7 @@ def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray
 
 @dataclass(frozen=True)
 class ViewSamples:
-    """The samples that the views contribute to pooled voxels of one section.
+    """Statistics of the samples that the views contribute to pooled voxels of one section.
 
     A cell is `cell_px` pixels wide and a window `window_cells` cells; each view's photons in the
     window are one sample. All arrays are (H / cell_px, W / cell_px), rounded up.
@@ -114,8 +114,8 @@ def view_samples(
 
     With cells and windows of 1 these are the samples of single voxels, whatever their colour.
 
-    In focus all views see the same piece of surface, so their samples differ by Poisson noise only;
-    out of focus they see different pieces, and the variance grows. A window of an even number of
+    In focus all views see the same surface point, so their samples differ by Poisson noise only; out of focus
+    they see different points, and the variance is larger. A window of an even number of
     pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
     """
     from pcii.base.compiled_loops import threads
@@ -125,12 +125,12 @@ def view_samples(
     row, col, inside = planes.project(events, plane)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
     number, total, squares = (np.zeros(shape, dtype=np.int64) for _ in range(3))
-    # Events are sorted by view, so each view's are one run.
+    # Events are sorted by view.
     starts = np.append(0, np.cumsum(inside))[counts.view_starts]
     cells = row[inside] // cell_px, col[inside] // cell_px
     kernels.window_samples(number, total, squares, *cells, events.n[inside], starts, window_cells, threads())
     mean = total / np.maximum(number, 1)
-    # n Q - S^2 in integers cannot cancel.
+    # n Q - S^2 is exact in integers.
     deviations = number * squares - total * total
     variance = deviations / np.maximum(number * (number - 1), 1)
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
@@ -147,6 +147,9 @@ def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
 
     If the rate is r, non-zero samples have the mean m = r / (1 - exp(-r)) and the variance
     m (1 + r - m). The rate is found from the mean by Newton's method; a mean of 1 or less is rate 0.
+
+    >>> truncated_poisson_variance(np.array([1.0, 2.0, 50.0])).round(3)
+    array([ 0.   ,  1.187, 50.   ])
     """
     m = np.maximum(np.asarray(mean, dtype=np.float64), 1.0)
     rate = np.maximum(2 * (m - 1), 1e-9)  # exact to second order at small rates; m itself at large

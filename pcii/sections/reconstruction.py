@@ -2,8 +2,8 @@
 
 Each view is shifted to the virtual centre and added; the mean over the samples that meet at a voxel
 is the section. Colours are summed apart, each with its own coverage, so that any shift is exact and
-raw Bayer colours never mix. Photon counts stay integers until that last division, and no count is
-ever spread by interpolation.
+raw Bayer colours never mix. Photon counts stay integers until that last division; they are never
+interpolated.
 """
 
 from collections.abc import Iterator
@@ -20,8 +20,8 @@ from pcii.core.section_stack import Normalisation, Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
 from pcii.sections.image_moves import AxisMoves, axis_moves, step_px
 
-MUCH_LIGHT = 1 / 16
-"""Where a larger share of the pixels caught photons, adding whole images takes less time than every photon.
+DENSE_SHARE = 1 / 16
+"""If a larger share of the pixels has photons, adding whole images takes less time than adding each photon.
 
 Measured on 100 views of 1024 x 1024: 24 ms for the images, 26 ms for the photons of 5.8 % of their pixels.
 """
@@ -44,20 +44,31 @@ def reconstruct(
     variance of the samples at each voxel, 0 below two.
 
     `shifts` are "nearest" (views move by whole pixels), "bilinear" (radiance only: each sample is shared
-    by the four voxels around its place; `coverage` is then the sum of the shares) or "even". With "even"
-    raw Bayer samples are added without telling colours apart, as the paper does, and the section is a
+    by the four nearest voxels; `coverage` is then the sum of the shares) or "even". With "even"
+    raw Bayer samples of all colours are added together, as the paper does, and the section is a
     mosaic to be demosaiced: `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for
     even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
 
     Raises `InputError` for a depth not above 0, a subpixel division below 1, or options that do not go
     together.
 
-    >>> sections = reconstruct(counts, z_mm=[540, 620])          # doctest: +SKIP
-    >>> sections.estimate.shape                                  # doctest: +SKIP
-    (2, 1024, 1024, 3)
+    Three cameras count a photon each of a point at 500 mm, where the disparity is 10 px:
+
+    >>> import pcii
+    >>> grid = pcii.CameraGrid(
+    ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=2, width=24
+    ... )
+    >>> counts = pcii.PhotonCounts.from_events(
+    ...     k=[0, 0, 0], l=[0, 1, 2], i=[0, 0, 0], j=[20, 10, 0], n=[1, 1, 1], grid=grid
+    ... )
+    >>> sections = pcii.reconstruct(counts, z_mm=[500, 1000])
+    >>> sections.estimate.shape
+    (2, 2, 24, 1)
+    >>> sections.counts[:, 0, 5:16, 0].tolist()
+    [[0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
     """
     _check(data, subpixel, normalisation, shifts, variance)
-    grid, planes, of_samples = data.grid, planes_at(data.grid, z_mm), None
+    grid, planes, sample_variance = data.grid, planes_at(data.grid, z_mm), None
     cfa, channels = colours_apart(data, shifts)
     shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
     rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
@@ -66,40 +77,51 @@ def reconstruct(
     else:
         coverage = _coverage(planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
-        if not data.is_sparse and subpixel == 1 and data.occupied_share > MUCH_LIGHT:
+        if not data.is_sparse and subpixel == 1 and data.occupied_share > DENSE_SHARE:
             sums = sum_counts(data, planes, shifts)
         else:
             sums = _scatter(data, data.events.n, shape, rows, cols)
         if variance:
-            of_samples = _count_variance(data, sums, coverage, rows, cols)
+            sample_variance = _count_variance(data, sums, coverage, rows, cols)
     elif subpixel > 1:
-        sums, of_samples = sum_fine(data, rows, cols, coverage, variance=variance)
+        sums, sample_variance = sum_fine(data, rows, cols, coverage, variance=variance)
     else:
-        sums, of_samples = sum_views(data, planes, shifts, variance=variance)
+        sums, sample_variance = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
-    return Sections(planes, sums, coverage, subpixel, normalisation, of_samples, mosaic)
+    return Sections(planes, sums, coverage, subpixel, normalisation, sample_variance, mosaic)
 
 
 def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
-    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane."""
+    """The sections of `reconstruct`, one plane at a time: a long stack in the memory of one plane.
+
+    Yields `Sections` of one plane each; takes the options of `reconstruct` and raises the same errors.
+
+    >>> import pcii
+    >>> grid = pcii.CameraGrid(
+    ...     rows=2, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=8, width=8
+    ... )
+    >>> views = pcii.Views(np.ones((2, 2, 8, 8, 3), dtype=np.float32), grid)
+    >>> [float(section.estimate.max()) for section in pcii.reconstruct_each(views, [1000, 2000])]
+    [1.0, 1.0]
+    """
     planes = planes_at(data.grid, z_mm)
     for plane in range(len(planes)):
         yield reconstruct(data, planes.take([plane]), **options)
 
 
 def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sections:
-    """Sections of the counts at `planes`, of which the first are those of `sections`: they are not made anew.
+    """Sections of the counts at `planes`, of which the first are those of `sections`, which are reused.
 
-    For sections of whole pixels as `reconstruct` makes them unless told otherwise.
+    For sections that `reconstruct` made with its default options.
     """
     known = len(sections.planes)
     if len(planes) == known:
         return sections
-    others = reconstruct(counts, planes.take(slice(known, None)))
+    added = reconstruct(counts, planes.take(slice(known, None)))
     return Sections(
         planes,
-        np.concatenate([sections.counts, others.counts]),
-        np.concatenate([sections.coverage, others.coverage]),
+        np.concatenate([sections.counts, added.counts]),
+        np.concatenate([sections.coverage, added.coverage]),
     )
 
 
@@ -136,9 +158,9 @@ def _scatter(
     from pcii.sections import event_kernels as kernels
 
     events = data.events
-    # No voxel gets more than the whole; half the bytes are half the time.
+    # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.
     counts = np.empty(shape, dtype=np.int32 if n is events.n and data.total < 2**31 else np.int64)
-    # A band for each thread: of one section if there is but one, else a section is a band.
+    # Bands give every thread work if there are fewer sections than threads.
     bands = max(1, threads() // shape[0])
     colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
     kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n, bands)
@@ -150,7 +172,7 @@ def _count_variance(
 ) -> np.ndarray:
     """Unbiased variance of the counts that meet at each voxel, those of zero included: float64.
 
-    (m Q - S^2) / (m (m - 1)) of m samples with the sum S and sum of squares Q: in integers, it cannot cancel.
+    (m Q - S^2) / (m (m - 1)) of m samples with the sum S and sum of squares Q: it is exact in integers.
     """
     n = data.events.n
     # No sum of squares is above the largest count times the largest sum.
@@ -162,13 +184,13 @@ def _count_variance(
 
 
 def view_coverage(planes: FocalPlanes) -> np.ndarray:
-    """How many views see each voxel of each plane, (Z, H, W)."""
+    """Number of views that reach each voxel of each plane, (Z, H, W)."""
     shape = (len(planes), planes.grid.height, planes.grid.width, 1)
     return _coverage(planes, None, shape, *planes.voxel_indices())[..., 0]
 
 
 def _shared_coverage(planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...]) -> np.ndarray:
-    """The sum of the shares that samples have in each voxel (Z, H, W, C), float64: it separates too."""
+    """Sum of the shares of samples in each voxel (Z, H, W, C), float64: a product of rows and columns."""
     coverage = np.zeros(shape)
     for plane in range(len(planes)):
         by_row, by_col = (
@@ -180,16 +202,16 @@ def _shared_coverage(planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...
 
 
 def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, cfa: str | None) -> None:
-    """Add what rows (2, H) and columns (2, W) of each parity bring to a plane (H, W, C), by colour."""
+    """Add products of values by row (2, H) and column (2, W) of each parity to a plane (H, W, C)."""
     cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
     for (a, b), colour in np.ndenumerate(cells):
         coverage[..., colour] += (by_row[a][:, None] * by_col[b]).astype(coverage.dtype, copy=False)
     if cfa is None:
-        coverage[..., 1:] = coverage[..., :1]  # all pixels see all colours
+        coverage[..., 1:] = coverage[..., :1]  # every pixel has all colours
 
 
 def _shares(move: AxisMoves, size: int) -> np.ndarray:
-    """What samples at pixels of even and of odd number bring to each voxel row (or column), (2, size)."""
+    """Sum of shares of the samples of even and of odd pixels in each voxel row (or column), (2, size)."""
     pixel = np.arange(size) - move.px[:, None]
     inside = (pixel >= 0) & (pixel < size)
     weight = np.where(inside, move.weight[:, None], 0)
@@ -199,10 +221,10 @@ def _shares(move: AxisMoves, size: int) -> np.ndarray:
 def _coverage(
     planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:
-    """How many samples of each colour meet at each voxel (Z, H M, W M, C), in closed form.
+    """Number of samples of each colour at each voxel (Z, H M, W M, C), in closed form.
 
-    The samples of Bayer phase (a, b) at voxel (r, c) are (camera rows whose pixel of row parity a
-    lands on r) x (camera columns whose pixel of column parity b lands on c): it separates.
+    The number of samples of Bayer phase (a, b) at voxel (r, c) is a product: of the number of camera rows
+    with a pixel of row parity a at r, and of camera columns with a pixel of column parity b at c.
     """
     from pcii.sections import event_kernels as kernels
 
@@ -213,11 +235,11 @@ def _coverage(
             np.array([_samples_at(targets[plane, :, parity::2], size) for parity in (0, 1)])
             for targets, size in ((rows, H), (cols, W))
         )
-        # There are but a few kinds of rows: away from the borders the pattern repeats.
+        # Few rows are distinct: away from the borders the pattern repeats.
         _, first, kinds = np.unique(by_row[0] << 32 | by_row[1], return_index=True, return_inverse=True)
-        some = np.zeros((first.size, W, C), dtype=coverage.dtype)
-        _add_product(some, by_row[:, first], by_col, cfa)
-        kernels.copy_rows(coverage[plane].reshape(H, W * C), kinds, some.reshape(-1, W * C))
+        distinct = np.zeros((first.size, W, C), dtype=coverage.dtype)
+        _add_product(distinct, by_row[:, first], by_col, cfa)
+        kernels.copy_rows(coverage[plane].reshape(H, W * C), kinds, distinct.reshape(-1, W * C))
     return coverage
 
 

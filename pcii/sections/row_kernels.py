@@ -1,4 +1,4 @@
-"""Compiled: one row of a section from the rows of shifted images, with sums of squared deviations.
+"""Compiled functions for one row of a section: sums of shifted images, and of their squared deviations.
 
 `running` is a `Running`, `moves` are `Moves` and `groups` are `Groups` of `image_moves`.
 """
@@ -20,10 +20,10 @@ def not_finite(values) -> int:
 
 @helper
 def add_rows(running, images, moves, top, start, stop) -> int:
-    """Add what all images have for `start` to `stop` of the rows of a section that begin at row `top`.
+    """Add all images to the rows `start` to `stop` of a band of a section that begins at row `top`.
 
-    An image's rows are read one after the other, which memory is good at. Returns how many pixels of these
-    rows are not finite and fall beside the section.
+    The rows of an image are read in the order in which they lie in memory. Returns how many pixels of these
+    rows are not finite and fall outside the section.
     """
     _, height, width = images.shape
     total, squares, first = running
@@ -39,10 +39,10 @@ def add_rows(running, images, moves, top, start, stop) -> int:
                 row = top + line
                 for n in four:
                     if 0 <= row - row_shift[n] < height:
-                        bad += _bad_beside(images[source[n], row - row_shift[n]], col_shift[n])
+                        bad += _bad_outside(images[source[n], row - row_shift[n]], col_shift[n])
                 if squares.size:
-                    places = total[g, line], squares[g, line], first[g, line]
-                    _add_deviations_of_four(places, images, row, moves, four)
+                    running_row = total[g, line], squares[g, line], first[g, line]
+                    _add_deviations_of_four(running_row, images, row, moves, four)
                     continue
                 for n in four:
                     at, shift = row - row_shift[n], col_shift[n]
@@ -56,10 +56,10 @@ def add_rows(running, images, moves, top, start, stop) -> int:
 
 @helper
 def _find_first(first, images, row, moves, from_move, to_move) -> None:
-    """Take the first sample of each place of a row that has none yet."""
+    """Set `first` to the first sample of each voxel of a row that has none yet."""
     _, height, width = images.shape
     source, row_shift, col_shift = moves.source, moves.row_shift, moves.col_shift
-    begin = end = 0  # the run of places that are known to have one
+    begin = end = 0  # the run of voxels that are known to have one
     for m in range(from_move, to_move):
         at, shift = row - row_shift[m], col_shift[m]
         low, high = max(0, shift), min(width, width + shift)
@@ -89,9 +89,9 @@ def _add(total, values, weight) -> None:
 
 
 @helper
-def _add_deviations(places, values, shift, start, stop) -> None:
-    """Add one image's row, moved by `shift`, to the running sums of the places `start` to `stop` of a row."""
-    total, squares, first = places
+def _add_deviations(running_row, values, shift, start, stop) -> None:
+    """Add one image's row, moved by `shift`, to the running sums of the voxels `start` to `stop` of a row."""
+    total, squares, first = running_row
     low, high = max(start, shift, 0), min(stop, values.size + shift, values.size)
     for x in range(low, high):
         difference = values[x - shift] - first[x]
@@ -100,9 +100,9 @@ def _add_deviations(places, values, shift, start, stop) -> None:
 
 
 @helper
-def _add_deviations_of_four(places, images, row, moves, four) -> None:
-    """The same of up to four images; where all four have samples, at once: sums are fetched less often."""
-    total, squares, first = places
+def _add_deviations_of_four(running_row, images, row, moves, four) -> None:
+    """Add the rows of up to four images, in one pass where all have samples: sums are loaded less often."""
+    total, squares, first = running_row
     source, row_shift, col_shift = moves.source, moves.row_shift, moves.col_shift
     _, height, width = images.shape
     low, high, reaching = 0, width, 0
@@ -115,8 +115,8 @@ def _add_deviations_of_four(places, images, row, moves, four) -> None:
         at = row - row_shift[m]
         if 0 <= at < height:
             values = images[source[m], at]
-            _add_deviations(places, values, col_shift[m], 0, low)
-            _add_deviations(places, values, col_shift[m], high, width)
+            _add_deviations(running_row, values, col_shift[m], 0, low)
+            _add_deviations(running_row, values, col_shift[m], high, width)
     if low >= high:
         return
     m, n, o, p = four[0], four[1], four[2], four[3]
@@ -132,8 +132,8 @@ def _add_deviations_of_four(places, images, row, moves, four) -> None:
 
 
 @helper
-def _bad_beside(values, shift) -> int:
-    """How many of a row's pixels are not finite and fall beside the section; the others show in its sums."""
+def _bad_outside(values, shift) -> int:
+    """How many of a row's pixels are not finite and fall outside the section; others show in its sums."""
     bad = 0
     for x in range(min(max(-shift, 0), values.size)):
         bad += not np.isfinite(values[x])
@@ -144,14 +144,14 @@ def _bad_beside(values, shift) -> int:
 
 @helper
 def bad_rows(images, moves) -> int:
-    """The same of the rows that are moved above or below the section."""
+    """How many pixels are not finite in the rows that are moved above or below the section."""
     source, row_shift = moves.source, moves.row_shift
     height, bad = images.shape[1], 0
     for m in range(source.size):
         for row in range(min(max(-row_shift[m], 0), height)):
-            bad += _bad_beside(images[source[m], row], images.shape[2])
+            bad += _bad_outside(images[source[m], row], images.shape[2])
         for row in range(max(height - row_shift[m], 0), height):
-            bad += _bad_beside(images[source[m], row], images.shape[2])
+            bad += _bad_outside(images[source[m], row], images.shape[2])
     return bad
 
 
@@ -168,43 +168,43 @@ def merge_line(sums, variance, running, groups, top, line) -> None:
             n = rows * (by_col[0, col] + by_col[1, col])
             inverse, unbiased = 1 / max(n, 1), 1 / max(n - 1, 1)
             for colour in range(channels):
-                place = col * channels + colour
-                whole = total[0, line, place]
+                index = col * channels + colour
+                voxel_sum = total[0, line, index]
                 if variance.size:
-                    squared = _deviations(whole, squares[0, line, place], inverse)
+                    squared = _deviations(voxel_sum, squares[0, line, index], inverse)
                     variance[line, col, colour] = squared * unbiased
-                    whole += first[0, line, place] * n if n > 0 else 0.0
-                sums[line, col, colour] = whole
+                    voxel_sum += first[0, line, index] * n if n > 0 else 0.0
+                sums[line, col, colour] = voxel_sum
         return
     for parity in range(2):
-        for phase in range(2):  # red and blue have one group at each voxel
+        for phase in range(2):  # red and blue samples of a voxel are all in one group
             p, q = (row + phases[phase, 0]) % 2, (parity + phases[phase, 1]) % 2
             rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
             for col in range(parity, width, 2):
-                whole, n = total[g, line, col], rows * by_col[q, col]
+                voxel_sum, n = total[g, line, col], rows * by_col[q, col]
                 if variance.size:
-                    squared = _deviations(whole, squares[g, line, col], 1 / max(n, 1))
+                    squared = _deviations(voxel_sum, squares[g, line, col], 1 / max(n, 1))
                     variance[line, col, colour] = squared / max(n - 1, 1)
-                    whole += first[g, line, col] * n if n > 0 else 0.0
-                sums[line, col, colour] = whole
+                    voxel_sum += first[g, line, col] * n if n > 0 else 0.0
+                sums[line, col, colour] = voxel_sum
         p, q = (row + phases[2, 0]) % 2, (parity + phases[2, 1]) % 2
-        g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells lie across from each other
+        g, h = 2 * p + q, 3 - 2 * p - q  # the two green cells are diagonal neighbours
         for col in range(parity, width, 2):
             n, m = by_row[p, row] * by_col[q, col], by_row[1 - p, row] * by_col[1 - q, col]
             a, b = total[g, line, col], total[h, line, col]
-            whole = a + b
+            voxel_sum = a + b
             if variance.size:
-                inverse, other = 1 / max(n, 1), 1 / max(m, 1)
-                squared = _deviations(a, squares[g, line, col], inverse) + _deviations(
-                    b, squares[h, line, col], other
+                inverse_n, inverse_m = 1 / max(n, 1), 1 / max(m, 1)
+                squared = _deviations(a, squares[g, line, col], inverse_n) + _deviations(
+                    b, squares[h, line, col], inverse_m
                 )
-                here = first[g, line, col] if n > 0 else 0.0
-                across = first[h, line, col] if m > 0 else 0.0
-                apart = (across - here) + (b * other - a * inverse)
-                squared += apart * apart * (n * m / max(n + m, 1))
+                first_n = first[g, line, col] if n > 0 else 0.0
+                first_m = first[h, line, col] if m > 0 else 0.0
+                difference = (first_m - first_n) + (b * inverse_m - a * inverse_n)
+                squared += difference * difference * (n * m / max(n + m, 1))
                 variance[line, col, 1] = squared / max(n + m - 1, 1)
-                whole += here * n + across * m
-            sums[line, col, 1] = whole
+                voxel_sum += first_n * n + first_m * m
+            sums[line, col, 1] = voxel_sum
 
 
 @helper
