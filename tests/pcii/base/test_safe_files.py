@@ -104,7 +104,7 @@ def test_one_writer_at_a_time(tmp_path):
         second.__enter__()
 
 
-def test_whoever_waited_for_a_lock_that_was_deleted_holds_a_new_one(tmp_path):
+def test_a_process_that_waited_for_a_lock_that_was_deleted_holds_a_new_one(tmp_path):
     path, order = tmp_path / "lock", []
 
     def waits():

@@ -106,8 +106,8 @@ def test_planes_of_a_total_disparity_are_those_of_its_depth(grid, z):
     if planes.total_disparity_px[0] > 0:
         again = FocalPlanes.at_total_disparity(grid, planes.total_disparity_px)
         np.testing.assert_allclose(again.z_mm, planes.z_mm, rtol=1e-14)  # two divisions
-        for one, other in zip(again.exact_shifts_px, planes.exact_shifts_px, strict=True):
-            np.testing.assert_allclose(one, other, atol=1e-9)
+        for repeated, expected in zip(again.exact_shifts_px, planes.exact_shifts_px, strict=True):
+            np.testing.assert_allclose(repeated, expected, atol=1e-9)
 
 
 def test_planes_are_taken_and_followed_by_others_in_the_order_asked_for():
@@ -138,7 +138,7 @@ def test_a_plane_whose_shifts_no_integer_holds_is_refused():
         FocalPlanes.at_depths(paper_grid(), [540.0, 1e-9])
 
 
-def test_far_beside_a_finely_divided_section_nothing_wraps_around():
+def test_indices_far_outside_a_section_of_fine_voxels_do_not_overflow():
     # Shifts of 1.6e9 px at the outer cameras: four subpixels of each exceed 32 bits.
     grid = unit_grid(1, 3, 4, 4)
     rows, cols = FocalPlanes.at_depths(grid, 1 / 1.4e9 * 2).voxel_indices(4)

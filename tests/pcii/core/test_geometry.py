@@ -99,8 +99,8 @@ def test_blur_is_half_of_where_the_cameras_scatter_a_point(grid, z, z0):
     extents = []
     shifts_at_z0 = disparity_px(grid, z0)
     for axis, (cameras, d0) in enumerate(zip((grid.cols, grid.rows), shifts_at_z0, strict=True)):
-        seen = [project_px(grid, (0, 0, z), n, n)[1 - axis] for n in range(cameras)]
-        placed = [p + (n - (cameras - 1) / 2) * float(d0) for n, p in enumerate(seen)]
+        columns = [project_px(grid, (0, 0, z), n, n)[1 - axis] for n in range(cameras)]
+        placed = [p + (n - (cameras - 1) / 2) * float(d0) for n, p in enumerate(columns)]
         extents.append((max(placed) - min(placed)) / 2)
     # Positions up to 1e4 px, each rounded at 2^-53 relative: 1e-11 px with room to spare.
     assert float(blur_half_extent_px(grid, z, z0)) == pytest.approx(max(extents), abs=1e-10)

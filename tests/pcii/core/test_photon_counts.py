@@ -37,7 +37,7 @@ def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
     from_dense = PhotonCounts.from_dense(dense, grid, cfa="GRBG")
     where = np.random.default_rng(shuffle).permutation(np.argwhere(dense))
     n = dense[tuple(where.T)]
-    # Photons of a pixel told one by one are the same counts.
+    # Photons of a pixel given as separate events are the same counts.
     single = np.repeat(where, n, axis=0)
     for rows, photons in ((where, n), (single, np.ones(len(single), dtype=int))):
         sparse = PhotonCounts.from_events(*rows.T, photons, grid, cfa="GRBG")

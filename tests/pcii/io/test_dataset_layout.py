@@ -1,4 +1,4 @@
-"""Datasets on disk: what comes back, what is refused."""
+"""Datasets on disk: what is read back, and which faults are errors."""
 
 import numpy as np
 import pytest
@@ -130,7 +130,7 @@ def test_a_file_that_the_manifest_does_not_list_is_refused(tmp_path):
 # Manifests
 
 
-def test_no_folder_and_no_manifest_are_told_apart(tmp_path):
+def test_a_missing_folder_and_a_missing_manifest_have_different_errors(tmp_path):
     assert "no such dataset folder" in one_sentence(lambda: open_dataset(tmp_path / "no"), tmp_path / "no")
     assert "not a finished dataset" in one_sentence(lambda: open_dataset(tmp_path), tmp_path)
 

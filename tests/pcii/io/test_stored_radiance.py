@@ -54,7 +54,7 @@ def test_what_is_on_disk_is_not_in_memory_without_a_copy(views: Views) -> None:
 
 
 @pytest.mark.parametrize("index", [0, (0,), (0, 1, 2), (2, 0), (0, -1), (slice(None), 0), ..., (0, 0.5)])
-def test_other_indices_are_told_how(views: Views, index: object) -> None:
+def test_an_error_for_other_indices_says_how_to_read_views(views: Views, index: object) -> None:
     with pytest.raises(InputError, match=r"radiance: read one view of 2 x 2 by \[k, l\], or all by numpy"):
         views.radiance[index]
 

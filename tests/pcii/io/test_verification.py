@@ -68,7 +68,7 @@ def test_every_damage_to_every_file_is_found(
         shutil.rmtree(broken)
 
 
-def test_several_faults_are_counted_and_the_first_is_told(tmp_path: Path) -> None:
+def test_several_faults_are_counted_and_the_first_is_described(tmp_path: Path) -> None:
     root = make_dataset(tmp_path / "d")
     names = sorted(path for path in (root / "radiance").iterdir())
     for path in names[:3]:

@@ -94,7 +94,7 @@ def test_eq_6_blue_at_a_red_pixel_is_the_diagonal_mean():
 
 
 def test_eq_6_follows_green_at_the_pixel_itself():
-    # Green differs at 33 alone; the greens at 32 and 34 are told vertically (alpha > beta) and stay 10.
+    # Green differs at 33 alone; the greens at 32 and 34 are vertical means (alpha > beta) and stay 10.
     raw = on_flat_green((12, 30), (32, 30), (52, 30), (14, 50), (34, 50), (54, 50))
     raw[2, 2] = 18
     assert demosaic(raw)[2, 2].tolist()[:2] == [(20 + 40) / 2 + 18, 18]
@@ -217,8 +217,10 @@ def test_every_method_keeps_its_sites_and_a_grey_image(method, cfa):
     rng = np.random.default_rng(1)
     raw = rng.random((12, 15))
     image = demosaic(raw, cfa=cfa, method=method)
-    own = np.take_along_axis(image, colour_index(12, 15, cfa)[..., None].astype(np.int64), axis=2)[..., 0]
-    np.testing.assert_allclose(own, raw, rtol=1e-12)
+    at_sites = np.take_along_axis(image, colour_index(12, 15, cfa)[..., None].astype(np.int64), axis=2)[
+        ..., 0
+    ]
+    np.testing.assert_allclose(at_sites, raw, rtol=1e-12)
     np.testing.assert_allclose(demosaic(np.full((9, 8), 0.3), cfa=cfa, method=method), 0.3, rtol=1e-12)
 
 

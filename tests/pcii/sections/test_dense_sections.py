@@ -76,19 +76,19 @@ def test_sums_and_variances_are_those_of_the_samples(
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("spread", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("relative_std", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_variance_survives_a_mean_of_a_million_deviations(cfa, spread, dtype) -> None:
+def test_variance_survives_a_mean_of_a_million_deviations(cfa, relative_std, dtype) -> None:
     grid = unit_grid(10, 10, 6, 6, (1.0, 1.0))
     rng = np.random.default_rng(5)
-    images = (7 * (1 + spread * rng.standard_normal((*grid.shape_KLHW, 1)))).astype(dtype)
+    images = (7 * (1 + relative_std * rng.standard_normal((*grid.shape_KLHW, 1)))).astype(dtype)
     sections = reconstruct(Views(images.astype(np.float64), grid, cfa), 1e6, variance=True)
     # At this depth nothing moves, so voxel (i, j) holds pixel (i, j) of every view.
     exact = images[..., 0].astype(np.longdouble).reshape(100, 6, 6).var(axis=0, ddof=1)
     assert sections.variance is not None
     found = sections.variance[0].max(axis=-1)
     np.testing.assert_allclose(found, exact.astype(float), rtol=1e-6)
-    if dtype == np.float32 and spread == 1e-6:  # the fault: mean of squares less square of mean
+    if dtype == np.float32 and relative_std == 1e-6:  # the fault: mean of squares less square of mean
         pixels = images[..., 0].reshape(100, 6, 6)
         one_pass = (pixels**2).mean(axis=0) - pixels.mean(axis=0) ** 2
         assert not np.allclose(one_pass * 100 / 99, exact.astype(float), rtol=0.5)
@@ -191,7 +191,7 @@ def test_bilinear_shifts_share_each_sample_among_four_voxels(cameras, pixels, pi
         top, left = int(np.floor(row)), int(np.floor(col))
         for a, b in np.ndindex(2, 2):
             share = abs(1 - a - (row - top)) * abs(1 - b - (col - left))
-            voxel = (top + a, left + b, colour_of(i, j, cfa))  # what is beside the section goes to the rest
+            voxel = (top + a, left + b, colour_of(i, j, cfa))  # pixels outside the section go to the rest
             sums[voxel] += share * images[k, l, i, j, 0]
             shares[voxel] += share
     for views in (images, Reader(images)):

@@ -193,10 +193,10 @@ def non_zero_moments(rate: float) -> tuple[float, float, float]:
     """P(C >= 1), mean and variance of the non-zero samples, by adding up the probabilities."""
     last = int(rate + 40 * math.sqrt(rate) + 40)
     p = [math.exp(c * math.log(rate) - rate - math.lgamma(c + 1)) for c in range(1, last)]
-    seen = math.fsum(p)
-    mean = math.fsum(c * q for c, q in enumerate(p, start=1)) / seen
-    variance = math.fsum((c - mean) ** 2 * q for c, q in enumerate(p, start=1)) / seen
-    return seen, mean, variance
+    non_zero = math.fsum(p)
+    mean = math.fsum(c * q for c, q in enumerate(p, start=1)) / non_zero
+    variance = math.fsum((c - mean) ** 2 * q for c, q in enumerate(p, start=1)) / non_zero
+    return non_zero, mean, variance
 
 
 @pytest.mark.parametrize("rate", [1e-4, 0.01, 0.34, 1.0, 1.59, 2.5, 7.0, 40.0, 300.0])
@@ -233,10 +233,10 @@ def test_the_truncated_variance_grows_with_the_mean_and_stays_below_it(means):
 
 
 def test_the_papers_chance_of_two_photons_is_0_0462():
-    seen, mean, _ = non_zero_moments(PAPER_RATE)
-    two_or_more = seen - PAPER_RATE * math.exp(-PAPER_RATE)
+    non_zero, mean, _ = non_zero_moments(PAPER_RATE)
+    two_or_more = non_zero - PAPER_RATE * math.exp(-PAPER_RATE)
     assert two_or_more == pytest.approx(0.0462, abs=0.5e-4)  # half a unit of the paper's last digit
-    assert mean == pytest.approx(PAPER_RATE / seen, rel=1e-12)  # one division
+    assert mean == pytest.approx(PAPER_RATE / non_zero, rel=1e-12)  # one division
 
 
 def test_voxels_of_a_section_hold_two_photons_as_often_as_the_paper_says():
@@ -264,7 +264,7 @@ def test_samples_of_a_flat_scene_have_the_variance_of_poisson_noise():
     flat = rng.poisson(PAPER_RATE / 16, size=grid.shape_KLHW)  # 4 x 4 pixels a cell
     mean, error = variance_excess(flat, grid)
     assert abs(mean - 1) < 4 * error  # the variance is unbiased for any number of samples; 400 cells
-    # The planted fault: views that see different things, half of them twice as much.
+    # The planted fault: views of different surfaces, half of them twice as bright.
     brighter = np.where(np.arange(8) % 2, 1.6, 0.4)[:, None, None, None]
     uneven = rng.poisson(PAPER_RATE / 16 * brighter, size=grid.shape_KLHW)
     mean, error = variance_excess(uneven, grid)

@@ -88,7 +88,7 @@ def test_the_view_from_below_moves_down_by_hand():
 
 
 def test_colours_never_mix_by_hand():
-    grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # odd shifts: green lands on red
+    grid = unit_grid(1, 2, 1, 4, pitch_mm=(2.0, 1.0))  # odd shifts: green falls on red
     dense = np.array([[[[1, 10, 2, 20]], [[3, 30, 4, 40]]]])  # G R G R
     red, green, blue = np.moveaxis(reconstruct(photons(dense, grid, "GRBG"), 1.0).counts[0, 0], -1, 0)
     assert red.tolist() == [10, 0, 20 + 30, 0]
@@ -161,10 +161,10 @@ def test_events_and_dense_counts_give_the_same_sections(grid, cfa, z, subpixel, 
     dense = random_counts(grid, seed, rate=0.3)
     k, l, i, j = np.nonzero(dense)
     sparse = PhotonCounts.from_events(k, l, i, j, dense[k, l, i, j], grid, cfa=cfa)
-    one = reconstruct(sparse, z, subpixel=subpixel)
-    other = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
-    np.testing.assert_array_equal(one.counts, other.counts)
-    np.testing.assert_array_equal(one.coverage, other.coverage)
+    from_events = reconstruct(sparse, z, subpixel=subpixel)
+    from_dense = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
+    np.testing.assert_array_equal(from_events.counts, from_dense.counts)
+    np.testing.assert_array_equal(from_events.coverage, from_dense.coverage)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.uint32, np.int64])
@@ -241,8 +241,8 @@ def test_a_subpixel_division_may_come_from_an_array():
 
 
 def test_an_unknown_normalisation_is_refused():
-    grid, other = unit_grid(1, 1, 2, 2), "sum"
-    unknown: Any = other
+    grid = unit_grid(1, 1, 2, 2)
+    unknown: Any = "sum"
     with pytest.raises(InputError, match=r"^normalisation: use 'overlap' or 'views'"):
         reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), 1.0, normalisation=unknown)
 
@@ -260,8 +260,8 @@ def test_no_photons_give_zeros(cfa):
 
 def test_one_photon_gives_one_voxel_of_its_colour():
     grid = unit_grid(3, 3, 9, 9)
-    one = PhotonCounts.from_events(*np.array([[2], [0], [4], [3], [1]]), grid, cfa="GRBG")
-    sections = reconstruct(one, 1.0)
+    single = PhotonCounts.from_events(*np.array([[2], [0], [4], [3], [1]]), grid, cfa="GRBG")
+    sections = reconstruct(single, 1.0)
     # Camera (2, 0) is lower and further left: it moves by (+1, -1). Pixel (4, 3) is red.
     assert np.argwhere(sections.counts).tolist() == [[0, 5, 2, 0]]
     assert sections.counts.sum() == 1
@@ -293,7 +293,7 @@ def views_of_a_plane(
     picture = np.random.default_rng(seed).integers(0, 256, size=(H + 2 * margin, W + 2 * margin, 3))
 
     def crop(k: float, l: float) -> np.ndarray:
-        # A camera further right looks at a part of the picture that lies further right.
+        # A camera further right has a field of view further right.
         top = margin + int((k - (K - 1) / 2) * disparity_px[1])
         left = margin + int((l - (L - 1) / 2) * disparity_px[0])
         return picture[top : top + H, left : left + W]
@@ -306,15 +306,15 @@ def views_of_a_plane(
 @pytest.mark.parametrize(("shape", "disparity"), [((3, 5, 20, 21), (3, 2)), ((4, 2, 21, 20), (6, 2))])
 def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, disparity):
     grid = unit_grid(*shape, pitch_mm=(float(disparity[0]), float(disparity[1])))
-    seen, pattern = views_of_a_plane(grid, disparity, seed=3)
-    views = Views(seen, grid) if cfa is None else Views(mosaic(seen, cfa)[..., None], grid, cfa)
+    images, pattern = views_of_a_plane(grid, disparity, seed=3)
+    views = Views(images, grid) if cfa is None else Views(mosaic(images, cfa)[..., None], grid, cfa)
     sections = reconstruct(views, [1.0, 0.5, 2.0])
     covered = sections.coverage > 0
     np.testing.assert_array_equal(sections.estimate[0], np.where(covered[0], pattern, 0))
     assert covered[0].any(axis=-1).mean() > 0.5
-    for other in (1, 2):
+    for plane in (1, 2):
         # The mean of at least two unrelated bytes is rarely the right byte.
-        wrong = (sections.estimate[other] != pattern)[sections.coverage[other] > 1]
+        wrong = (sections.estimate[plane] != pattern)[sections.coverage[plane] > 1]
         assert wrong.mean() > 0.9
 
 
@@ -323,8 +323,8 @@ def test_a_plane_is_exact_at_its_depth_and_nowhere_else(cfa, shape, disparity):
 def test_a_plane_is_exact_in_a_sheared_grid(cfa, shear):
     # At z = 1 the parallax is (3, 2): the first shear makes the plane stand still, the last turns it round.
     grid = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0), shear_px=shear)
-    seen, pattern = views_of_a_plane(grid, (3 - int(shear[0]), 2 - int(shear[1])), seed=4)
-    views = Views(seen, grid) if cfa is None else Views(mosaic(seen, cfa)[..., None], grid, cfa)
+    images, pattern = views_of_a_plane(grid, (3 - int(shear[0]), 2 - int(shear[1])), seed=4)
+    views = Views(images, grid) if cfa is None else Views(mosaic(images, cfa)[..., None], grid, cfa)
     sections = reconstruct(views, [1.0, 0.25])
     covered = sections.coverage > 0
     np.testing.assert_array_equal(sections.estimate[0], np.where(covered[0], pattern, 0))
@@ -346,8 +346,8 @@ def test_a_mirrored_scene_gives_mirrored_sections(axis, cfa, subpixel):
     dense = random_counts(grid, seed=8)
     plain = reconstruct(photons(dense, grid, cfa), 1.0, subpixel=subpixel).counts
     mirrored = np.flip(dense, axis=(axis, axis + 2))
-    other = reconstruct(photons(mirrored, grid, cfa), 1.0, subpixel=subpixel).counts
-    np.testing.assert_array_equal(np.flip(other, axis=axis + 1), plain)
+    flipped = reconstruct(photons(mirrored, grid, cfa), 1.0, subpixel=subpixel).counts
+    np.testing.assert_array_equal(np.flip(flipped, axis=axis + 1), plain)
 
 
 def test_the_estimate_is_the_rate_of_the_photons():
@@ -359,7 +359,7 @@ def test_the_estimate_is_the_rate_of_the_photons():
     # The sum is Poisson, so its mean has the standard error sqrt(rate / samples); 4 of them.
     tolerance = 4 * np.sqrt(rates[0, 0, 0, 0] / samples)
     assert np.all(np.abs(mean - [0.2, 0.5, 1.1]) < tolerance)
-    # The planted fault: with green and red exchanged this would be seen.
+    # The planted fault: with green and red exchanged the comparison fails.
     assert not np.all(np.abs(mean - [0.5, 0.2, 1.1]) < tolerance)
 
 
