@@ -45,7 +45,8 @@ def windows_within_edges(
 
     `picture` (Z, C, H, W) is the section at each plane; a step in it of more than `noise` lengthens the
     distance to the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira
-    2011."""
+    2011.
+    """
     Z, H, W = narrow.shape
     for z in nb.prange(Z):
         distance = np.ones((2, H, W), np.float32)

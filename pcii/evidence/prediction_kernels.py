@@ -141,7 +141,8 @@ def _predict_cells(
 
     Mean over blocks, in each of which rates are linear, weighted by the views that cover it: so `samples`
     times `mean` is the sum of the rates that `_predict_events` gives the pixels of the cell, wherever events
-    are. If `sharp`, coarser scales are evaluated at the centre of the cell instead, as in a picture."""
+    are. If `sharp`, coarser scales are evaluated at the centre of the cell instead, as in a picture.
+    """
     prior = section.prior_samples
     views_at, photons_at, _, mean_rate, by_row, by_col = scales
     _, _, samples, mean, blurred = predicted
@@ -203,7 +204,8 @@ def predict_shared(
 
     Rates of cells are those at their centres: sharper, but not the mean over their pixels. Only cells in the
     rows `cell_rows`, (first, last + 1), are written. With `finest` = BASE_SCALE only the widest window is
-    computed: `base` and `blurred` are valid, `rate` and `mean` are not."""
+    computed: `base` and `blurred` are valid, `rate` and `mean` are not.
+    """
     N, (first, last) = events.k.size, cell_rows
     scales = _scales(events, section, finest)
     for chunk in nb.prange(chunks):

@@ -48,7 +48,8 @@ def cells_of_events(
     """Writes to `cell` (N,) the flat index of the cell of each event, -1 outside its view's blocks.
 
     Events at pixels (`i`, `j`) of cameras (`k`, `l`); whole shifts `rows` (K,) and `cols` (L,) in px; `size`
-    of the film in px."""
+    of the film in px.
+    """
     H, W = size
     across = -(-W // CELL_PX)
     for e in range(k.size):

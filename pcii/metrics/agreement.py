@@ -41,7 +41,8 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
     A photon is kept if `photon_in_focus` has its event or, without that, if the voxel of the section that it
     is projected to is in the mask. It is rightly kept if its object belongs to the plane (`kind` "object"),
     or if its first hit is in focus there ("pixel"). Photons projected outside the section do not count.
-    Raises `InputError` if `photon_in_focus` has another number of events than the truth."""
+    Raises `InputError` if `photon_in_focus` has another number of events than the truth.
+    """
     if truth is None or truth.photons is None:
         return {"photon_precision": None, "photon_recall": None}
     grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]

@@ -127,7 +127,8 @@ def object_bounds(
 
     The texture is that of the full-light section at the object's plane, where the object is in focus there
     and away from its edges. Photons are counted by origin if the truth has it, else in the object's pixels of
-    the photon section. `depth_sigma_px` is None without full light, texture or photons."""
+    the photon section. `depth_sigma_px` is None without full light, texture or photons.
+    """
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):
         photons = _photons(number, truth, sections)

@@ -2,7 +2,8 @@
 
 Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated. A
 pixel without an estimate counts as bad in every share. Means and quantiles are of the pixels with an
-estimate, whose share is given beside them."""
+estimate, whose share is given beside them.
+"""
 
 from typing import Any
 

@@ -2,7 +2,8 @@
 
 Each uses a single cue, in windows whose size follows from the number of photons. All work on the square root
 of the photons in a window, whose noise does not depend on the brightness (see
-`pcii.imaging.bright_regions.brightness`)."""
+`pcii.imaging.bright_regions.brightness`).
+"""
 
 import numpy as np
 
@@ -60,7 +61,8 @@ def shape_from_focus(counts: PhotonCounts, sections: Sections) -> Segmented:
 
     Nayar and Nakagawa 1994: sharpness is the modified Laplacian |2 I - I(left) - I(right)| + |2 I - I(above)
     - I(below)|, one pooling window apart, summed over a window where it exceeds its noise. `steps` holds
-    `bright` and `sharpness`."""
+    `bright` and `sharpness`.
+    """
     compared = extend(sections, counts, with_probes(sections.planes))
     window_px = section_window_px(compared)
     image = _root_photons(compared, window_px)

@@ -3,7 +3,8 @@
 The paper does not say of which quantity h in Eq. 9 is the histogram. Here h is the share of the region's edge
 energy |G|^2 (step 2) in each pixel. In focus the energy is concentrated in few strong edges, so the entropy
 is low; out of focus the same edges are weak and wide, and photon noise remains, which is uniform.
-docs/experiments/three_step.md compares this with grey levels and with the photons' places."""
+docs/experiments/three_step.md compares this with grey levels and with the photons' places.
+"""
 
 import numpy as np
 

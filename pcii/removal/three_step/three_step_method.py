@@ -164,7 +164,8 @@ def adaptive_threshold(
     sqrt(2 / (n - 1)) for n samples, plus the variance due to the slope of the section, over shifts that a
     surface in focus may have: `tolerance_px` either way and the rounding to whole pixels, both uniform.
     Points with fewer than `FEWEST_SAMPLES` are kept, and so are rejected regions smaller than a window of
-    cells."""
+    cells.
+    """
     samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
     limit = _threshold(samples, cell_px, tolerance_px)
     known = samples.number >= FEWEST_SAMPLES

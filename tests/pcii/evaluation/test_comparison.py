@@ -21,7 +21,7 @@ from pcii.core.estimates import DepthMap
 from pcii.evaluation.comparison import evaluate, find_datasets
 from pcii.evaluation.rows import ROWS, all_rows, append_row, claim_rows
 from pcii.evaluation.summary import summarise
-from pcii.evaluation.tables import markdown, overview, told
+from pcii.evaluation.tables import markdown, overview, with_interval
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
 from pcii.removal.methods import METHODS
@@ -372,7 +372,7 @@ def test_the_command_and_its_page(
     assert "://" not in page
     assert str(tmp_path) not in page
     assert "0.850 (0.726 to 0.974)" in page
-    assert "IoU of as told is worse with 50 photons than with 20" in page
+    assert "IoU of as told is lower with 50 photons than with 20" in page
     assert len(rows_of(out)) == 12
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
     assert command_line.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
@@ -392,6 +392,6 @@ def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str
 
 
 def test_means_are_told_with_their_interval() -> None:
-    assert told(None) == "–"
-    assert told({"mean": 0.5, "interval": None}) == "0.500"
-    assert told({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"
+    assert with_interval(None) == "–"
+    assert with_interval({"mean": 0.5, "interval": None}) == "0.500"
+    assert with_interval({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"
