@@ -20,8 +20,6 @@ app = App(
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
-
-
 Subpixel = Annotated[int, Parameter(converter=command_line.whole)]
 Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
 Budget = Annotated[
