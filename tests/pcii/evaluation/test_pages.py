@@ -130,11 +130,11 @@ def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Ou
 def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None:
     texts = Read(pages["evaluation.html"]).texts
     for name in NAMES:
-        told = visible(name)
-        assert told in texts  # method, object
-        for scene in (told, "other"):
-            assert texts.count(f"{told} (scene={scene})") == 1 + 2  # heading, and by method in the overview
-        assert f"IoU of {told} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
+        shown = visible(name)
+        assert shown in texts  # method, object
+        for scene in (shown, "other"):
+            assert texts.count(f"{shown} (scene={scene})") == 1 + 2  # heading, and by method in the overview
+        assert f"IoU of {shown} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
