@@ -105,7 +105,7 @@ def _table1(objects: tuple[Mapping[str, Any], ...]) -> list[dict[str, Any]]:
 def table1_holds(
     objects: tuple[Mapping[str, Any], ...], planes: tuple[Mapping[str, Any], ...]
 ) -> bool | None:
-    """Whether each object's entropy is lowest at the plane it belongs to; None if no object has two planes to compare."""
+    """Whether each object's entropy is lowest at its plane; None if none has two planes to compare."""
     plane_of = object_planes(planes)
     verdicts: list[bool] = []
     for row in objects:

@@ -108,6 +108,6 @@ def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
 )
 def test_nonsense_is_told_in_one_sentence(tmp_path, monkeypatch, name, sentence):
     install(tmp_path, monkeypatch, **{name: f"strange_code:{name}"})
-    told = name.replace("_", "-")
-    with pytest.raises(InputError, match=rf"^method: '{told}' of the package strange {sentence}"):
-        segment(counts(), 1.0, method=told)
+    method = name.replace("_", "-")
+    with pytest.raises(InputError, match=rf"^method: '{method}' of the package strange {sentence}"):
+        segment(counts(), 1.0, method=method)
