@@ -105,7 +105,9 @@ def test_methods_are_compared_on_the_same_datasets(series: Path, tmp_path: Path,
     assert nested["difference"]["interval"] == pytest.approx([1 - 10 / 48] * 2)
 
 
-def test_more_photons_that_make_it_worse_are_told(series: Path, tmp_path: Path, calls: list[str]) -> None:
+def test_a_significant_fall_with_more_photons_is_listed(
+    series: Path, tmp_path: Path, calls: list[str]
+) -> None:
     (group,) = evaluate([series], tmp_path / "out", methods=FAKES)["groups"]
     # From 1 to 0.8, 0.9, 0.85: -0.15, half width 4.302653 * 0.05 / sqrt(3) = 0.124207. "two rows" stays.
     (fall,) = group["monotonic"]
@@ -114,7 +116,7 @@ def test_more_photons_that_make_it_worse_are_told(series: Path, tmp_path: Path, 
     assert fall["difference"]["interval"] == pytest.approx([-0.274207, -0.025793], abs=1e-6)
 
 
-def test_a_fall_that_the_interval_explains_is_not_told(tmp_path: Path, calls: list[str]) -> None:
+def test_an_insignificant_fall_is_not_listed(tmp_path: Path, calls: list[str]) -> None:
     for seed, hits in ((1, 5), (2, 9)):  # -0.25 and -0.05: half width 12.7 * 0.1
         write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {NESTED: 10, OWN: hits})
     (group,) = evaluate([tmp_path / "data"], tmp_path / "out", methods=FAKES)["groups"]
@@ -143,11 +145,13 @@ def change_recipe(dataset: Path, **settings: Any) -> None:
     write_manifest(dataset, manifest)
 
 
-def test_groups_of_one_title_are_told_by_what_differs(tmp_path: Path, calls: list[str]) -> None:
+def test_groups_of_one_title_are_labelled_by_the_settings_that_differ(
+    tmp_path: Path, calls: list[str]
+) -> None:
     data = [write_dataset(tmp_path / f"data {number}", 1, {OWN: 2 + number}) for number in range(4)]
     change_recipe(data[1], scene="another", grid={"rows": 4}, exposure=None)
     change_recipe(data[2], scene="another", grid={"rows": 6}, exposure={"time_s": 1.0})
-    change_recipe(data[3], title="of its own")  # which `title` of the manifest does not tell
+    change_recipe(data[3], title="of its own")  # the manifest's `title` stays the same
     other = write_dataset(tmp_path / "other", 1, {OWN: 9}, title="other")
     evaluation = evaluate([*data, other], tmp_path / "out", methods=["by count"])
     table = overview(evaluation["groups"])
@@ -228,7 +232,7 @@ def test_table_1_is_counted_over_seeds() -> None:
     assert bird["mean_gap_bits"] == pytest.approx(0.5 / 3)
 
 
-def test_a_depth_map_without_answers_is_told_as_such(
+def test_a_depth_map_without_estimates_is_reported_as_such(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing = DepthMap(np.full((8, 12), np.nan), np.zeros((8, 12)))
@@ -391,7 +395,7 @@ def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str
     assert r"| ball \| bird | by count | – | 0.750 |" in lines
 
 
-def test_means_are_told_with_their_interval() -> None:
+def test_means_are_shown_with_their_interval() -> None:
     assert with_interval(None) == "–"
     assert with_interval({"mean": 0.5, "interval": None}) == "0.500"
     assert with_interval({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"
