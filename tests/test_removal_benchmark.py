@@ -72,8 +72,8 @@ def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict
         }
         for (budget, method), mean in ious.items()
     ]
-    told = {"datasets": 2, "results": results, "paired": [], "monotonic": [], "table1": []}
-    return {"recipe": recipe, "title": title, "label": title, "scene": title, **told}
+    common = {"datasets": 2, "results": results, "paired": [], "monotonic": [], "table1": []}
+    return {"recipe": recipe, "title": title, "label": title, "scene": title, **common}
 
 
 GROUPS = [

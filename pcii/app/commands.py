@@ -14,19 +14,17 @@ from pcii.io.dataset import Dataset, open_dataset
 
 app = App(
     name="pcii",
-    help="Reconstruct photon-counted integral images, remove what is out of focus, and score it.",
+    help="Reconstruct photon-counted integral images, remove defocused points, and score the result.",
     version=lambda: version("photon-integral-imaging"),
 )
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
-
-
 Subpixel = Annotated[int, Parameter(converter=command_line.whole)]
 Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
 Budget = Annotated[
     float | None,
-    Parameter(help="Take the photons of this smaller budget, one that the recipe nests in its own."),
+    Parameter(help="Use the photons of this smaller, nested budget of the recipe."),
 ]
 
 
@@ -39,7 +37,7 @@ def _open(dataset: Path, budget: float | None) -> Dataset:
 def run(
     dataset: Path, *, out: Out, z_mm: Depths = (), method: tuple[str, ...] = (), budget: Budget = None
 ) -> None:
-    """Do everything with one dataset: sections, removal by each method, depth, scores, report.html.
+    """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
     Example:  pcii run out/paper -o out/paper-results
 
@@ -52,7 +50,7 @@ def run(
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     method
-        A removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
+        A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     """
     from pcii.app.single_run import run as run_all
     from pcii.removal.methods import DEFAULT_METHODS
@@ -129,12 +127,12 @@ def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
 
     data = _open(dataset, budget)
     z_range = depth_range_of(data)
-    found = estimate_depth(data.counts, z_range)
+    depth_map = estimate_depth(data.counts, z_range)
     with Results(out, data).writing() as results:
-        say(f"{results.save_depth(found)}")
+        say(f"{results.save_depth(depth_map)}")
         with results.replacing("depth.png") as path:
-            write_png(path, depth_image(found.z_mm, *z_range))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm yellow to {z_range[1]:g} mm violet, black no answer")
+            write_png(path, depth_image(depth_map.z_mm, *z_range))
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, black without estimate")
 
 
 @app.command
@@ -163,8 +161,8 @@ def segment(
     z_mm
         Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
     method
-        three-step (the paper's), likelihood (Poisson), brightness, variance or shape-from-focus (to compare
-        with), or a method that an installed package brings.
+        three-step (of the paper), likelihood (Poisson), brightness, variance or shape-from-focus (for
+        comparison), or a method that an installed package registers.
     without
         Leave out one of the three steps; repeat for more.
     subpixel
@@ -195,7 +193,7 @@ def segment(
 
 @app.command
 def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
-    """Compare the results in a folder with the dataset's truth; writes score.json there.
+    """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
     Example:  pcii score out/paper out/paper-results
 
@@ -216,19 +214,19 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         raise InputError(f"{out}: there is no such folder of results")
     results = Results(out, data)
     results.check()
-    focus, found = results.load_segmented(), results.load_depth()
-    if not focus and found is None:
+    focus, depth_map = results.load_segmented(), results.load_depth()
+    if not focus and depth_map is None:
         steps = "`pcii segment`, `pcii depth` or `pcii run`"
-        raise InputError(f"{out}: holds neither in-focus masks nor a depth map; make them with {steps}")
-    named = data.analysis.get("z_mm")
-    planes = FocalPlanes.at_depths(data.grid, named) if named else None
+        raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with {steps}")
+    z_mm = data.analysis.get("z_mm")
+    planes = FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
     if focus:
         planes = focus[0].sections.planes
-    light = None
+    full_light = None
     if data.truth is not None and planes is not None:
         with Stages() as report:
-            light = full_light_sections(data, planes, report)
-    result = compare(focus, found, data.truth, grid=data.grid, full_light=light, dataset=data.name)
+            full_light = full_light_sections(data, planes, report)
+    result = compare(focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name)
     with results.writing():
         say(f"{results.save_score(result)}")
 
@@ -242,9 +240,10 @@ def evaluate(
     budget: Annotated[tuple[float, ...], Parameter(negative=())] = (),
     part: str = "1/1",
 ) -> None:
-    """Compare methods over datasets and photon budgets, with intervals over seeds; run again to go on.
+    """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
-    Writes evaluation.json, evaluation.html and evaluation.md, and rows.jsonl as it goes.
+    Writes evaluation.json, evaluation.html and evaluation.md, and each score, as it is measured, to
+    rows.jsonl.
 
     Examples:
 
@@ -255,15 +254,15 @@ def evaluate(
     Parameters
     ----------
     datasets
-        Dataset folders, or folders of such, as made by `simgen generate --seeds`.
+        Dataset folders, or folders of dataset folders, as made by `simgen generate --seeds`.
     out
-        Folder for the evaluation: new, empty, or that of an earlier one, which is added to.
+        Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
         A method of removal, or "depth"; may be repeated. Default: all.
     budget
         A photon budget that every dataset has; may be repeated. Default: all that each has.
     part
-        i/n: measure only every n-th dataset from the i-th on, so that n processes share one OUT.
+        i/n: score only every n-th dataset from the i-th, so that n processes can share one OUT.
     """
     from pcii.evaluation.comparison import evaluate as compare
     from pcii.evaluation.comparison import part_of
@@ -286,7 +285,7 @@ def verify(folder: Path) -> None:
     Parameters
     ----------
     folder
-        A dataset folder, or one of results.
+        A dataset folder, or a folder of results.
     """
     from pcii.io.verification import verify as compare
 

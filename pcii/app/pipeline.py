@@ -1,4 +1,4 @@
-"""The method from dataset to score, in the order of the paper's sections 2 and 3."""
+"""Analysis of a dataset, from sections to scores, in the order of the paper's sections 2 and 3."""
 
 import time
 from collections.abc import Sequence
@@ -21,13 +21,13 @@ from pcii.sections.reconstruction import reconstruct
 
 @dataclass(frozen=True)
 class Outcome:
-    """All that a run of the method on one dataset gives."""
+    """Results of the analysis of a dataset."""
 
     dataset: Dataset
     full_light: Sections | None
-    """Eq. 2, where the dataset has radiance."""
+    """Sections of the radiance (Eq. 2), if the dataset has it."""
     sections: Sections
-    """Eq. 3, from the photon counts."""
+    """Sections of the photon counts (Eq. 3)."""
     focus: tuple[Segmented, ...]
     depth: DepthMap
     score: Score
@@ -42,8 +42,8 @@ def analyse(
 ) -> Outcome:
     """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
-    `z_mm` defaults to the depths that the dataset's recipe names. Raises `InputError` where there
-    are none, no counts, or no method of such a name.
+    `z_mm` defaults to the depths in the dataset's recipe. Raises `InputError` without depths or counts, and
+    for an unknown method.
     """
     methods = tuple(dict.fromkeys(methods))
     seconds: dict[str, float] = {}
@@ -88,12 +88,12 @@ def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = 
     views = dataset.views
     if views is None:
         return None
-    counted = _Counted(views.radiance, views.grid.view_count, report)
-    return reconstruct(Views(counted, views.grid, views.cfa), planes)
+    radiance = _ReportedRadiance(views.radiance, views.grid.view_count, report)
+    return reconstruct(Views(radiance, views.grid, views.cfa), planes)
 
 
-class _Counted:
-    """Radiance that reports each view as it is read."""
+class _ReportedRadiance:
+    """Radiance that reports progress with each view that is read."""
 
     def __init__(self, radiance: ArrayLike5D, total: int, report: Report) -> None:
         self._radiance, self._total, self._report, self._done = radiance, total, report, 0

@@ -1,6 +1,6 @@
-"""report.html: the paper's Figures 6 and 7 and Table 1 from this dataset, the truth beside them.
+"""report.html: the paper's Figures 6 and 7 and Table 1 for one dataset, with the truth beside them.
 
-One file without scripts and without anything fetched: it can be mailed, archived and printed.
+A single file without scripts or external resources, which can be mailed, archived and printed.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from pcii.base.safe_files import write_bytes_safely
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.evaluation.pages import page
-from pcii.evaluation.summary import own_planes
+from pcii.evaluation.summary import object_planes
 from pcii.imaging import pictures as picture
 from pcii.imaging.bright_regions import box_around
 from pcii.io.suggested_depths import depth_range_of
@@ -59,7 +59,7 @@ def _content(outcome: Outcome) -> dict[str, Any]:
 
 
 def _made(manifest: Mapping[str, Any], name: str, timings_s: Mapping[str, float]) -> list[tuple[str, str]]:
-    """What is known of how the dataset and this report were made."""
+    """Rows (name, value) on how the dataset and this report were made."""
     recipe, backend, photons = (manifest.get(key) or {} for key in ("recipe", "backend", "photons"))
     identity = manifest.get("identity")
     rows = [("dataset", f"{name}, identity {identity[:16]}" if identity else name)]
@@ -68,17 +68,17 @@ def _made(manifest: Mapping[str, Any], name: str, timings_s: Mapping[str, float]
         engine = f"Mitsuba {backend['mitsuba']}, {backend['variant']}"
         rows.append(("renderer", f"{engine}; {samples} samples per pixel, seed {recipe['seed']}"))
     if photons.get("method") == "thinning":
-        told = (
+        value = (
             f"drawn one by one: {photons['paths']:,} light paths for {photons['total']:,} photons, where "
             f"rendering every pixel would have taken {photons['dense_paths_instead']:,}"
         )
-        rows.append(("photons", told))
+        rows.append(("photons", value))
     elif photons.get("method") == "dense":
-        told = (
+        value = (
             f"drawn from rendered views of {photons['samples_per_pixel']} samples per pixel, whose noise "
             f"adds about {100 * photons['rendering_noise']:.2g} % to the variance of the counts"
         )
-        rows.append(("photons", told))
+        rows.append(("photons", value))
     if manifest.get("timings_s"):
         rows.append(("made in", _stages(manifest["timings_s"], 1)))
     return [
@@ -105,13 +105,13 @@ def _table1(objects: tuple[Mapping[str, Any], ...]) -> list[dict[str, Any]]:
 def table1_holds(
     objects: tuple[Mapping[str, Any], ...], planes: tuple[Mapping[str, Any], ...]
 ) -> bool | None:
-    """Whether each object's entropy is lowest at its own plane; None if that cannot be said."""
-    own = own_planes(planes)
+    """Whether each object's entropy is lowest at its plane; None if none has two planes to compare."""
+    plane_of = object_planes(planes)
     verdicts: list[bool] = []
     for row in objects:
         bits = {z: value for z, value in row["entropy"].items() if value is not None}
-        if row["name"] in own and len(bits) > 1:
-            verdicts.append(min(bits, key=lambda z: bits[z]) == own[row["name"]])
+        if row["name"] in plane_of and len(bits) > 1:
+            verdicts.append(min(bits, key=lambda z: bits[z]) == plane_of[row["name"]])
     return all(verdicts) if verdicts else None
 
 
@@ -120,7 +120,7 @@ def _panel(image: np.ndarray, box: tuple[slice, slice], caption: str) -> dict[st
 
 
 def _figure6(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
-    """(a) raw centre view, (b) demosaiced, sections at full light and from photons, one view, truth."""
+    """Panels of Figure 6: central view raw and demosaiced, sections, photons of one view, truth."""
     dataset = outcome.dataset
     k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
     letters = iter("abcdefghijklmnopqrstuvwxyz")
@@ -133,18 +133,22 @@ def _figure6(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]
         raw = picture.to_srgb8(view, white)
         panels.append(_panel(raw, box, f"({next(letters)}) view ({k}, {l}) at full light, raw"))
         if is_mosaic:
-            shown = picture.to_srgb8(colour, white)
-            panels.append(_panel(shown, box, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
+            image = picture.to_srgb8(colour, white)
+            panels.append(_panel(image, box, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
     per_view = dataset.counts.total / dataset.grid.view_count
     panels += _section_panels(outcome.full_light, box, "full light", letters)
     panels += _section_panels(outcome.sections, box, f"{per_view:.0f} photons per view", letters)
     counts = dataset.counts.view(k, l)
-    shown = picture.to_srgb8(counts.astype(np.float64), max(1.0, picture.white_level(counts, box)))
-    panels.append(_panel(shown, box, f"({next(letters)}) view ({k}, {l}) alone: {counts.sum()} photons"))
+    image = picture.to_srgb8(counts.astype(np.float64), max(1.0, picture.white_level(counts, box)))
+    panels.append(
+        _panel(image, box, f"({next(letters)}) view ({k}, {l}) at the photon budget: {counts.sum()} photons")
+    )
     if dataset.truth is not None:
         near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
-        shown = picture.depth_image(_object_depth(dataset.truth), near, far)
-        panels.append(_panel(shown, box, f"({next(letters)}) truth: depth of the objects, key below"))
+        image = picture.depth_image(_object_depth(dataset.truth), near, far)
+        panels.append(
+            _panel(image, box, f"({next(letters)}) true depth of the objects (colour scale under Depth)")
+        )
     return panels
 
 
@@ -170,7 +174,7 @@ def _section_panels(
 
 
 def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, str]]]:
-    """For each method and plane: what is left of the section, the truth, and where they differ."""
+    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison."""
     truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
     by_object = object_masks(grid, truth, z_mm) if truth else None
     by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
@@ -180,13 +184,13 @@ def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, 
         cleaned = focus.cleaned
         for plane, z in enumerate(z_mm):
             image = picture.to_srgb8(cleaned[plane], white)
-            panels = [_panel(image, box, f"{focus.method}, {z:g} mm: what is left")]
+            panels = [_panel(image, box, f"{focus.method}, {z:g} mm: after removal")]
             if by_object is not None and by_pixel is not None:
-                shown = picture.mask_image(by_object[plane])
-                shown[by_object[plane] & ~by_pixel[plane]] = 130
-                panels.append(_panel(shown, box, f"truth at {z:g} mm"))
-                shown = picture.agreement_image(focus.in_focus[plane], by_object[plane])
-                panels.append(_panel(shown, box, "compared"))
+                image = picture.mask_image(by_object[plane])
+                image[by_object[plane] & ~by_pixel[plane]] = 130
+                panels.append(_panel(image, box, f"truth at {z:g} mm"))
+                image = picture.agreement_image(focus.in_focus[plane], by_object[plane])
+                panels.append(_panel(image, box, "comparison"))
             rows.append(panels)
     return rows
 
@@ -196,8 +200,8 @@ def _depth_panels(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, 
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
     if truth is not None:
-        shown = picture.depth_image(_object_depth(truth), near, far)
-        panels.append(_panel(shown, box, "true depth of the objects"))
-    shown = picture.to_srgb8(depth.confidence**2.2, 1.0)
-    panels.append(_panel(shown, box, "confidence, black 0 to white 1"))
+        image = picture.depth_image(_object_depth(truth), near, far)
+        panels.append(_panel(image, box, "true depth of the objects"))
+    image = picture.to_srgb8(depth.confidence**2.2, 1.0)
+    panels.append(_panel(image, box, "confidence, from 0 (black) to 1 (white)"))
     return panels

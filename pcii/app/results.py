@@ -1,14 +1,15 @@
-"""The folder of results: what the commands leave behind, so that a later command can go on from it.
+"""The folder of results that commands write and later commands read.
 
 results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
 score.json               as in `Score.to_dict`
-*.png, report.html       to look at
+*.png, report.html       pictures and the report
 
-What replaces something is made whole beside it. Then the old one is taken off the list, the new one put in
-its place, and listed: a kill at any time leaves the old one, none, or the new one.
+A replacement is written completely under a temporary name. Then the old entry is removed from results.json,
+the replacement renamed, and its entry added: a kill at any time leaves the old results, none, or the new
+ones.
 """
 
 from collections.abc import Iterator, Mapping
@@ -70,12 +71,12 @@ class Results:
 
     @property
     def _origin(self) -> dict[str, Any]:
-        """What tells whose results these are."""
+        """Dataset and budget that the results belong to, as in results.json."""
         data = self.dataset
         return {"dataset": data.name, "identity": data.manifest.get("identity"), "budget": data.budget}
 
     def check(self) -> None:
-        """Raise `InputError` unless the folder is new, empty, or holds results of this dataset and budget."""
+        """Raise `InputError` unless the folder is new, empty, or has results of this dataset and budget."""
         out = self.path
         if out.exists() and not out.is_dir():
             raise InputError(f"{out}: this is a file; name a folder for the results")
@@ -93,7 +94,7 @@ class Results:
 
     @contextmanager
     def writing(self) -> Iterator["Results"]:
-        """Claim the folder, and keep other writers out of it for the length of the block."""
+        """Make the folder and lock it against other writers until the end of the block."""
         self.check()
         self.path.mkdir(parents=True, exist_ok=True)
         with locked(self.path / LOCK, wait=True):
@@ -108,33 +109,33 @@ class Results:
 
     @contextmanager
     def replacing(self, name: str) -> Iterator[Path]:
-        """Where to write the new file or folder `name`, which takes its place at the end of the block."""
-        place = self.path / name
-        with temporary_folder(place) as temporary:
+        """Path at which to write the new file or folder `name`; it is renamed at the end of the block."""
+        target = self.path / name
+        with temporary_folder(target) as temporary:
             new = temporary / name
             yield new
             files = read_results(self.path)["files"]
-            others = {path: entry for path, entry in files.items() if not lists_part([path], name)}
-            if len(others) < len(files):
-                self._list(others)
+            remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
+            if len(remaining) < len(files):
+                self._list(remaining)
             if new.is_dir():
-                replace_folder(new, place)
+                replace_folder(new, target)
             else:
-                new.replace(place)
+                new.replace(target)
                 sync_folder(self.path)
-            self._list(others | list_files(self.path, [name]))
+            self._list(remaining | list_files(self.path, [name]))
 
     def _list(self, files: Mapping[str, Any]) -> None:
         write_results(self.path, {**self._origin, "files": files})
 
     def save_sections(self, sections: Sections) -> Path:
-        """Write the sums and the coverage; the estimate is one divided by the other."""
+        """Write the counts and the coverage, whose quotient is the estimate."""
         arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
         pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
         return self._save("sections.zarr", arrays, SECTIONS_LABELS, pattern)
 
     def save_segmented(self, focus: Segmented) -> Path:
-        """Write the in-focus masks of one method, and its photons in focus if it tells them."""
+        """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
         arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
         if focus.photon_in_focus is not None:
             arrays["photon_in_focus"] = focus.photon_in_focus
@@ -164,28 +165,30 @@ class Results:
         return self.path / name
 
     def load_segmented(self) -> list[Segmented]:
-        """The in-focus masks of every method in the folder; their sections are reconstructed anew."""
+        """The in-focus masks of every method in the folder; their sections are reconstructed again."""
         files = read_results(self.path)["files"]
-        tops = {name.split("/")[0] for name in files}
-        found: list[Segmented] = []
+        groups = {name.split("/")[0] for name in files}
+        segmented: list[Segmented] = []
         sections: dict[bytes, Sections] = {}
-        for top in sorted(top for top in tops if top.startswith("segmented_") and top.endswith(".zarr")):
-            tells = lists_part(files, f"{top}/photon_in_focus")
-            names = ("z_mm", "in_focus", *(["photon_in_focus"] if tells else []))
-            arrays = {name: self._read(f"{top}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
+        for group in sorted(
+            name for name in groups if name.startswith("segmented_") and name.endswith(".zarr")
+        ):
+            has_photons = lists_part(files, f"{group}/photon_in_focus")
+            names = ("z_mm", "in_focus", *(["photon_in_focus"] if has_photons else []))
+            arrays = {name: self._read(f"{group}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
             photons = arrays.pop("photon_in_focus", None)
             if photons is not None and photons.shape[-1] != self.dataset.counts.events.n.size:
-                raise InputError(f"{self.path / top}: its photon_in_focus is of other counts; {REMEDY}")
-            method = top.removeprefix("segmented_").removesuffix(".zarr")
+                raise InputError(f"{self.path / group}: its photon_in_focus is of other counts; {REMEDY}")
+            method = group.removeprefix("segmented_").removesuffix(".zarr")
             try:
                 depths = arrays["z_mm"].tobytes()
                 if depths not in sections:
                     sections[depths] = reconstruct(self.dataset.counts, arrays["z_mm"])
                 in_focus = arrays["in_focus"]
-                found.append(Segmented(in_focus, method, sections[depths], photon_in_focus=photons))
+                segmented.append(Segmented(in_focus, method, sections[depths], photon_in_focus=photons))
             except InputError as fault:
-                raise InputError(f"{self.path / top}: {fault}; {REMEDY}") from None
-        return found
+                raise InputError(f"{self.path / group}: {fault}; {REMEDY}") from None
+        return segmented
 
     def load_depth(self) -> DepthMap | None:
         """The depth map in the folder, or None."""

@@ -1,4 +1,4 @@
-"""One dataset, everything: analyse it and leave sections, masks, depth, scores and the report."""
+"""Analysis of one dataset with all its results written: sections, masks, depth, scores and report."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,11 +19,11 @@ def run(
     report: Report = silent,
     methods: Sequence[str] = DEFAULT_METHODS,
 ) -> Outcome:
-    """Analyse `dataset` and write everything into `out`.
+    """Analyse `dataset` and write all results into `out`.
 
-    Raises `InputError` if `out` holds something else, and like `analyse`.
+    Raises `InputError` if `out` is no folder for results of this dataset, and as `analyse` does.
     """
-    for method in methods:  # a misspelt name is told before the work, and leaves no folder behind
+    for method in methods:  # an unknown name is reported before any work, and no folder is made
         find_method(method)
     planes_of(dataset, z_mm)
     results = Results(out, dataset)

@@ -1,4 +1,5 @@
 """Estimators of depth.
 
-depth_map  Depth maps: where does the light say that the surface is, and how sure is that?
+depth_map  Depth maps from the focus evidence of planes: a depth and its posterior probability for each
+           pixel.
 """

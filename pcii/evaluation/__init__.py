@@ -1,16 +1,17 @@
 """Many datasets: rows, intervals, paired tests, tables, plots and pages.
 
-comparison        Methods compared: every dataset, photon budget and method once, scored against the truth
-                  and timed.
-evaluation_pages  An evaluation to keep and to read: evaluation.json, a self-contained page, and Markdown.
-pages             Pages made from templates: all that is put in is text, and no page runs or fetches
-                  anything.
-paired_tests      Means over seeds with their uncertainty, and whether two methods differ on the same
+comparison        Methods compared over many datasets: each dataset, budget and method is scored and timed
+                  once.
+evaluation_pages  Files of an evaluation: evaluation.json, a self-contained HTML page, and Markdown.
+pages             HTML pages made from templates: content is escaped as text, and pages run and fetch
+                  nothing.
+paired_tests      Means over seeds with confidence intervals, and paired tests of two methods on the same
                   datasets.
-plots             Plots of an evaluation: accuracy against light, and against time.
-rows              Scores as they are measured, one JSON object a line in rows.jsonl, through kills and by
-                  many processes.
-summary           Rows of an evaluation, summed up: means over seeds, and what is better than what.
-tables            The tables of an evaluation as text, the same for HTML and Markdown.
-timing            Wall time of a method alone: no call counts in which code was compiled or loaded.
+plots             Plots of an evaluation: IoU against photons per view, and against run time.
+rows              rows.jsonl: one JSON object per measured score, written safely by several processes at
+                  once.
+summary           Summary of the rows of an evaluation: means over seeds, and paired comparisons of
+                  methods.
+tables            Tables of an evaluation as text, the same for HTML and Markdown.
+timing            Wall time of a method without the time of compiling or importing code.
 """

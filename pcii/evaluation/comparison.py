@@ -1,4 +1,4 @@
-"""Methods compared: every dataset, photon budget and method once, scored against the truth and timed."""
+"""Methods compared over many datasets: each dataset, budget and method is scored and timed once."""
 
 import re
 from collections.abc import Sequence
@@ -31,13 +31,13 @@ from pcii.removal.methods import removal_methods, segment
 
 
 def known_methods() -> tuple[str, ...]:
-    """Names of what can be evaluated: the methods of removal, and the depth map."""
+    """Names of the methods that can be evaluated: those of removal, and the depth map."""
     return (*removal_methods(), DEPTH)
 
 
 @dataclass(frozen=True)
 class Task:
-    """One row to measure."""
+    """A dataset, photon budget and method to score."""
 
     dataset: Dataset
     budget: float | None
@@ -58,45 +58,52 @@ def evaluate(
     part: tuple[int, int] = (1, 1),
     report: Report = silent,
 ) -> dict[str, Any]:
-    """Score methods on datasets and compare them; the content of evaluation.json, as `summarise` gives it.
+    """Score methods on datasets and compare them; returns the content of evaluation.json (`summarise`).
 
-    `datasets` are dataset folders, or folders of such. `methods` default to all; "depth" stands for the
-    depth map. `budgets` default to all that each dataset has. Of the datasets only those of `part` (i, n) are
-    measured: every n-th from the i-th on, so that n processes share the work on one `out`.
+    `datasets` are dataset folders, or folders of dataset folders. `methods` default to all; "depth" is the
+    depth map. `budgets` default to all that each dataset has. With `part` (i, n) only every n-th dataset from
+    the i-th is scored, so that n processes can share the work on one `out`.
 
-    Rows are added to out/rows.jsonl as they are made, and what is there is not made again; evaluation.json,
-    .html and .md tell of all rows that `out` holds. `missing` counts those that were asked for and are not
-    there yet. The seconds of a row are wall time of the method alone, after one call that warms up, of a
-    call in which nothing was compiled or loaded. Raises `InputError` for a dataset without truth, depths or
-    counts, or an unknown method or budget.
+    Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again;
+    evaluation.json, .html and .md summarise all of them. `missing` counts requested rows that are not
+    measured yet. The seconds of a row are the wall time of the method alone, after a warm-up call, in a call
+    in which no code was compiled or imported. Raises `InputError` for a dataset without truth, depths or
+    counts, or an unknown method or budget:
+
+    >>> evaluate(["out/no-such-dataset"], "out/compared")
+    Traceback (most recent call last):
+    pcii.base.errors.InputError: out/no-such-dataset: there is no such dataset folder
+
+    With datasets of `simgen generate RECIPE -o out/twenty --seeds 20`, the mean IoU of the first method is
+    `evaluate(["out/twenty"], "out/compared")["groups"][0]["results"][0]["object"]["iou"]["mean"]`.
     """
     folder = Path(out)
     tasks = _tasks([open_dataset(path) for path in find_datasets(datasets)], _checked(methods), budgets)
-    number, parts = part
-    if not 1 <= number <= parts:
-        raise InputError(f"part: expected one of 1/{parts} to {parts}/{parts}, got {number}/{parts}")
+    index, count = part
+    if not 1 <= index <= count:
+        raise InputError(f"part: expected one of 1/{count} to {count}/{count}, got {index}/{count}")
     claim_rows(folder)
     with all_rows(folder) as rows:
         done = {key_of(row) for row in rows}
-    own = [task for position, each in enumerate(tasks) if position % parts == number - 1 for task in each]
-    left = [task for task in own if task.key not in done]
+    share = [task for position, each in enumerate(tasks) if position % count == index - 1 for task in each]
+    remaining = [task for task in share if task.key not in done]
     warm: set[tuple[float | None, str]] = set()
-    for finished, task in enumerate(left, start=1):
+    for finished, task in enumerate(remaining, start=1):
         append_row(folder, _measured(task, warm))
-        report("scores", finished, len(left))
+        report("scores", finished, len(remaining))
     with all_rows(folder) as rows:
-        there = {key_of(row) for row in rows}
-        missing = sum(task.key not in there for each in tasks for task in each)
+        measured = {key_of(row) for row in rows}
+        missing = sum(task.key not in measured for each in tasks for task in each)
         result = {"missing": missing, **summarise(rows)}
         write_evaluation(folder, result)
     return result
 
 
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
-    """Folders of datasets: those named, and those in the folders named; `InputError` where there is none.
+    """Dataset folders among `paths` and, for other folders, in them; `InputError` where there is none.
 
-    An unfinished one, or a folder seed_<n> without a manifest, counts too, so that who opens it learns what
-    it lacks.
+    Unfinished datasets and folders seed_<n> without a manifest are included, so that opening them reports
+    what is missing.
     """
     found: list[Path] = []
     for path in map(Path, paths):
@@ -111,7 +118,7 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
             if folder.is_dir() and (_is_begun(folder) or re.fullmatch(r"seed_\d+", folder.name))
         ]
         if not inside:
-            raise InputError(f"{path}: neither a finished dataset nor a folder of such")
+            raise InputError(f"{path}: neither a finished dataset nor a folder of datasets")
         found += sorted(inside, key=lambda folder: (len(folder.name), folder.name))
     if not found:
         raise InputError("datasets: name at least one dataset folder")
@@ -139,22 +146,22 @@ def _checked(methods: Sequence[str]) -> tuple[str, ...]:
 
 
 def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float]) -> list[list[Task]]:
-    """The rows of each dataset; what is missing in one shows before any work."""
+    """The tasks of each dataset; raises `InputError` for what a dataset lacks before any work is done."""
     tasks: dict[str, list[Task]] = {}
     for dataset in datasets:
         if not dataset.has(TRUTH):
             raise InputError(f"{dataset.path}: has no truth to score with; its recipe left it out")
         planes_of(dataset, ())
-        own = dict.fromkeys(budgets or dataset.budgets)
-        for budget in own:
+        chosen = dict.fromkeys(budgets or dataset.budgets)
+        for budget in chosen:
             dataset.at_budget(budget)
-        each = [Task(dataset, budget, method) for budget in own for method in methods]
+        each = [Task(dataset, budget, method) for budget in chosen for method in methods]
         tasks.setdefault(identity_of(dataset.manifest), each)
     return list(tasks.values())
 
 
 def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
-    """The row of a task; the first call of a method at a budget is made twice, and the second one timed."""
+    """The row of a task; the first call of a method at a budget is a warm-up, the second is timed."""
     data = task.dataset.at_budget(task.budget)
     counts, planes, z_range_mm = data.counts, planes_of(data, ()), depth_range_of(data)
 
@@ -166,7 +173,7 @@ def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
     if (task.budget, task.method) not in warm:
         work()
         warm.add((task.budget, task.method))
-    seconds, found = timed(work)
+    seconds, estimate = timed(work)
     row = described(data) | {
         "budget": task.budget,
         "photons_per_view": counts.total / counts.grid.view_count,
@@ -174,10 +181,10 @@ def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
         "seconds": round(seconds, 6),
     }
     if task.method == DEPTH:
-        return row | {"depth": dict(score(None, found, data.truth, grid=data.grid).depth)}
-    result = score(found, None, data.truth)
+        return row | {"depth": dict(score(None, estimate, data.truth, grid=data.grid).depth)}
+    result = score(estimate, None, data.truth)
     planes = [
-        {name: value for name, value in (known | plane).items() if name != "method"}
-        for plane, known in zip(result.planes, result.bounds["planes"], strict=True)
+        {name: value for name, value in (bound | plane).items() if name != "method"}
+        for plane, bound in zip(result.planes, result.bounds["planes"], strict=True)
     ]
-    return row | {"planes": planes, "objects": [dict(thing) for thing in result.objects]}
+    return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}

@@ -1,4 +1,4 @@
-"""An evaluation to keep and to read: evaluation.json, a self-contained page, and Markdown."""
+"""Files of an evaluation: evaluation.json, a self-contained HTML page, and Markdown."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,11 +8,11 @@ from pcii.base.plain_text import in_markdown
 from pcii.base.safe_files import write_bytes_safely, write_json_safely
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
-from pcii.evaluation.tables import budget_name, markdown, overview, tables_of, told
+from pcii.evaluation.tables import budget_name, markdown, overview, tables_of, with_interval
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
-    """Write evaluation.json, evaluation.md and evaluation.html of what `summarise` gives."""
+    """Write the result of `summarise` as evaluation.json, evaluation.md and evaluation.html."""
     write_json_safely(out / "evaluation.json", evaluation)
     write_bytes_safely(out / "evaluation.md", _markdown(evaluation).encode())
     write_bytes_safely(out / "evaluation.html", _page(evaluation))
@@ -24,11 +24,12 @@ def _methods(evaluation: Mapping[str, Any]) -> list[str]:
 
 
 def _notes(evaluation: Mapping[str, Any]) -> list[str]:
-    """What has to be known to read the tables."""
+    """Sentences that explain the tables."""
     notes = [
-        "Figures are against the objects that belong to each plane, and means over the planes where none is "
-        "named. In brackets: " + evaluation["interval"] + ".",
-        "p: sign-flip permutation test on the same datasets, two-sided, not corrected for many comparisons.",
+        "Scores compare masks with the objects that belong to each plane, and are means over the planes "
+        f"unless a plane is named. In brackets: {evaluation['interval']}.",
+        "p: two-sided sign-flip permutation test on the same datasets, without correction for multiple "
+        "comparisons.",
     ]
     if evaluation.get("missing"):
         notes.append(f"Not finished: {evaluation['missing']} rows are still to be measured.")
@@ -37,22 +38,22 @@ def _notes(evaluation: Mapping[str, Any]) -> list[str]:
 
 def _falls(group: Mapping[str, Any]) -> list[str]:
     return [
-        f"IoU of {fall['method']} is worse with {budget_name(fall['to'])} photons than with "
-        f"{budget_name(fall['from'])}, by {told(fall['difference'])}."
+        f"IoU of {fall['method']} is lower with {budget_name(fall['to'])} photons than with "
+        f"{budget_name(fall['from'])}, by {with_interval(fall['difference'])}."
         for fall in group["monotonic"]
     ]
 
 
 def _markdown(evaluation: Mapping[str, Any]) -> str:
-    parts = ["# Evaluation", *_notes(evaluation)]
+    blocks = ["# Evaluation", *_notes(evaluation)]
     table = overview(evaluation["groups"])
     if table.rows:
-        parts += [f"## {table.title}", markdown(table)]
+        blocks += [f"## {table.title}", markdown(table)]
     for group in evaluation["groups"]:
-        parts.append(f"## {in_markdown(group['label'])}")
-        parts += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
-        parts += map(in_markdown, _falls(group))
-    return "\n\n".join(parts) + "\n"
+        blocks.append(f"## {in_markdown(group['label'])}")
+        blocks += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
+        blocks += map(in_markdown, _falls(group))
+    return "\n\n".join(blocks) + "\n"
 
 
 def _page(evaluation: Mapping[str, Any]) -> bytes:

@@ -1,4 +1,4 @@
-"""Pages made from templates: all that is put in is text, and no page runs or fetches anything."""
+"""HTML pages made from templates: content is escaped as text, and pages run and fetch nothing."""
 
 from typing import Any
 
@@ -6,18 +6,18 @@ from pcii.base.plain_text import visible
 
 
 def page(template: str, content: dict[str, Any]) -> bytes:
-    """A page of `templates` with this content, in UTF-8; a name that the content lacks is an error."""
+    """A page in UTF-8 from a file in `templates`; it is an error if `content` lacks a name."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    def shown(value: object) -> object:
+    def as_visible_text(value: object) -> object:
         return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
     environment = Environment(
         loader=PackageLoader("pcii.evaluation"),
         autoescape=True,
         undefined=StrictUndefined,
-        finalize=shown,
+        finalize=as_visible_text,
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -1,4 +1,4 @@
-"""Means over seeds with their uncertainty, and whether two methods differ on the same datasets."""
+"""Means over seeds with confidence intervals, and paired tests of two methods on the same datasets."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,10 +9,11 @@ from pcii.base.errors import InputError
 
 CONFIDENCE = 0.95
 EXACT_UP_TO = 14
-"""With so many differences all their signs are tried: 2^14 sums take milliseconds."""
+"""Up to so many pairs all assignments of signs are computed: 2^14 sums take milliseconds."""
 FLIPS = 10_000
+"""Random assignments of signs for more pairs."""
 ROUNDING = 1e-12
-"""Sums that differ by less than this share of the greatest are equal but for rounding."""
+"""Relative difference below which sums are equal but for rounding."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Mean:
 
 @dataclass(frozen=True)
 class Difference:
-    """Mean difference of paired values, and how likely one as large is if signs are chance."""
+    """Mean difference of paired values, and the p-value of a sign-flip test; `exact` if over all signs."""
 
     difference: Mean
     p: float
@@ -37,8 +38,12 @@ class Difference:
 def mean_interval(values: Sequence[float], bounds: tuple[float, float] = (-np.inf, np.inf)) -> Mean:
     """Mean of values and its 95 % interval by Student's t, clipped to `bounds`.
 
-    The values are taken as independent and about normal, which means of shares far from 0 and 1 are.
-    One value has no interval. Raises `InputError` for none.
+    Assumes independent, approximately normal values, as means of shares far from 0 and 1 are. One value has
+    no interval. Raises `InputError` for none.
+
+    >>> mean = mean_interval([0.8, 0.9, 1.0], bounds=(0.0, 1.0))
+    >>> round(mean.low, 3), round(mean.mean, 3), round(mean.high, 3)
+    (0.652, 0.9, 1.0)
     """
     mean, half = _mean_and_half(values)
     if half is None:
@@ -50,10 +55,9 @@ def positive_mean_interval(values: Sequence[float]) -> Mean:
     """Mean of values that are never negative, such as times and errors, and its 95 % interval.
 
     It is Student's interval of the logarithm of the mean, whose standard error is about s / (mean sqrt(n)):
-    from mean / r to mean r, r = exp(t s / (mean sqrt(n))). So it never reaches 0, is that of
-    `mean_interval` where the values lie close together, and is longer above than below where few large ones
-    make the mean. Values that are all 0 have an interval without width. Raises `InputError` for none, or
-    one below 0.
+    from mean / r to mean r, r = exp(t s / (mean sqrt(n))). So it never reaches 0, approaches that of
+    `mean_interval` for values close together, and is longer above than below if a few large values dominate.
+    Values that are all 0 have an interval of width 0. Raises `InputError` for no values, or one below 0.
     """
     if any(value < 0 for value in values):
         raise InputError("values: expected numbers of at least 0")
@@ -79,15 +83,15 @@ def _mean_and_half(values: Sequence[float]) -> tuple[float, float | None]:
 def paired_difference(first: Sequence[float], second: Sequence[float], seed: int = 0) -> Difference:
     """`first` minus `second`, value by value on the same datasets, and a sign-flip permutation test.
 
-    If neither method is better each difference is as likely with the other sign. `p` is the share of all
-    assignments of signs whose mean is as far from 0 as the one found (two-sided): of all 2^n for n of at
-    most `EXACT_UP_TO`, else of `FLIPS` random ones and the one found. So n pairs cannot give less
-    than 2 / 2^n. Raises `InputError` for lists of different lengths, or without values.
+    Under the null hypothesis both signs of each difference are equally likely. `p` is the share of
+    assignments of signs whose mean is at least as far from 0 as the observed one (two-sided): of all 2^n for
+    n up to `EXACT_UP_TO`, else of `FLIPS` random ones, drawn from `seed`, and the observed one. So n pairs
+    give at least 2 / 2^n. Raises `InputError` for lists of different lengths, or without values.
     """
     if len(first) != len(second):
         raise InputError("first, second: expected values of the same datasets, in the same order")
     x = np.asarray(first, dtype=np.float64) - np.asarray(second, dtype=np.float64)
-    found = mean_interval(x.tolist())
+    observed = mean_interval(x.tolist())
     exact = x.size <= EXACT_UP_TO
     if exact:
         signs = 1 - 2.0 * ((np.arange(1 << x.size)[:, None] >> np.arange(x.size)) & 1)
@@ -95,4 +99,4 @@ def paired_difference(first: Sequence[float], second: Sequence[float], seed: int
         signs = np.random.default_rng(seed).choice((-1.0, 1.0), size=(FLIPS, x.size))
     as_far = np.abs(signs @ x) >= abs(x.sum()) - ROUNDING * np.abs(x).sum()
     p = as_far.mean() if exact else (1 + as_far.sum()) / (1 + FLIPS)
-    return Difference(found, float(p), exact)
+    return Difference(observed, float(p), exact)

@@ -1,4 +1,4 @@
-"""Plots of an evaluation: accuracy against light, and against time."""
+"""Plots of an evaluation: IoU against photons per view, and against run time."""
 
 import base64
 import io
@@ -8,7 +8,7 @@ from typing import Any
 from pcii.base.plain_text import visible
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""Okabe and Ito's colours, which the colour-blind tell apart."""
+"""The palette of Okabe and Ito, which the colour-blind can distinguish."""
 MARKERS = "osD^vPX"
 LONGEST_NAME = 40
 """Characters of a method's name in the legend, about a third of the plot's width."""
@@ -17,7 +17,7 @@ LONGEST_NAME = 40
 def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
     """Object IoU against photons per view, and against seconds, as a PNG in a data URI.
 
-    One colour and marker for each of `methods`, whichever of them the group has; bars are intervals.
+    Each of `methods` has its colour and marker in all groups, also in those without it; bars are intervals.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
 
     figure = Figure(figsize=(10.5, 3.9), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    light, time = figure.subplots(1, 2, sharey=True)
+    by_photons, by_seconds = figure.subplots(1, 2, sharey=True)
     for number, method in enumerate(methods):
         rows = [row for row in group["results"] if row["method"] == method and row["object"].get("iou")]
         if not rows:
@@ -40,12 +40,12 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         }
         iou = [row["object"]["iou"]["mean"] for row in rows]
         bars = _bars([row["object"]["iou"] for row in rows])
-        light.errorbar(
+        by_photons.errorbar(
             [row["photons_per_view"] for row in rows], iou, yerr=bars, label=_legend(method), **style
         )
         seconds = [row["seconds"]["mean"] for row in rows]
-        time.errorbar(seconds, iou, yerr=bars, **style)
-    for axes, name in ((light, "photons per view"), (time, "seconds a dataset")):
+        by_seconds.errorbar(seconds, iou, yerr=bars, **style)
+    for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
         axes.set_xlabel(name)
         axes.set_ylim(-0.02, 1.02)
         axes.grid(True, color="#d9dde5", linewidth=0.6)
@@ -55,19 +55,19 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-    light.set_ylabel("IoU, mean over planes")
-    if light.get_legend_handles_labels()[0]:
-        light.legend(frameon=False, fontsize=9)
+    by_photons.set_ylabel("IoU, mean over planes")
+    if by_photons.get_legend_handles_labels()[0]:
+        by_photons.legend(frameon=False, fontsize=9)
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
     return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"
 
 
 def _legend(method: str) -> str:
-    """A method's name so that Matplotlib shows it as it is, cut to what leaves room for the plots."""
-    told = visible(method)
-    told = told if len(told) <= LONGEST_NAME else f"{told[: LONGEST_NAME - 1]}…"
-    return told.lstrip("_").replace("$", r"\$")
+    """A method's name, cut to `LONGEST_NAME` and escaped so that Matplotlib shows it literally."""
+    name = visible(method)
+    name = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
+    return name.lstrip("_").replace("$", r"\$")
 
 
 def _bars(means: Sequence[Mapping[str, Any]]) -> list[list[float]]:

@@ -1,4 +1,4 @@
-"""Scores as they are measured, one JSON object a line in rows.jsonl, through kills and by many processes.
+"""rows.jsonl: one JSON object per measured score, written safely by several processes at once.
 
 A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice.
 """
@@ -17,18 +17,18 @@ from pcii.io.dataset import Dataset
 
 ROWS = "rows.jsonl"
 DEPTH = "depth"
-"""Name by which the depth map stands among the methods."""
+"""Name of the depth map among the methods."""
 Row = dict[str, Any]
 Key = tuple[str, float | None, str]
 
 
 def identity_of(manifest: Mapping[str, Any]) -> str:
-    """What tells a dataset from others: the manifest's identity, else a hash of its files' hashes."""
+    """Identity of a dataset: that in its manifest, else a hash of its files' hashes."""
     return manifest.get("identity") or _hash(manifest["files"])
 
 
 def recipe_of(manifest: Mapping[str, Any]) -> str:
-    """Hash of a dataset's recipe but for the seed, and of its scene: datasets that share it are repeats."""
+    """Hash of a dataset's recipe without the seed, and of its scene; seeds of one recipe share it."""
     recipe = {name: value for name, value in manifest.get("recipe", {}).items() if name != "seed"}
     if not recipe:
         return identity_of(manifest)[:16]
@@ -40,7 +40,7 @@ def _hash(content: Any) -> str:
 
 
 def described(dataset: Dataset) -> Row:
-    """What a row says of its dataset."""
+    """The fields of a row that describe its dataset."""
     manifest = dataset.manifest
     recipe = manifest.get("recipe", {})
     return {
@@ -54,13 +54,13 @@ def described(dataset: Dataset) -> Row:
     }
 
 
-def _settings(table: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, Any]]:
+def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Every value of nested tables by its dotted name, as `--set` takes it."""
     for name, value in table.items():
         if isinstance(value, Mapping):
-            yield from _settings(value, f"{place}{name}.")
+            yield from _settings(value, f"{prefix}{name}.")
         else:
-            yield f"{place}{name}", value
+            yield f"{prefix}{name}", value
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
@@ -80,10 +80,10 @@ def claim_rows(out: Path) -> None:
 
 @contextmanager
 def all_rows(out: Path) -> Iterator[list[Row]]:
-    """Every row that is there, each key once, while no process adds any.
+    """All rows of the folder, each key once; other processes wait until the block ends before they add any.
 
-    A last line without an end was being written when its process was killed: it does not count.
-    Raises `InputError` for another line that is no row.
+    A last line without a line break is left by a process that was killed, and is ignored. Raises `InputError`
+    for any other line that is not a row.
     """
     with locked(out / ROWS, wait=True) as file:
         *lines, _ = file.read().split(b"\n")
@@ -98,7 +98,7 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
 
 
 def append_row(out: Path, row: Row) -> None:
-    """Add a row and flush it to disk; what a killed process left of a line goes first."""
+    """Add a row and flush it to disk, after removing an incomplete last line of a killed process."""
     text = json.dumps(row, ensure_ascii=False, allow_nan=False)
     line = text.encode(errors="backslashreplace") + b"\n"
     with locked(out / ROWS, wait=True) as file:

@@ -1,4 +1,4 @@
-"""Rows of an evaluation, summed up: means over seeds, and what is better than what."""
+"""Summary of the rows of an evaluation: means over seeds, and paired comparisons of methods."""
 
 import json
 from collections import defaultdict
@@ -11,8 +11,8 @@ from pcii.evaluation.paired_tests import Mean, mean_interval, paired_difference,
 from pcii.evaluation.rows import DEPTH, Row
 
 INTERVALS = (
-    "95 % interval of the mean by Student's t over seeds, for shares clipped to [0, 1], for seconds and "
-    "other figures that are never negative by way of the mean's logarithm; null for one seed"
+    "95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the logarithm "
+    "of the mean for seconds and other values that are never negative; null for one seed"
 )
 TABLE_1_METHOD = "three-step"
 TRUTHS = ("object", "pixel")
@@ -22,14 +22,14 @@ SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fa
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
-    """What evaluation.json holds: `groups`, one for each recipe, of datasets that differ in their seed alone.
+    """The content of evaluation.json: `groups`, one for each recipe, of datasets that differ in seed.
 
-    A group's `label` is its title, and where groups share one also what tells their recipes apart. Its
-    `results` have a row for each budget and method: means over seeds with their intervals, by kind of truth
+    A group's `label` is its title, with the settings that differ between groups of the same title. Its
+    `results` have a row for each budget and method: means over seeds with their intervals, by kind of truth,
     as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`. `paired`
-    compares methods by the mean object IoU of the same datasets, `monotonic` lists where that falls from one
-    budget to the next larger one by more than its interval explains, and `table1` says in how many seeds
-    each object's entropy is lowest at its own plane.
+    compares methods by the mean object IoU of the same datasets, `monotonic` lists significant falls of it
+    from one budget to the next larger one, and `table1` has in how many seeds each object's entropy is lowest
+    at the plane that the object belongs to.
     """
     groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
     for row in rows:
@@ -38,34 +38,34 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
         "version": version("photon-integral-imaging"),
         "interval": INTERVALS,
         "groups": [
-            {"label": _label(rows[0], [other[0] for other in groups.values()]), **_group(recipe, rows)}
+            {"label": _label(rows[0], [members[0] for members in groups.values()]), **_group(recipe, rows)}
             for (_, recipe), rows in sorted(groups.items())
         ],
     }
 
 
-def _label(row: Row, others: Sequence[Row]) -> str:
-    """The title of a row's group, with settings that tell it from those `others` that share the title."""
-    alike = [other for other in others if other["title"] == row["title"]]
-    rivals = [other.get("settings", {}) for other in alike if other["recipe"] != row["recipe"]]
-    told: list[str] = []
+def _label(row: Row, groups: Sequence[Row]) -> str:
+    """Title of a row's group, with the settings that distinguish it from other groups of the same title."""
+    same_title = [each for each in groups if each["title"] == row["title"]]
+    rivals = [each.get("settings", {}) for each in same_title if each["recipe"] != row["recipe"]]
+    distinctions: list[str] = []
     for name, value in row.get("settings", {}).items():
         left = [settings for settings in rivals if name in settings and settings[name] == value]
         if len(left) < len(rivals):
-            told.append(f"{name}={value if isinstance(value, str) else json.dumps(value)}")
+            distinctions.append(f"{name}={value if isinstance(value, str) else json.dumps(value)}")
         rivals = left
-    if rivals:  # scenes of one name that were changed, or datasets without a recipe
-        told.append(f"recipe {row['recipe'][:8]}")
-    return f"{row['title']} ({', '.join(told)})" if told else row["title"]
+    if rivals:  # a scene was changed under the same name, or there is no recipe
+        distinctions.append(f"recipe {row['recipe'][:8]}")
+    return f"{row['title']} ({', '.join(distinctions)})" if distinctions else row["title"]
 
 
-def own_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
-    """Depth, as the keys of `Score.objects` spell it, of the plane that each object belongs to."""
-    own: dict[str, str] = {}
+def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+    """Depth of the plane that each object belongs to, spelled as in the keys of `Score.objects`."""
+    plane_of: dict[str, str] = {}
     for row in planes:
         for name in (row["object"] or "").split(", "):
-            own[name] = f"{row['z_mm']:g}"
-    return own
+            plane_of[name] = f"{row['z_mm']:g}"
+    return plane_of
 
 
 def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
@@ -85,9 +85,9 @@ def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
         "monotonic": _falls(removal),
         "table1": [
             entry
-            for (budget, method), own in removal.items()
+            for (budget, method), by_dataset in removal.items()
             if method == TABLE_1_METHOD
-            for entry in _table1(budget, list(own.values()))
+            for entry in _table1(budget, list(by_dataset.values()))
         ],
     }
 
@@ -102,7 +102,7 @@ def _result(budget: float | None, method: str, rows: Sequence[Row]) -> dict[str,
         "method": method,
         "seeds": len(rows),
         "photons_per_view": sum(row["photons_per_view"] for row in rows) / len(rows),
-        "seconds": _told(positive_mean_interval([row["seconds"] for row in rows])),
+        "seconds": _with_interval(positive_mean_interval([row["seconds"] for row in rows])),
     }
     if method == DEPTH:
         return result | {"depth": _means([row["depth"] for row in rows])}
@@ -117,8 +117,8 @@ def _result(budget: float | None, method: str, rows: Sequence[Row]) -> dict[str,
 
 
 def over_planes(row: Row, kind: str) -> dict[str, float | None]:
-    """Each figure of a row's planes against one kind of truth, as the mean of the planes that have it."""
-    planes = [_figures(plane) for plane in row["planes"] if plane["truth"] == kind]
+    """Means over a row's planes of each score against one kind of truth, of the planes that have it."""
+    planes = [_plane_scores(plane) for plane in row["planes"] if plane["truth"] == kind]
     means: dict[str, float | None] = {}
     for name in dict.fromkeys(name for plane in planes for name in plane):
         known = [value for plane in planes if (value := plane.get(name)) is not None]
@@ -129,16 +129,16 @@ def over_planes(row: Row, kind: str) -> dict[str, float | None]:
 def _plane(row: Row, kind: str, z_mm: float) -> dict[str, float | None]:
     for plane in row["planes"]:
         if plane["truth"] == kind and plane["z_mm"] == z_mm:
-            return _figures(plane)
+            return _plane_scores(plane)
     return {}
 
 
-def _figures(plane: Mapping[str, Any]) -> dict[str, float | None]:
+def _plane_scores(plane: Mapping[str, Any]) -> dict[str, float | None]:
     return {name: value for name, value in plane.items() if name not in ("z_mm", "object", "truth")}
 
 
 def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Mean and interval of each figure over the rows that have it, None where none has; of tables too."""
+    """Mean and interval of each score, also nested, over the rows that have it; None if none has."""
     means: dict[str, Any] = {}
     for name in dict.fromkeys(name for row in rows for name in row):
         known = [value for row in rows if (value := row.get(name)) is not None]
@@ -149,11 +149,11 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             means[name] = _means(known)
             continue
         mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
-        means[name] = _told(mean)
+        means[name] = _with_interval(mean)
     return means
 
 
-def _told(mean: Mean) -> dict[str, Any]:
+def _with_interval(mean: Mean) -> dict[str, Any]:
     interval = None if mean.low is None else [mean.low, mean.high]
     return {"n": mean.n, "mean": mean.mean, "interval": interval}
 
@@ -163,21 +163,23 @@ def _compared(first: Mapping[str, Row], second: Mapping[str, Row]) -> dict[str, 
     pairs: list[tuple[float, float]] = []
     for identity in first:
         if identity in second:
-            one, other = (over_planes(rows[identity], "object").get("iou") for rows in (first, second))
-            if one is not None and other is not None:
-                pairs.append((one, other))
+            a, b = (over_planes(rows[identity], "object").get("iou") for rows in (first, second))
+            if a is not None and b is not None:
+                pairs.append((a, b))
     if not pairs:
         return None
-    found = paired_difference([one for one, _ in pairs], [other for _, other in pairs])
-    return {"difference": _told(found.difference), "p": found.p, "exact": found.exact}
+    test = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
+    return {"difference": _with_interval(test.difference), "p": test.p, "exact": test.exact}
 
 
 def _paired(cells: Mapping[tuple[float | None, str], Mapping[str, Row]]) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
-    for one, other in combinations(cells, 2):
-        found = _compared(cells[one], cells[other]) if one[0] == other[0] else None
-        if found is not None:
-            entries.append({"budget": one[0], "methods": [one[1], other[1]], **found})
+    for (budget, method), (other_budget, other_method) in combinations(cells, 2):
+        if budget != other_budget:
+            continue
+        comparison = _compared(cells[budget, method], cells[other_budget, other_method])
+        if comparison is not None:
+            entries.append({"budget": budget, "methods": [method, other_method], **comparison})
     return entries
 
 
@@ -185,23 +187,24 @@ def _falls(cells: Mapping[tuple[float | None, str], Mapping[str, Row]]) -> list[
     entries: list[dict[str, Any]] = []
     for method in sorted({method for _, method in cells}):
         for fewer, more in pairwise(cell for cell in cells if cell[1] == method):
-            found = _compared(cells[more], cells[fewer])
-            interval = None if found is None else found["difference"]["interval"]
-            if found is not None and interval is not None and interval[1] < 0:
-                entries.append({"method": method, "from": fewer[0], "to": more[0], **found})
+            comparison = _compared(cells[more], cells[fewer])
+            interval = None if comparison is None else comparison["difference"]["interval"]
+            if comparison is not None and interval is not None and interval[1] < 0:
+                entries.append({"method": method, "from": fewer[0], "to": more[0], **comparison})
     return entries
 
 
 def _table1(budget: float | None, rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """In how many seeds each object's entropy is lowest at its own plane, and by how many bits."""
+    """In how many seeds each object's entropy is lowest at the object's plane, and by how many bits."""
     gaps: dict[tuple[str, str], list[float]] = defaultdict(list)
     for row in rows:
-        own = own_planes(row["planes"])
-        for thing in row["objects"]:
-            bits = {z: value for z, value in thing["entropy"].items() if value is not None}
-            here = bits.pop(own.get(thing["name"], ""), None)
-            if here is not None and bits:
-                gaps[thing["name"], own[thing["name"]]].append(min(bits.values()) - here)
+        plane_of = object_planes(row["planes"])
+        for entry in row["objects"]:
+            name = entry["name"]
+            bits = {z: value for z, value in entry["entropy"].items() if value is not None}
+            at_plane = bits.pop(plane_of.get(name, ""), None)
+            if at_plane is not None and bits:
+                gaps[name, plane_of[name]].append(min(bits.values()) - at_plane)
     return [
         {
             "budget": budget,

@@ -1,4 +1,4 @@
-"""The tables of an evaluation as text, the same for HTML and Markdown."""
+"""Tables of an evaluation as text, the same for HTML and Markdown."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from pcii.base.plain_text import in_markdown
 COLUMNS = (
     ("IoU", "object", "iou"),
     ("IoU, pixels", "pixel", "iou"),
-    ("oracle's IoU, pixels", "pixel", "iou_oracle"),
+    ("oracle IoU, pixels", "pixel", "iou_oracle"),
     ("boundary F", "object", "boundary_f"),
     ("claimed share", "object", "claimed_share"),
     ("photon precision", "object", "photon_precision"),
@@ -17,11 +17,13 @@ COLUMNS = (
 )
 DEPTH_COLUMNS = ("median_px", "median_mm", "mae_mm", "bad_1px", "bad_3px", "coverage")
 DIGITS = {"median_px": 2, "median_mm": 2, "mae_mm": 2}
+EXPOSURE = "by exposure"
+"""Name of the photon budget of datasets whose recipe has an exposure instead."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text: its title, the names of its columns, its rows; `words` columns hold words."""
+    """A table of text: title, names of the columns, rows; the first `words` columns are left-aligned."""
 
     title: str
     header: tuple[str, ...]
@@ -30,13 +32,13 @@ class Table:
 
 
 def tables_of(group: Mapping[str, Any]) -> list[Table]:
-    """The tables of one group that have rows."""
+    """The tables of one group, without empty ones."""
     tables = [_removal(group), _depth(group), _paired(group), _table1(group)]
     return [table for table in tables if table.rows]
 
 
 def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
-    """Mean object IoU of every group and method by photon budget; no two groups have one label."""
+    """Mean object IoU of every group and method by photon budget; labels of groups differ."""
     budgets: dict[str, None] = {}
     cells: dict[tuple[str, str], dict[str, str]] = {}
     for group in groups:
@@ -44,9 +46,10 @@ def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
             if "object" in row:
                 name = budget_name(row["budget"])
                 budgets[name] = None
-                cells.setdefault((group["label"], row["method"]), {})[name] = told(row["object"].get("iou"))
-    order = sorted(budgets, key=lambda name: (name == "own", float(name) if name != "own" else 0.0))
-    rows = [(*names, *(own.get(budget, "–") for budget in order)) for names, own in cells.items()]
+                iou = with_interval(row["object"].get("iou"))
+                cells.setdefault((group["label"], row["method"]), {})[name] = iou
+    order = sorted(budgets, key=lambda name: float("inf") if name == EXPOSURE else float(name))
+    rows = [(*names, *(by_budget.get(budget, "–") for budget in order)) for names, by_budget in cells.items()]
     return Table("IoU by photon budget", ("scene", "method", *order), tuple(rows), words=2)
 
 
@@ -57,8 +60,12 @@ def markdown(table: Table) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 
-def told(mean: Mapping[str, Any] | None, digits: int = 3) -> str:
-    """A mean with its interval, such as 0.912 (0.905 to 0.919)."""
+def with_interval(mean: Mapping[str, Any] | None, digits: int = 3) -> str:
+    """A mean with its interval as text, a dash for None.
+
+    >>> with_interval({"mean": 0.912, "interval": [0.905, 0.919]})
+    '0.912 (0.905 to 0.919)'
+    """
     if mean is None:
         return "–"
     text = f"{mean['mean']:.{digits}f}"
@@ -69,8 +76,8 @@ def told(mean: Mapping[str, Any] | None, digits: int = 3) -> str:
 
 
 def budget_name(budget: float | None) -> str:
-    """A photon budget as text; "own" where the recipe has an exposure instead."""
-    return "own" if budget is None else f"{budget:g}"
+    """A photon budget as text; `EXPOSURE` where the recipe has an exposure time instead."""
+    return EXPOSURE if budget is None else f"{budget:g}"
 
 
 def _removal(group: Mapping[str, Any]) -> Table:
@@ -80,10 +87,10 @@ def _removal(group: Mapping[str, Any]) -> Table:
     rows = []
     for row in results:
         planes = {plane["z_mm"]: plane["object"].get("iou") for plane in row["planes"]}
-        cells = [told(planes.get(z)) for z in depths] if len(depths) > 1 else []
-        means = [told(row[kind].get(name)) for _, kind, name in shown]
+        cells = [with_interval(planes.get(z)) for z in depths] if len(depths) > 1 else []
+        means = [with_interval(row[kind].get(name)) for _, kind, name in shown]
         lead = (row["method"], budget_name(row["budget"]), str(row["seeds"]))
-        rows.append((*lead, *cells, *means, told(row["seconds"], 2)))
+        rows.append((*lead, *cells, *means, with_interval(row["seconds"], 2)))
     planes = [f"IoU, {z:g} mm" for z in depths] if len(depths) > 1 else []
     names = [name for name, _, _ in shown]
     header = ("method", "photons", "seeds", *planes, *names, "seconds")
@@ -97,8 +104,8 @@ def _depth(group: Mapping[str, Any]) -> Table:
         (
             budget_name(row["budget"]),
             str(row["seeds"]),
-            *(told(row["depth"].get(name), DIGITS.get(name, 3)) for name in shown),
-            told(row["seconds"], 2),
+            *(with_interval(row["depth"].get(name), DIGITS.get(name, 3)) for name in shown),
+            with_interval(row["seconds"], 2),
         )
         for row in results
     )
@@ -111,13 +118,13 @@ def _paired(group: Mapping[str, Any]) -> Table:
             " minus ".join(entry["methods"]),
             budget_name(entry["budget"]),
             str(entry["difference"]["n"]),
-            told(entry["difference"]),
-            f"{entry['p']:.2g}" + ("" if entry["exact"] else " (drawn)"),
+            with_interval(entry["difference"]),
+            f"{entry['p']:.2g}" + ("" if entry["exact"] else " (sampled)"),
         )
         for entry in group["paired"]
     )
     header = ("methods", "photons", "seeds", "difference of IoU", "p")
-    return Table("Methods on the same datasets", header, rows)
+    return Table("Pairs of methods on the same datasets", header, rows)
 
 
 def _table1(group: Mapping[str, Any]) -> Table:
@@ -132,5 +139,5 @@ def _table1(group: Mapping[str, Any]) -> Table:
         )
         for entry in group["table1"]
     )
-    header = ("object", "own plane", "photons", "lowest there", "smallest gap, bits", "mean gap, bits")
+    header = ("object", "plane", "photons", "lowest at its plane", "smallest gap, bits", "mean gap, bits")
     return Table("Entropy of the objects (Table 1 of Muniraj et al. 2017)", header, rows, words=2)

@@ -1,22 +1,22 @@
-"""Wall time of a method alone: no call counts in which code was compiled or loaded."""
+"""Wall time of a method without the time of compiling or importing code."""
 
 import sys
 import time
 from collections.abc import Callable
 from typing import TypeVar
 
-Found = TypeVar("Found")
+Result = TypeVar("Result")
 MOST_CALLS = 4
-"""One may import, the next come to loops that the first did not, one is timed, and one is to spare; code
-that loads something in every call is timed with it."""
+"""One call may import modules, one may compile further loops, one is timed and one is spare. A method that
+imports or compiles in every call is timed with that."""
 
 
-def timed(work: Callable[[], Found]) -> tuple[float, Found]:
-    """Seconds that `work()` takes, and what it returns.
+def timed(work: Callable[[], Result]) -> tuple[float, Result]:
+    """Seconds of a call of `work()`, and its result.
 
-    A call during which Numba compiled a loop or read a compiled one from its cache, or a module was
-    imported, is made again and the later one told. Which loops a method needs depends on the data, so it is
-    not enough to warm it up on other data.
+    A call during which Numba compiled a loop or read one from its cache, or a module was imported, is
+    repeated, and the last call counts. Which loops a method needs depends on the data, so a warm-up on other
+    data does not suffice.
     """
     from numba.core import event
 
@@ -24,10 +24,10 @@ def timed(work: Callable[[], Found]) -> tuple[float, Found]:
     while True:
         left -= 1
         known = len(sys.modules)
-        # The lock of the compiler is taken for both; the event of compilation tells nothing of the cache.
+        # Numba locks its compiler both to compile and to read its cache.
         with event.install_recorder("numba:compiler_lock") as locked:
             start = time.perf_counter()
-            found = work()
+            result = work()
             seconds = time.perf_counter() - start
         if not left or (not locked.buffer and len(sys.modules) == known):
-            return seconds, found
+            return seconds, result

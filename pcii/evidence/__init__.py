@@ -1,19 +1,22 @@
-"""What photons say about depth: how well a section predicts where they land, and whether cameras agree.
+"""Evidence of depth in photon counts: how well a section predicts the photons, and whether cameras agree.
 
 cells               The coarse grid on which evidence of focus is kept.
-focus_kernels       Compiled loops over photons and planes: what a plane predicts of photons, and which of
-                    several does best.
-focus_likelihood    Evidence of focus from the Poisson likelihood: what does the section at a depth
-                    predict?
-half_agreement      Do both halves of the cameras show the same thing?
-hot_pixels          Pixels that are hot in the same place of all cameras: what is fixed to the sensor
-                    tells no depth.
-label_kernels       Compiled loops over cells: evidence summed within edges, and labels that agree with
-                    their neighbours.
-prediction_kernels  Compiled: the rate of each photon's own pixel and colour, as all other photons of a
-                    section tell it.
-prediction_types    What the compiled loops that predict photons take and give, without the compiler.
+focus_kernels       Compiled loops over photons and planes: the gain of a plane over its blur, and planes
+                    compared.
+focus_likelihood    Evidence of focus from the Poisson likelihood: how well does the section at a depth
+                    predict the photons?
+half_agreement      Whether both halves of the cameras show the same structure: evidence of depth needs
+                    several cameras.
+hot_pixels          Hot pixels at the same place of all cameras, which belong to the sensor and not to the
+                    scene.
+label_kernels       Compiled loops over cells: evidence summed between edges, and labels by belief
+                    propagation.
+prediction_kernels  Compiled: the rate of each photon's pixel and colour, estimated from all other photons
+                    of a section.
+prediction_types    Arguments and results of the compiled loops that predict photons; importing them needs
+                    no compiler.
 projection_kernels  Compiled: the cells of a section that events fall into, and how many views cover each
                     block of pixels.
-smoothing_kernels   Compiled: light at coarser and coarser scales, and between the centres of cells.
+smoothing_kernels   Compiled: sums of photons at coarser and coarser scales, interpolated between the
+                    centres of cells.
 """

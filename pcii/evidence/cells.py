@@ -7,5 +7,9 @@ CELL_PX = 4
 
 
 def in_cells(shifts_px: np.ndarray) -> np.ndarray:
-    """Shifts in px (...) to the nearest whole cell, int64."""
+    """Shifts in px (...), rounded to whole cells, int64.
+
+    >>> in_cells(np.array([-6.0, 1.0, 2.0, 9.0])).tolist()
+    [-1, 0, 1, 2]
+    """
     return np.floor(shifts_px / CELL_PX + 0.5).astype(np.int64)

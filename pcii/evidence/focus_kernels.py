@@ -1,4 +1,4 @@
-"""Compiled loops over photons and planes: what a plane predicts of photons, and which of several does best.
+"""Compiled loops over photons and planes: the gain of a plane over its blur, and planes compared.
 
 Axes: Z planes, C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
@@ -14,9 +14,9 @@ from pcii.evidence.prediction_types import PlacedEvents, Predicted
 
 @helper
 def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray, photons: np.ndarray) -> None:
-    """Adds to `gain` (H, W) by how much events are better predicted than by the blurred section alone.
+    """Adds to `gain` (H, W) the log-likelihood ratio, in nats, of the section to its blur at each event.
 
-    `photons` (C, H, W), from zeros, counts them by colour and cell.
+    `photons` (C, H, W), from zeros, counts the events' photons by colour and cell.
     """
     w = gain.shape[1]
     cell, colour, n = events.cell, events.colour, events.n
@@ -32,9 +32,10 @@ def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray,
 def views_of_planes(
     expected: np.ndarray, rows: np.ndarray, cols: np.ndarray, weight: float, views: np.ndarray
 ) -> None:
-    """What the planes (Z, H, W) together send to cameras, on cells: adds `weight` times to `views` (V, H, W).
+    """Adds to `views` (V, H, W) `weight` times the photons per cell of each camera that all planes predict.
 
-    `rows` (Z, A) and `cols` (Z, B) are shifts of A x B = V cameras in whole cells.
+    `expected` (Z, H, W) are the photons per cell of the planes; `rows` (Z, A) and `cols` (Z, B) the shifts of
+    A x B = V cameras in whole cells.
     """
     Z, H, W = expected.shape
     across = cols.shape[1]
@@ -59,9 +60,10 @@ def duel_planes(
     n: np.ndarray,
     result: np.ndarray,
 ) -> None:
-    """Log-likelihood that each plane gains over all of them together, by cell: `result` (Z, H, W) from zeros.
+    """Log-likelihood gain of each plane over the mean of all planes, by cell: `result` (Z, H, W) from zeros.
 
-    `together` (N,) is the rate that the planes predict for each event together, `views` (V, H, W) for all.
+    `predicted` (Z, N) is the rate of each event by each plane, `together` (N,) by their mean; `expected`
+    (Z, H, W) are the photons per cell of each plane, `views` (V, H, W) those of their mean in each camera.
     """
     Z, H, W = expected.shape
     across = cols.shape[1]
@@ -80,6 +82,6 @@ def duel_planes(
                 if number[i, j] > 0:
                     result[z, i, j] = total[i, j] / number[i, j] - expected[z, i, j]
         for e in range(cell.shape[1]):
-            at = cell[z, e]
-            if at >= 0:
-                result[z, at // W, at % W] += n[e] * math.log(predicted[z, e] / together[e])
+            flat = cell[z, e]
+            if flat >= 0:
+                result[z, flat // W, flat % W] += n[e] * math.log(predicted[z, e] / together[e])

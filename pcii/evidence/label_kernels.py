@@ -1,4 +1,4 @@
-"""Compiled loops over cells: evidence summed within edges, and labels that agree with their neighbours.
+"""Compiled loops over cells: evidence summed between edges, and labels by belief propagation.
 
 Axes: Z planes or labels, C colours, (H, W) cells.
 """
@@ -13,7 +13,10 @@ from pcii.base.compiled_loops import compiled, helper
 
 @helper
 def _recursive_mean(values: np.ndarray, left: np.ndarray, up: np.ndarray) -> None:
-    """Exponential means along rows, then columns, there and back; weights (H, W) to the cell before."""
+    """Recursive exponential means, in place, along rows and then columns, forwards and backwards.
+
+    `left` and `up` (H, W) are the weights of the previous cell.
+    """
     H, W = values.shape
     for i in range(H):
         for j in range(1, W):
@@ -30,7 +33,7 @@ def _recursive_mean(values: np.ndarray, left: np.ndarray, up: np.ndarray) -> Non
 
 @compiled
 def windows_within_edges(
-    near: np.ndarray,
+    narrow: np.ndarray,
     picture: np.ndarray,
     noise: float,
     stiffness: float,
@@ -38,14 +41,15 @@ def windows_within_edges(
     weights: np.ndarray,
     result: np.ndarray,
 ) -> None:
-    """`near` (Z, H, W) plus its weighted means over wide windows that stop at edges: `result`, overwritten.
+    """Writes to `result` `narrow` (Z, H, W) plus its weighted means over wider windows up to edges.
 
-    `picture` (Z, C, H, W) is what each plane shows; a step in it of more than `noise` lengthens the way to
-    the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira 2011.
+    `picture` (Z, C, H, W) is the section at each plane; a step in it of more than `noise` lengthens the
+    distance to the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira
+    2011.
     """
-    Z, H, W = near.shape
+    Z, H, W = narrow.shape
     for z in nb.prange(Z):
-        way = np.ones((2, H, W), np.float32)
+        distance = np.ones((2, H, W), np.float32)
         for i in range(H):
             for j in range(W):
                 across = 0.0
@@ -55,19 +59,19 @@ def windows_within_edges(
                         across += (picture[z, c, i, j] - picture[z, c, i, j - 1]) ** 2
                     if i > 0:
                         down += (picture[z, c, i, j] - picture[z, c, i - 1, j]) ** 2
-                way[0, i, j] += stiffness * max(math.sqrt(across) / noise - 1, 0.0) ** 2
-                way[1, i, j] += stiffness * max(math.sqrt(down) / noise - 1, 0.0) ** 2
+                distance[0, i, j] += stiffness * max(math.sqrt(across) / noise - 1, 0.0) ** 2
+                distance[1, i, j] += stiffness * max(math.sqrt(down) / noise - 1, 0.0) ** 2
         left = np.empty((H, W), np.float32)
         up = np.empty((H, W), np.float32)
-        result[z] = near[z]
+        result[z] = narrow[z]
         for scale in range(scales.size):
-            mean = near[z].copy()
+            mean = narrow[z].copy()
             for turn in range(2):
                 length = scales[scale] * math.sqrt(3.0) * 2.0 ** (1 - turn) / math.sqrt(15.0)
                 for i in range(H):
                     for j in range(W):
-                        left[i, j] = math.exp(-math.sqrt(2.0) / length * way[0, i, j])
-                        up[i, j] = math.exp(-math.sqrt(2.0) / length * way[1, i, j])
+                        left[i, j] = math.exp(-math.sqrt(2.0) / length * distance[0, i, j])
+                        up[i, j] = math.exp(-math.sqrt(2.0) / length * distance[1, i, j])
                 _recursive_mean(mean, left, up)
             for i in range(H):
                 for j in range(W):
@@ -75,8 +79,8 @@ def windows_within_edges(
 
 
 @helper
-def _passed_on(message: np.ndarray, steps: np.ndarray, jump: float) -> None:
-    """The least cost of each label given the neighbour's costs: some per step, at most `jump`."""
+def _pass_to_neighbour(message: np.ndarray, steps: np.ndarray, jump: float) -> None:
+    """Least cost of each label given the neighbour's, in place: `steps` between labels, at most `jump`."""
     top = message.min() + jump
     low = message.min()
     for z in range(1, message.size):
@@ -93,7 +97,7 @@ def pass_messages(
 ) -> None:
     """One sweep of belief propagation: costs (H, W, Z), messages (4, H, W, Z) from left, right, above, below.
 
-    The way to the next label costs `steps` (Z - 1,), and at most `jump`. Lines are independent.
+    A change to the next label costs `steps` (Z - 1,), any change at most `jump`. Lines are independent.
     """
     H, W, Z = cost.shape
     sideways = direction < 2
@@ -103,14 +107,14 @@ def pass_messages(
         length = W if sideways else H
         message = np.zeros(Z, np.float32)
         for step in range(length):
-            at = step if direction % 2 == 0 else length - 1 - step
-            i, j = (line, at) if sideways else (at, line)
+            position = step if direction % 2 == 0 else length - 1 - step
+            i, j = (line, position) if sideways else (position, line)
             for z in range(Z):
                 messages[direction, i, j, z] = message[z]
             for z in range(Z):
                 total = cost[i, j, z]
-                for other in range(4):
-                    if other != opposite:
-                        total += messages[other, i, j, z]
+                for source in range(4):
+                    if source != opposite:
+                        total += messages[source, i, j, z]
                 message[z] = total
-            _passed_on(message, steps, jump)
+            _pass_to_neighbour(message, steps, jump)

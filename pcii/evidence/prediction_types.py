@@ -1,4 +1,4 @@
-"""What the compiled loops that predict photons take and give, without the compiler.
+"""Arguments and results of the compiled loops that predict photons; importing them needs no compiler.
 
 Axes: N events, K rows and L columns of cameras, C colours, (H, W) cells of 4 x 4 pixels.
 """
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class PlacedEvents(NamedTuple):
-    """Pixels that caught photons, (N,) each, and where they fall in one section."""
+    """Pixels that counted photons, (N,) each, and the cell of one section that each falls into."""
 
     k: np.ndarray
     """Camera row, and `l` its column."""
@@ -21,13 +21,13 @@ class PlacedEvents(NamedTuple):
     n: np.ndarray
     """Photons, float32."""
     weight: np.ndarray
-    """From 0 to 1, how far the event is believed, float32."""
+    """Share of the event that predictions count, from 0 to 1, float32."""
     cell: np.ndarray
-    """Flat index of the cell that the event falls into, int32; -1 outside (`cells_of_events`)."""
+    """Flat index of the cell, int32; -1 outside the section (`cells_of_events`)."""
 
 
 class PlaneView(NamedTuple):
-    """A section at one plane, and what is believed there."""
+    """A section at one plane: shifts of the views, size, colours, and the share of the views that counts."""
 
     row_shifts_px: np.ndarray
     """Whole shifts of the rows (K,) of cameras."""
@@ -37,23 +37,23 @@ class PlaneView(NamedTuple):
     """Height of the film, and `width_px` its width."""
     width_px: int
     sites: np.ndarray
-    """Sites (C,) of each colour in a block."""
+    """Pixels (C,) of each colour in a block."""
     share: np.ndarray
-    """Of the views that cover a cell (H, W) the share that is believed."""
+    """Share of the views covering each cell (H, W) that predictions count."""
     prior_samples: float
-    """How many samples a coarser scale is worth."""
+    """Weight of the next coarser scale's rate, in samples."""
 
 
 class Predicted(NamedTuple):
-    """What a section predicts, overwritten, in double precision: of many photons a small share is many."""
+    """Rates that a section predicts, overwritten; float64, as a small share of many photons is many."""
 
     rate: np.ndarray
-    """Photons per sample of the pixel of each event (N,), by all other events."""
+    """Photons per sample of each event's pixel (N,), estimated from all other events."""
     base: np.ndarray
-    """The same by the widest window alone."""
+    """`rate` by the widest window alone."""
     samples: np.ndarray
-    """Of each cell (H, W) the views of all its blocks."""
+    """Views that cover each cell (H, W), summed over its blocks."""
     mean: np.ndarray
     """Photons per block and view of each cell (H, W)."""
     blurred: np.ndarray
-    """The same by the widest window alone."""
+    """`mean` by the widest window alone."""

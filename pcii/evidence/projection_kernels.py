@@ -6,18 +6,18 @@ from pcii.base.compiled_loops import helper
 from pcii.evidence.cells import CELL_PX
 
 BLOCK_PX = 2
-"""Voxels of 2 x 2 pixels: whatever the shifts, each block is covered equally by each Bayer colour.
+"""Voxels of 2 x 2 pixels, each of which every Bayer colour covers equally for any shifts.
 
-Single pixels are not. At depths where all shifts are even a colour falls on every fourth voxel only, where
-photons have four times as many partners, and textured patches would be drawn to such depths.
-"""
+Single pixels are not covered equally: at depths where all shifts are even a colour falls on every fourth
+voxel only, each of which holds four times as many photons, and textured regions would be assigned such
+depths. """
 
 
 @helper
 def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
     """First and last row (or column) + 1 of the blocks that a shifted view covers as a whole.
 
-    Blocks that it covers in part are left out: there it would bring more of one colour than of another.
+    Blocks covered in part are left out: one colour would have more samples in them than another.
     """
     first, last = max(0, shift), min(size, size + shift)
     return first + first % BLOCK_PX, last - last % BLOCK_PX
@@ -25,13 +25,13 @@ def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
 
 @helper
 def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
-    """How many camera rows (or columns) see each block row (or column), (blocks,)."""
-    seen = np.zeros(blocks)
+    """How many camera rows (or columns) cover each row (or column) of blocks, (blocks,) float64."""
+    count = np.zeros(blocks)
     for camera in range(shifts.size):
         first, last = _whole_blocks(int(shifts[camera]), size)
         for place in range(first, last):
-            seen[place // BLOCK_PX] += 1.0 / BLOCK_PX
-    return seen
+            count[place // BLOCK_PX] += 1.0 / BLOCK_PX
+    return count
 
 
 @helper
@@ -45,9 +45,10 @@ def cells_of_events(
     size: tuple[int, int],
     cell: np.ndarray,
 ) -> None:
-    """The `cell` (N,) that each event lands in, row by row; -1 outside the blocks that its view covers.
+    """Writes to `cell` (N,) the flat index of the cell of each event, -1 outside its view's blocks.
 
-    Whole shifts `rows` (K,) and `cols` (L,); `size` of the film in px.
+    Events at pixels (`i`, `j`) of cameras (`k`, `l`); whole shifts `rows` (K,) and `cols` (L,) in px; `size`
+    of the film in px.
     """
     H, W = size
     across = -(-W // CELL_PX)

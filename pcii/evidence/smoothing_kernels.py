@@ -1,4 +1,4 @@
-"""Compiled: light at coarser and coarser scales, and between the centres of cells.
+"""Compiled: sums of photons at coarser and coarser scales, interpolated between the centres of cells.
 
 Axes: C colours, (H, W) cells.
 """
@@ -13,7 +13,7 @@ CENTRE, SIDE = 0.5, 0.25
 
 @helper
 def smoothed(values: np.ndarray) -> np.ndarray:
-    """Each plane of (C, H, W) smoothed along both axes; nothing comes in across borders."""
+    """Each plane of (C, H, W) smoothed along both axes; zero beyond the borders."""
     C, H, W = values.shape
     centre, side = CENTRE, SIDE
     result = np.empty_like(values)
@@ -24,11 +24,11 @@ def smoothed(values: np.ndarray) -> np.ndarray:
             row, line = values[c, i], across[i]
             for j in range(line.size):
                 line[j] = centre * row[j]
-            before, after, later, ended = row[:-1], row[1:], line[1:], line[:-1]
+            before, after, later, earlier = row[:-1], row[1:], line[1:], line[:-1]
             for j in range(later.size):
                 later[j] += side * before[j]
             for j in range(later.size):
-                ended[j] += side * after[j]
+                earlier[j] += side * after[j]
         for i in range(H):
             row, line = across[i], result[c, i]
             above, below = across[max(i - 1, 0)], across[min(i + 1, H - 1)]
@@ -54,10 +54,11 @@ def halved(values: np.ndarray) -> np.ndarray:
 
 
 @helper
-def centres_around(place: float, size: int) -> tuple[int, int, float, float]:
-    """The cells whose centres are around a place (in cells), the share of the second, an event's own part.
+def enclosing_centres(place: float, size: int) -> tuple[int, int, float, float]:
+    """Indices of the two cells whose centres enclose a `place` (in cells), and weights between them.
 
-    Beside the frame both are the same.
+    The weights are that of the second cell, and the one with which an event at `place` enters its own
+    interpolated sum after smoothing. Beyond the outermost centres both cells are the same.
     """
     low = int(place + 0.5) - 1
     share = place - 0.5 - low
@@ -72,7 +73,7 @@ def centres_around(place: float, size: int) -> tuple[int, int, float, float]:
 def linear_at(
     values: np.ndarray, top: int, bottom: int, share_i: float, left: int, right: int, share_j: float
 ) -> float:
-    """Linear between the four centres (see `centres_around`) in `values` (H, W)."""
+    """Bilinear interpolation of `values` (H, W) between the four centres of `enclosing_centres`."""
     upper = (1 - share_j) * values[top, left] + share_j * values[top, right]
     lower = (1 - share_j) * values[bottom, left] + share_j * values[bottom, right]
     return (1 - share_i) * upper + share_i * lower

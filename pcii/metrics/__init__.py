@@ -1,10 +1,11 @@
-"""How right an estimate is: masks, depth, photons and bounds; nothing here knows a method.
+"""Accuracy of estimates: masks, depth and photons against the truth, and bounds; independent of methods.
 
-agreement       How well two masks agree, and whether the photons that a method keeps are the right ones.
-bounds          How good it could be: masks from the true depth, and how well photons can tell depth at
-                all.
+agreement       How well two masks agree, and how many of the photons that a method keeps are rightly
+                kept.
+bounds          Bounds on accuracy: masks from the true depth, and the Cramér-Rao bound on depth from
+                photons.
 depth_accuracy  Errors of a depth map: in mm, in px of total disparity, and by the 4D light field
                 benchmark.
-scoring         How right it was: masks, depth and entropies against the truth.
-true_masks      What should be in focus in each section: the truth as masks, by object and by pixel.
+scoring         Scores of masks, depth and entropies against the truth.
+true_masks      True in-focus masks of sections, by object and by pixel.
 """

@@ -1,4 +1,4 @@
-"""How well two masks agree, and whether the photons that a method keeps are the right ones."""
+"""How well two masks agree, and how many of the photons that a method keeps are rightly kept."""
 
 import numpy as np
 
@@ -15,29 +15,33 @@ def mask_agreement(
 ) -> dict[str, float | None]:
     """IoU, precision, recall, F1 and boundary F of two masks (H, W).
 
-    `true_share` (H, W) is how much of each pixel is true, if that is known more finely. Two empty masks
-    agree fully. Precision is None if nothing is claimed, recall if nothing is true.
+    `true_share` (H, W) is the true share of each pixel's area, where that is known. Two empty masks have an
+    IoU of 1. Precision is None if nothing is claimed, recall if nothing is true, all are None without truth.
+
+    >>> agreement = mask_agreement(np.array([[True, True, False]]), np.array([[True, False, False]]))
+    >>> agreement["iou"], agreement["precision"], agreement["recall"]
+    (0.5, 0.5, 1.0)
     """
     if true is None:
         return dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f"))
-    both, claims, facts = (int(np.count_nonzero(m)) for m in (claimed & true, claimed, true))
-    either = claims + facts - both
+    both, positives, truths = (int(np.count_nonzero(mask)) for mask in (claimed & true, claimed, true))
+    either = positives + truths - both
     return {
         "iou": both / either if either else 1.0,
-        "precision": both / claims if claims else None,
-        "recall": both / facts if facts else None,
-        "f1": 2 * both / (claims + facts) if either else 1.0,
+        "precision": both / positives if positives else None,
+        "recall": both / truths if truths else None,
+        "f1": 2 * both / (positives + truths) if either else 1.0,
         "boundary_f": boundary_f(claimed, true, true_share) if either else 1.0,
     }
 
 
 def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: str) -> dict[str, float | None]:
-    """Precision and recall of the photons that a method keeps, against where each came from.
+    """Precision and recall of the photons that a method keeps, by the origin of each photon.
 
-    A photon is kept if `photon_in_focus` says so of its event or, without one, if the voxel that it lands
-    on in the section is claimed. It is rightly kept if its object belongs to the plane ("object"), or if
-    its first hit is in focus there ("pixel"). Photons that land outside the section do not count.
-    Raises `InputError` if `photon_in_focus` is of other events than the truth.
+    A photon is kept if `photon_in_focus` has its event or, without that, if the voxel of the section that it
+    is projected to is in the mask. It is rightly kept if its object belongs to the plane (`kind` "object"),
+    or if its first hit is in focus there ("pixel"). Photons projected outside the section do not count.
+    Raises `InputError` if `photon_in_focus` has another number of events than the truth.
     """
     if truth is None or truth.photons is None:
         return {"photon_precision": None, "photon_recall": None}
@@ -48,8 +52,8 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
     else:
         kept = _by_photon(focus.photon_in_focus[plane], photons)[inside]
     if kind == "object":
-        own = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
-        right = np.isin(photons.object_id[inside], own)
+        objects = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
+        right = np.isin(photons.object_id[inside], objects)
     else:
         right = blur_half_extent_px(grid, photons.z_mm[inside], z0) <= FOCUS_TOLERANCE_PX
     both = int(np.count_nonzero(kept & right))
@@ -60,12 +64,12 @@ def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: st
 
 
 def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
-    """What is said of each event (N,) for each of its photons: in the truth they are a run of one pixel."""
-    where = np.stack([photons.k, photons.l, photons.i, photons.j])
-    event = np.cumsum(np.any(np.diff(where, axis=1, prepend=-1), axis=0)) - 1
+    """Values of events (N,) repeated for each of their photons, which are consecutive in the truth."""
+    places = np.stack([photons.k, photons.l, photons.i, photons.j])
+    event = np.cumsum(np.any(np.diff(places, axis=1, prepend=-1), axis=0)) - 1
     events = int(event[-1]) + 1 if event.size else 0
     if by_event.size != events:
         raise InputError(
-            f"photon_in_focus: tells of {by_event.size} events, and the truth's photons are of {events}"
+            f"photon_in_focus: has {by_event.size} events, but the truth's photons belong to {events}"
         )
     return by_event[event]

@@ -1,4 +1,4 @@
-"""How good it could be: masks from the true depth, and how well photons can tell depth at all.
+"""Bounds on accuracy: masks from the true depth, and the Cramér-Rao bound on depth from photons.
 
 Notation: u total disparity in px; g gradient of the logarithm of the rate, per px; N photons; the
 rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k), where a_l = (l - (L-1)/2)
@@ -18,12 +18,12 @@ from pcii.core.truth import Truth
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, object_masks, objects_by_plane, pixel_masks
 
 TEXTURE_SIGMA_PX = 0.5
-"""Rates are smoothed by this before their gradient is taken: enough to fill voxels that miss a colour.
-
-Natural texture has more gradient the closer one looks: with 1 px bounds are about half as large again.
-"""
+"""Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels
+without samples of a colour. Natural texture has larger gradients at finer scales: with 1 px bounds are 1.5
+times as large."""
 AWAY_FROM_EDGES_PX = 4
-"""Three of these sigmas, one pixel of blur and one of the difference: no outline gets into the texture."""
+"""Three standard deviations of the smoothing, one pixel of blur and one of the difference: no edge is
+included."""
 
 
 def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"] = "pixel") -> Segmented:
@@ -48,8 +48,8 @@ def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"]
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
     """Mean square of the cameras' shifts per px of total disparity, (horizontal, vertical).
 
-    (n + 1) / (12 (n - 1)) along an axis of n cameras that has all of it: 0.102 for 10. An axis
-    of less total disparity has less by its square, one of a single camera 0.
+    (n + 1) / (12 (n - 1)) along an axis of n cameras that has the whole total disparity: 0.102 for 10. For an
+    axis of less total disparity it is smaller by the square of the ratio, for a single camera 0.
     """
     total = float(total_disparity_px(grid, 1.0))
     if total == 0:
@@ -62,8 +62,15 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     """Least standard deviation of total disparity that any unbiased method can have, in px.
 
     The Cramer-Rao bound 1 / sqrt(N (c_x <g_x^2> + c_y <g_y^2>)) for a surface at one depth with a known
-    texture that shows N = `photons` in all views together; `gradient_squared` is (<g_x^2>, <g_y^2>), means
-    over the photons. None where nothing tells depths apart: no photon, no texture, a single camera.
+    texture of which all views together have N = `photons`; `gradient_squared` is (<g_x^2>, <g_y^2>), means
+    over the photons. None without information on depth: no photons, no texture or a single camera.
+
+    >>> from pcii.core.camera_grid import CameraGrid
+    >>> grid = CameraGrid(
+    ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=9, width=9
+    ... )
+    >>> depth_bound_px(grid, photons=5000, gradient_squared=(0.01, 0.01)).__round__(3)
+    0.313
     """
     c_x, c_y = camera_information(grid)
     information = photons * (c_x * gradient_squared[0] + c_y * gradient_squared[1])
@@ -75,7 +82,7 @@ def log_gradient_squared(
 ) -> tuple[float, float] | None:
     """(<g_x^2>, <g_y^2>) per px^2 of the rate counts / coverage (H, W, C), over the photons `inside` (H, W).
 
-    Each colour weighs as many photons as its sites bring; a mean over photons of (grad rate / rate)^2 is
+    Each colour is weighted by the photons at its pixels; a mean over photons of (grad rate / rate)^2 is
     the sum of (grad rate)^2 / rate over that of rate. None if there is no light inside.
     """
     from scipy.ndimage import gaussian_filter
@@ -94,10 +101,10 @@ def log_gradient_squared(
 
 
 def plane_bounds(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
-    """For each row of the score's planes: the IoU that `oracle` would have there."""
+    """For each row of the score's planes the IoU of `oracle`."""
     grid, z_mm = focus.sections.grid, focus.z_mm
     true = {"object": object_masks(grid, truth, z_mm), "pixel": pixel_masks(grid, truth, z_mm)}
-    known = {
+    oracles = {
         "object": oracle(focus.sections, truth, kind="object").in_focus,
         "pixel": oracle(focus.sections, truth, kind="pixel").in_focus,
     }
@@ -106,7 +113,7 @@ def plane_bounds(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
             "z_mm": float(depth),
             "method": focus.method,
             "truth": kind,
-            "iou_oracle": _iou(known[kind][plane], true[kind][plane]),
+            "iou_oracle": _iou(oracles[kind][plane], true[kind][plane]),
         }
         for plane, depth in enumerate(z_mm)
         for kind in true
@@ -116,11 +123,11 @@ def plane_bounds(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
 def object_bounds(
     truth: Truth, full_light: Sections | None, sections: Sections | None
 ) -> list[dict[str, Any]]:
-    """For each object: its photons, its texture and the bound on its depth that follows from them.
+    """For each object its photons, its texture and the bound on its depth that follows from them.
 
     The texture is that of the full-light section at the object's plane, where the object is in focus there
-    and away from its edges. Photons are counted by where they came from if the truth knows it, else in the
-    object's pixels of the photon section. `depth_sigma_px` is None without full light, texture or photons.
+    and away from its edges. Photons are counted by origin if the truth has it, else in the object's pixels of
+    the photon section. `depth_sigma_px` is None without full light, texture or photons.
     """
     rows: list[dict[str, Any]] = []
     for number, name in sorted(truth.names.items()):

@@ -1,8 +1,8 @@
 """Errors of a depth map: in mm, in px of total disparity, and by the 4D light field benchmark.
 
-Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated.
-A missing answer is bad in every share, and is left out of means and quantiles, beside which stands the
-share answered.
+Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated. A
+pixel without an estimate counts as bad in every share. Means and quantiles are of the pixels with an
+estimate, whose share is given beside them.
 """
 
 from typing import Any
@@ -15,23 +15,24 @@ from pcii.core.geometry import parallax_px, total_disparity_px
 from pcii.core.truth import Truth
 
 HCI_BORDER_PX = 15
+"""Border that the benchmark ignores."""
 BADPIX = {"badpix_001": 0.01, "badpix_003": 0.03, "badpix_007": 0.07}
 DISCONTINUITY_BADPIX = 0.07
 FINE_STEP_PX = 0.15
-"""Disparity by which fine structures stand out and are fattened or thinned; a larger jump is an edge."""
+"""Disparity by which fine structures differ from their surroundings; a larger jump is an edge."""
 FINE_WIDTH_PX = 11
-"""What no square of this side fits into is fine."""
+"""Structures into which no square of this side fits are fine."""
 NEAR_EDGE_PX = 5
 
 
 def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
     """Errors of a depth map over the objects' pixels, and those of `hci_errors`.
 
-    `hci` is over all pixels where something is hit, as the benchmark has it; `hci_objects` over the objects'
-    pixels, since nothing can be known of a dark backdrop.
-    `mae_mm`, `median_mm`, `mae_px` and `median_px` are of the pixels answered, in mm and in px of total
-    disparity; `bad_1px` and `bad_3px` the shares off by more than that; `coverage` the share
-    answered. All are None without a depth map, without truth or without objects.
+    `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
+    since a dark backdrop has no photons to estimate depth from.
+    `mae_mm`, `median_mm`, `mae_px` and `median_px` are mean and median absolute errors of the pixels with an
+    estimate, in mm and in px of total disparity; `bad_1px` and `bad_3px` the shares with larger errors;
+    `coverage` the share with an estimate. All are None without a depth map, without truth or without objects.
     """
     keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px")
     errors: dict[str, Any] = dict.fromkeys(keys)
@@ -39,22 +40,22 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     errors["hci_objects"] = hci_errors(grid, depth, truth, None if truth is None else truth.object_id > 0)
     if grid is None or depth is None or truth is None or not (truth.object_id > 0).any():
         return errors
-    here = truth.object_id > 0
-    estimate, true = depth.z_mm[here], truth.z_mm[here]
+    on_object = truth.object_id > 0
+    estimate, true = depth.z_mm[on_object], truth.z_mm[on_object]
     answered = _answered(estimate)
     error_mm = np.abs(estimate[answered] - true[answered])
     error_px = np.full(estimate.shape, np.inf)
-    claimed_px, true_px = (total_disparity_px(grid, z_mm[answered]) for z_mm in (estimate, true))
-    error_px[answered] = np.abs(claimed_px - true_px)
-    some = answered.any()
+    estimated_px, true_px = (total_disparity_px(grid, z_mm[answered]) for z_mm in (estimate, true))
+    error_px[answered] = np.abs(estimated_px - true_px)
+    has_answers = answered.any()
     return errors | {
-        "mae_mm": float(error_mm.mean()) if some else None,
-        "median_mm": float(np.median(error_mm)) if some else None,
+        "mae_mm": float(error_mm.mean()) if has_answers else None,
+        "median_mm": float(np.median(error_mm)) if has_answers else None,
         "bad_1px": float((error_px > 1).mean()),
         "bad_3px": float((error_px > 3).mean()),
         "coverage": float(answered.mean()),
-        "median_px": float(np.median(error_px[answered])) if some else None,
-        "mae_px": float(error_px[answered].mean()) if some else None,
+        "median_px": float(np.median(error_px[answered])) if has_answers else None,
+        "mae_px": float(error_px[answered].mean()) if has_answers else None,
     }
 
 
@@ -66,8 +67,8 @@ def hci_errors(
     Honauer et al. 2016, 2017. `badpix_*`: share with |e| > t; `mse_x100`: 100 mean e^2; `q25_x100`: 100
     times the lower quartile of |e|; `discontinuities`: badpix at 0.07 px near edges of the true depth;
     `fine_fattening`: share around fine structures with e < -0.15; `fine_thinning`: share of them with
-    e > 0.15; `answered`. The benchmark draws its regions by hand; these are `near_edges` and
-    `fine_structures`. A border of 15 px is ignored. None where there is nothing to judge.
+    e > 0.15; `answered`: share with an estimate. The benchmark's regions are drawn by hand; here they are
+    `near_edges` and `fine_structures`. A border of 15 px is ignored. None where no pixel is left.
     """
     keys = (*BADPIX, "mse_x100", "q25_x100", "discontinuities", "fine_fattening", "fine_thinning", "answered")
     errors: dict[str, float | None] = dict.fromkeys(keys)
@@ -97,7 +98,7 @@ def hci_errors(
 
 
 def near_edges(disparity: np.ndarray) -> np.ndarray:
-    """Pixels within 5 px of a jump of the disparity (H, W) by more than 0.15 px between neighbours, bool."""
+    """Pixels (H, W) bool within 5 px of a jump of the disparity by more than 0.15 px between neighbours."""
     jump = np.zeros(disparity.shape, dtype=bool)
     down = np.abs(np.diff(disparity, axis=0)) > FINE_STEP_PX
     across = np.abs(np.diff(disparity, axis=1)) > FINE_STEP_PX
@@ -109,9 +110,9 @@ def near_edges(disparity: np.ndarray) -> np.ndarray:
 
 
 def fine_structures(disparity: np.ndarray) -> np.ndarray:
-    """Pixels (H, W) nearer, by more than 0.15 px of disparity, than a square of 11 px would leave them, bool.
+    """Pixels (H, W) bool whose disparity exceeds its opening by a square of 11 px by more than 0.15 px.
 
-    That is a white top-hat, an image less its opening: what is narrow and stands before its surroundings.
+    The difference is the white top-hat: narrow structures in front of their surroundings.
     """
     from scipy.ndimage import grey_opening
 

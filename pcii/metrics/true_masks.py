@@ -1,4 +1,4 @@
-"""What should be in focus in each section: the truth as masks, by object and by pixel."""
+"""True in-focus masks of sections, by object and by pixel."""
 
 import numpy as np
 
@@ -15,20 +15,20 @@ def objects_by_plane(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> dict[i
 
     The closest plane is the one at which the object's visible surface has the least mean blur.
     """
-    belongs: dict[int, int] = {}
+    plane_of: dict[int, int] = {}
     for number in truth.names:
         surface = truth.z_mm[truth.object_id == number]
         if surface.size:
             blur = [blur_half_extent_px(grid, surface, z).mean() for z in z_mm]
-            belongs[number] = int(np.argmin(blur))
-    return belongs
+            plane_of[number] = int(np.argmin(blur))
+    return plane_of
 
 
 def object_masks(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> np.ndarray:
     """Truth by object: (Z, H, W) bool, the pixels of the objects that belong to each plane."""
-    belongs = objects_by_plane(grid, truth, z_mm)
+    plane_of = objects_by_plane(grid, truth, z_mm)
     masks = np.zeros((len(z_mm), *truth.z_mm.shape), dtype=bool)
-    for number, plane in belongs.items():
+    for number, plane in plane_of.items():
         masks[plane] |= truth.object_id == number
     return masks
 

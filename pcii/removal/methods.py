@@ -1,4 +1,4 @@
-"""Removal of defocused points: which points of each section are in focus there."""
+"""Removal methods by name: which points of each section are in focus."""
 
 from pcii.base.errors import InputError
 from pcii.core.estimates import Segmented
@@ -14,15 +14,26 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
     `method` is one of `pcii.removal_methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood",
-    a simple one to compare them with ("brightness", "variance", "shape-from-focus"), or that of an
-    installed package; or anything that makes a `Segmented` of counts and their sections, such as
-    `ThreeStep(entropy=False)`. None is told how many objects there are, their colours or their depths.
-    Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown
-    method, a single view, or a package's method that returns something else than it should.
+    a simple one to compare them with ("brightness", "variance", "shape-from-focus"), or one that an
+    installed package registers; or a function that returns a `Segmented` for counts and their sections, such
+    as `ThreeStep(entropy=False)`. No method is given the number of objects, their colours or their depths.
+    Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a
+    single view, or a registered method whose result is not a `Segmented` of these sections.
 
-    >>> focus = segment(counts, z_mm=[540, 620])              # doctest: +SKIP
-    >>> focus.in_focus.shape                                  # doctest: +SKIP
-    (2, 1024, 1024)
+    A bright square at 500 mm, where views shift by 4 px from camera to camera:
+
+    >>> import numpy as np
+    >>> import pcii
+    >>> grid = pcii.CameraGrid(
+    ...     rows=3, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.125, height=64, width=64
+    ... )
+    >>> photons = np.zeros(grid.shape_KLHW, dtype=int)
+    >>> for k, l in np.ndindex(3, 3):
+    ...     photons[k, l, 26 - 4 * k : 46 - 4 * k, 26 - 4 * l : 46 - 4 * l] = 5
+    >>> counts = pcii.PhotonCounts.from_dense(photons, grid)
+    >>> focus = segment(counts, z_mm=[500, 1000], method="three-step")
+    >>> focus.in_focus.shape, focus.in_focus.any(axis=(1, 2)).tolist()
+    ((2, 64, 64), [True, False])
     """
     check_depth_counts(counts)
     remove = method if callable(method) else find_method(method)
@@ -30,20 +41,24 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
 
 
 def removal_methods() -> tuple[str, ...]:
-    """Names that `segment` knows: the built-in ones, then those of installed packages.
+    """Names of the methods that `segment` accepts: the built-in ones, then those of installed packages.
 
-    Raises `InputError` for a package whose method has a name that it may not have.
+    Raises `InputError` for a registered name that is already taken or no file name.
+
+    >>> removal_methods()[:2]
+    ('three-step', 'likelihood')
     """
     return (*METHODS, *plugins.registered(METHODS))
 
 
 def find_method(name: str) -> plugins.Method:
-    """The removal of this name; `InputError` that lists the known names if there is none."""
+    """The removal method of this name; `InputError` listing the known names if there is none."""
     if not isinstance(name, str) or name not in METHODS:
-        brought = plugins.registered(METHODS)
-        if name not in brought:
-            raise InputError(f"method: no removal named {name!r}; use {', '.join((*METHODS, *brought))}")
-        return plugins.load(brought[name])
+        registered = plugins.registered(METHODS)
+        if name not in registered:
+            names = ", ".join((*METHODS, *registered))
+            raise InputError(f"method: no removal named {name!r}; use {names}")
+        return plugins.load(registered[name])
     return METHODS[name]
 
 
@@ -54,5 +69,6 @@ METHODS: dict[str, plugins.Method] = {
     "variance": variance,
     "shape-from-focus": shape_from_focus,
 }
-"""What is built in; the first two are what `pcii run` does unless told otherwise."""
+"""The built-in methods."""
 DEFAULT_METHODS = ("three-step", "likelihood")
+"""The methods of `pcii run` without `--method`."""

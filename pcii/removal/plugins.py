@@ -1,4 +1,4 @@
-"""Removal methods that other packages bring: entry points of the group `pcii.methods`.
+"""Removal methods registered by other packages: entry points of the group `pcii.methods`.
 
 In the pyproject.toml of such a package:
 
@@ -7,7 +7,7 @@ In the pyproject.toml of such a package:
 
 `remove` is called with the `PhotonCounts` and their `Sections` at the requested planes, and returns a
 `Segmented` of these sections.
-Nothing is looked up, and no such package imported, before a method is asked for that is not built in.
+Entry points are read, and the package imported, only when a method is requested that is not built in.
 """
 
 import re
@@ -29,52 +29,56 @@ Method = Callable[[PhotonCounts, Sections], Segmented]
 def registered(taken: Collection[str]) -> dict[str, "EntryPoint"]:
     """Methods of installed packages by name, sorted.
 
-    Raises `InputError` for a name that is `taken`, that two packages want, or that makes no file name.
+    Raises `InputError` for a name that is `taken`, that two packages use, or that cannot be a file name.
     """
     from importlib.metadata import entry_points
 
     found: dict[str, EntryPoint] = {}
-    for point in sorted(entry_points(group=GROUP), key=lambda one: one.name):
-        told = f"{GROUP}: {point.value} of {_package(point)}"
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        label = f"{GROUP}: {point.value} of {_package(point)}"
         if point.name in taken:
-            raise InputError(f"{told} takes the name of the built-in {point.name!r}; it needs another name")
+            raise InputError(f"{label} takes the name of the built-in {point.name!r}; it needs another name")
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", point.name):
-            raise InputError(f"{told} is named {point.name!r}; use letters, digits, '-', '_' and '.'")
+            raise InputError(f"{label} is named {point.name!r}; use letters, digits, '-', '_' and '.'")
         if point.name in found and found[point.name].value != point.value:
-            raise InputError(f"{told} and {found[point.name].value} are both named {point.name!r}")
+            raise InputError(f"{label} and {found[point.name].value} are both named {point.name!r}")
         found[point.name] = point
     return found
 
 
 def load(point: "EntryPoint") -> Method:
-    """The method, its answers checked; `InputError` if it cannot be imported or called."""
-    told = f"method: {point.name!r} of {_package(point)}"
+    """The method of an entry point, with its result checked at every call.
+
+    Raises `InputError` if it cannot be imported or called, and the method if its result is not a `Segmented`
+    of the given sections.
+    """
+    label = f"method: {point.name!r} of {_package(point)}"
     try:
         remove = point.load()
-    except Exception as fault:  # whatever a stranger's module does when it is imported
-        raise InputError(f"{told} cannot be loaded: {type(fault).__name__}: {fault}") from fault
+    except Exception as fault:  # importing another package's module may raise anything
+        raise InputError(f"{label} cannot be loaded: {type(fault).__name__}: {fault}") from fault
     if not callable(remove):
-        raise InputError(f"{told} is {type(remove).__name__}, which cannot be called")
+        raise InputError(f"{label} is {type(remove).__name__}, which cannot be called")
 
     def checked(counts: PhotonCounts, sections: Sections) -> Segmented:
-        answer = remove(counts, sections)
-        if not isinstance(answer, Segmented):
-            raise InputError(f"{told} must return a pcii.Segmented, not {type(answer).__name__}")
-        expected = _expected(answer, point.name, counts, sections)
-        if expected:
-            raise InputError(f"{told} must return {expected}")
-        return answer
+        result = remove(counts, sections)
+        if not isinstance(result, Segmented):
+            raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}")
+        requirement = _unmet_requirement(result, point.name, counts, sections)
+        if requirement:
+            raise InputError(f"{label} must return {requirement}")
+        return result
 
     return checked
 
 
-def _expected(answer: Segmented, name: str, counts: PhotonCounts, sections: Sections) -> str | None:
-    """What the answer should have been, if it is not that."""
-    if answer.sections is not sections:
+def _unmet_requirement(result: Segmented, name: str, counts: PhotonCounts, sections: Sections) -> str | None:
+    """The first requirement that the result of a method does not meet, in words; None if it meets all."""
+    if result.sections is not sections:
         return "a Segmented of the sections that it was given"
-    if answer.method != name:
-        return f"its own name as `method`, not {answer.method!r}"
-    kept, events = answer.photon_in_focus, counts.events.n.size
+    if result.method != name:
+        return f"its own name as `method`, not {result.method!r}"
+    kept, events = result.photon_in_focus, counts.events.n.size
     if kept is not None and kept.shape[1] != events:
         return f"photon_in_focus for the {events} events of the counts, not for {kept.shape[1]}"
     return None

@@ -1,7 +1,8 @@
-"""Removal as textbooks would do it: by brightness, by variance, by sharpness. To compare others with.
+"""Textbook methods of removal to compare others with: by brightness, by variance, by sharpness.
 
-Each uses one cue alone, with windows as large as the photons demand. All work on the square root of the
-photons in a window, whose noise is the same everywhere (see `pcii.imaging.bright_regions.brightness`).
+Each uses a single cue, in windows whose size follows from the number of photons. All work on the square root
+of the photons in a window, whose noise does not depend on the brightness (see
+`pcii.imaging.bright_regions.brightness`).
 """
 
 import numpy as np
@@ -19,32 +20,34 @@ from pcii.sections.reconstruction import extend, view_coverage
 NOISE = 0.5
 """Standard deviation of the square root of a Poisson count."""
 LEAST_CONTRAST_SIGMAS = 4.0
-"""Noise alone, cut in two at its mean, gives halves whose means are 2 sqrt(2 / pi) = 1.6 sigma apart."""
+"""Least contrast of the two classes: noise divided at its mean has classes 2 sqrt(2 / pi) = 1.6 sigma
+apart."""
 WINDOW_CELLS = 4
 PHOTONS_PER_VIEW = 10.0
 LARGEST_CELL_PX = 8
+"""The variance test pools over 4 x 4 cells of so many px that a view has about 10 photons in the window."""
 POISSON_QUANTILE = 0.999
-"""The variance test passes what Poisson noise exceeds in one window of a thousand."""
+"""The variance test rejects values that Poisson noise exceeds in one window of a thousand."""
 FOCUS_WINDOW = 6
 """Sharpness is summed over this many pooling windows along each axis."""
 
 
 def brightness(counts: PhotonCounts, sections: Sections) -> Segmented:
-    """In focus is what is bright in the section at z: Otsu's threshold on its pooled brightness.
+    """Points brighter than Otsu's threshold on the pooled section are in focus.
 
-    Otsu 1979. A section whose two classes differ by no more than noise can make is all dark.
+    Otsu 1979. Where the two classes differ by no more than noise explains, nothing is in focus.
     """
     bright = _bright(_root_photons(sections, section_window_px(sections)))
     return Segmented(bright, "brightness", sections)
 
 
 def variance(counts: PhotonCounts, sections: Sections) -> Segmented:
-    """In focus is what is bright at z and varies over the views no more than Poisson noise does.
+    """Bright points whose variance over the views is that of Poisson noise are in focus.
 
-    Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point follows chi-square
-    with V - 1 degrees of freedom if they all see one rate. A sample x is the photons of one view in a
-    square of even side, which holds each Bayer colour alike, large enough for about 10 of them where it
-    is bright. `steps` holds `bright` and `even`, the outcome of the test.
+    Fisher's index of dispersion: sum (x - mean)^2 / mean over the V views of a point is distributed as
+    chi-square with V - 1 degrees of freedom if all views have the same rate. A sample x is the photons of one
+    view in a square window of even side, which has equally many pixels of each Bayer colour, large enough for
+    about 10 photons where the section is bright. `steps` holds `bright` and `even`, the outcome of the test.
     """
     window_px = section_window_px(sections)
     bright = _bright(_root_photons(sections, window_px))
@@ -54,11 +57,11 @@ def variance(counts: PhotonCounts, sections: Sections) -> Segmented:
 
 
 def shape_from_focus(counts: PhotonCounts, sections: Sections) -> Segmented:
-    """In focus is what is bright at z and sharper there than at any other requested or probe plane.
+    """Bright points that are sharper at z than at any other requested or probe plane are in focus.
 
-    Nayar and Nakagawa 1994: sharpness is the modified Laplacian |2 I - I(left) - I(right)| +
-    |2 I - I(above) - I(below)|, one pooling window apart, summed over a window where it exceeds the
-    noise. `steps` holds `bright` and `sharpness`.
+    Nayar and Nakagawa 1994: sharpness is the modified Laplacian |2 I - I(left) - I(right)| + |2 I - I(above)
+    - I(below)|, one pooling window apart, summed over a window where it exceeds its noise. `steps` holds
+    `bright` and `sharpness`.
     """
     compared = extend(sections, counts, with_probes(sections.planes))
     window_px = section_window_px(compared)
@@ -74,8 +77,8 @@ def shape_from_focus(counts: PhotonCounts, sections: Sections) -> Segmented:
 def sum_modified_laplacian(image: np.ndarray, step_px: int) -> np.ndarray:
     """Sharpness (H, W) of an image (H, W) whose noise is `NOISE`, its samples `step_px` apart.
 
-    Nayar and Nakagawa 1994, Eqs. 5 and 6. What is below the noise of a modified Laplacian, sqrt(6) times
-    that of a sample, is not added; borders continue the image.
+    Nayar and Nakagawa 1994, Eqs. 5 and 6. Values below the noise of a modified Laplacian, sqrt(6) times that
+    of a sample, are not added; beyond its borders the image is continued by its outermost pixels.
     """
     from scipy.ndimage import correlate1d, uniform_filter
 
@@ -93,24 +96,24 @@ def _root_photons(sections: Sections, window_px: int) -> np.ndarray:
 
 
 def _bright(image: np.ndarray) -> np.ndarray:
-    """What exceeds Otsu's threshold in each plane of (Z, H, W), without specks, bool."""
+    """Pixels above Otsu's threshold of each plane, (Z, H, W) bool, without small regions."""
     from skimage.filters import threshold_otsu
 
     masks: list[np.ndarray] = []
     for plane in image:
-        # No two classes are farther apart than the darkest and the brightest; Otsu's histogram needs two.
+        # The range bounds the contrast of any two classes; Otsu's histogram needs two different values.
         if np.ptp(plane) <= LEAST_CONTRAST_SIGMAS * NOISE:
             masks.append(np.zeros(plane.shape, dtype=bool))
             continue
         mask = plane > threshold_otsu(plane)
         contrast = plane[mask].mean() - plane[~mask].mean() if mask.any() else 0.0
-        is_real = contrast > LEAST_CONTRAST_SIGMAS * NOISE
-        masks.append(without_specks(mask & is_real, SMALLEST_REGION_PX))
+        is_significant = contrast > LEAST_CONTRAST_SIGMAS * NOISE
+        masks.append(without_specks(mask & is_significant, SMALLEST_REGION_PX))
     return np.stack(masks)
 
 
 def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
-    """Cell size at which a window of `WINDOW_CELLS` holds about 10 photons per view where it is bright."""
+    """Cell size at which a window of `WINDOW_CELLS` has about 10 photons per view where it is bright."""
     if not bright.any():
         return LARGEST_CELL_PX
     per_pixel = float(pooled.mean(axis=-1)[bright].mean())
@@ -119,7 +122,7 @@ def _cell_px(pooled: np.ndarray, bright: np.ndarray) -> int:
 
 
 def _is_even(counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int) -> np.ndarray:
-    """Where the views' samples vary no more than Poisson noise, (H, W) bool; so does what has no photons."""
+    """Where the variance over the views is that of Poisson noise, or 0, (H, W) bool."""
     from scipy.special import chdtri
 
     samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
@@ -133,9 +136,9 @@ def _is_even(counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int
 
 
 def _views(planes: FocalPlanes, cell_px: int) -> np.ndarray:
-    """How many views see the middle of each cell of the first plane, at least 1."""
+    """How many views cover the middle of each cell of the first plane, at least 1."""
     grid = planes.grid
     coverage = view_coverage(planes)[0].astype(np.float64)
     rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in (grid.height, grid.width))
-    at = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
-    return np.maximum(coverage[at], 1)
+    middle = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
+    return np.maximum(coverage[middle], 1)

@@ -1,4 +1,4 @@
-"""A clock by which the time of methods is taken, that goes on when it is told to: no test hangs on speed."""
+"""A clock that tests advance themselves, so that no test of timing depends on speed."""
 
 from types import SimpleNamespace
 

@@ -45,7 +45,7 @@ def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, s
     """Even light, and some hot pixels, of one view each or of all."""
     grid, rng = grid_of(views, (64, 72)), np.random.default_rng(seed)
     film = rng.poisson(rate, grid.shape_KLHW)
-    # No two beside each other: they are told from their neighbours.
+    # No two are adjacent: hot pixels are recognised by their neighbours.
     for place in rng.choice(8 * 9, pixels, replace=False):
         i, j = 8 * (place // 9) + 2, 8 * (place % 9) + 2
         view = np.s_[:, :] if everywhere else (rng.integers(views[0]), rng.integers(views[1]))

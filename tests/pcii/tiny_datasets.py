@@ -62,11 +62,11 @@ def write_dataset(root: Path, seed: int, hits: Mapping[float, int], title: str =
     return root
 
 
-def as_told(counts: PhotonCounts, sections: Sections) -> Segmented:
+def by_count(counts: PhotonCounts, sections: Sections) -> Segmented:
     """Claims at the plane p the pixels of the first view that have p + 1 photons."""
     first = counts.view(0, 0)
     masks = np.stack([first == plane + 1 for plane in range(len(sections.planes))])
-    return Segmented(masks, "as told", sections)
+    return Segmented(masks, "by count", sections)
 
 
 def two_rows(_: PhotonCounts, sections: Sections) -> Segmented:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.evidence.focus_likelihood import Focus, dark_around, photon_weighted_mean
+from pcii.evidence.focus_likelihood import FocusEvidence, dark_around, photon_weighted_mean
 from pcii.evidence.half_agreement import Halves, least_agreement
 from pcii.imaging.bright_regions import connected_pieces, dilated
 
@@ -109,7 +109,7 @@ def _typical_around(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     return np.exp(np.divide(logarithm, share, where=some, out=np.full(where.shape, np.inf)))
 
 
-def settled(plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes) -> np.ndarray:
+def settled(plane: np.ndarray, bright: np.ndarray, focus: FocusEvidence, planes: Planes) -> np.ndarray:
     """The planes (h, w) of cells, -1 for none, after pieces without evidence of their own joined others."""
     plane = plane.copy()
     for _ in range(ROUNDS):
@@ -132,7 +132,7 @@ def _join(
     plane: np.ndarray,
     bright: np.ndarray,
     size: np.ndarray,
-    focus: Focus,
+    focus: FocusEvidence,
     planes: Planes,
     own: int,
     box: tuple[slice, slice],
@@ -158,7 +158,7 @@ def _depths(planes: Planes, plane: int) -> np.ndarray:
 
 
 def regions_of(
-    plane: np.ndarray, bright: np.ndarray, focus: Focus, planes: Planes, halves: Halves
+    plane: np.ndarray, bright: np.ndarray, focus: FocusEvidence, planes: Planes, halves: Halves
 ) -> tuple[np.ndarray, list[Region]]:
     """A map (h, w) int64 of the regions' numbers, 0 outside, and the regions.
 
@@ -227,7 +227,9 @@ def _pieces(mask: np.ndarray) -> list[tuple[tuple[slice, slice], np.ndarray]]:
     return found
 
 
-def _evidence(focus: Focus, box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray) -> np.ndarray:
+def _evidence(
+    focus: FocusEvidence, box: tuple[slice, slice], piece: np.ndarray, bright: np.ndarray
+) -> np.ndarray:
     """Gain of every searched depth over a piece and the dark around it, (Z,) float64."""
     around = _around(box, piece, bright)
     return focus.gain[:, box[0], box[1]][:, around].sum(axis=1, dtype=np.float64)

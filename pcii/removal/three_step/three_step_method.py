@@ -1,12 +1,13 @@
-"""Removal of defocused points in the paper's three steps (Muniraj et al. 2017, section 3).
+"""Removal of defocused points by the three steps of Muniraj et al. 2017, section 3.
 
 1. Adaptive threshold on the variance of the non-zero samples (Eq. 7): in focus, the views' samples of
    a voxel differ by Poisson noise alone.
-2. Boundary detection by Roberts' cross (Eq. 8): the outline of what is bright runs along it, and its
-   ridges cut what is bright into regions.
+2. Boundary detection by Roberts' cross (Eq. 8): the outlines of bright regions lie on its ridges, and ridges
+   inside divide them into smaller regions.
 3. Entropy criterion (Eq. 9): a region is in focus at the plane where its entropy is lowest.
 
-Where the paper is silent we chose; docs/removal.md gives the reasons and the figures.
+docs/removal.md describes the choices that the paper leaves open, docs/experiments/three_step.md has the
+measurements behind them.
 """
 
 from dataclasses import dataclass, fields
@@ -43,26 +44,31 @@ from pcii.sections.reconstruction import extend, reconstruct
 WINDOW_CELLS = 4
 PHOTONS_PER_SAMPLE = 10.0
 LARGEST_CELL_PX = 8
-"""Eq. 7 pools over 4 x 4 cells, wide enough for about 5 photons per view where the photons are."""
+"""Eq. 7 pools over 4 x 4 cells of a size at which a view has about 10 photons in them where the photons
+are."""
 SIGMAS = 3.0
+"""By how many standard deviations of the sample variance T exceeds its expectation."""
 FEWEST_SAMPLES = 8
+"""With fewer non-zero samples than this a point is not removed."""
 PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
 LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2
-"""Half-extent of the blur at the farthest probe of what is in focus at its plane."""
+"""Half-extent, at the farthest probe plane, of the blur of a point in focus at a requested plane."""
 
 
 @dataclass(frozen=True)
 class ThreeStep:
-    """The paper's removal as a method for `pcii.segment`, each step to be left out at will.
+    """The paper's removal as a `method` of `pcii.segment`; each step can be left out.
 
-    Without `threshold` no point is removed for its variance. Without `boundary` whatever is lit by a photon
-    nearby may stay, and sub-images for the entropy are square tiles. Without `entropy` no region is
-    removed for being sharper elsewhere. Without any, all that is lit stays at every plane.
+    Without `threshold` no point is removed for its variance. Without `boundary` every point with a photon in
+    its window may remain, and the sub-images of the entropy are square tiles. Without `entropy` no region is
+    removed for being sharper at another plane. Without all three, every point with a photon in its window
+    remains at every plane.
 
-    With `subpixel` = M outlines are found on voxels M times finer (section 3.1); a pixel is in focus if half
-    of its voxels are. Raises `InputError` for a division below 1.
+    With `subpixel` = M outlines are located on voxels M times finer (section 3.1); a pixel is in focus if
+    half of its voxels are. Raises `InputError` for a `subpixel` below 1.
 
-    >>> focus = pcii.segment(counts, [540, 620], method=ThreeStep(entropy=False))  # doctest: +SKIP
+    >>> ThreeStep(subpixel=2, entropy=False).name
+    'three-step-subpixel-2-without-entropy'
     """
 
     subpixel: int = 1
@@ -77,7 +83,7 @@ class ThreeStep:
 
     @property
     def name(self) -> str:
-        """What results are called: three-step, and what is different."""
+        """Name of the results: three-step, and the settings that differ from the defaults."""
         missing = [f"without-{step.name}" for step in fields(self) if getattr(self, step.name) is False]
         fine = [f"subpixel-{self.subpixel}"] if self.subpixel > 1 else []
         return "-".join(["three-step", *fine, *missing])
@@ -86,19 +92,19 @@ class ThreeStep:
         """In-focus masks (Z, H, W) of the requested sections, with the maps of each step in `steps`.
 
         Step 1: `mean` and `variance` of the non-zero samples, `threshold` (T of Eq. 7), `answered` (where
-        there were enough samples) and `kept`. Step 2: `edges` (Roberts magnitude), `bright` (what it
+        there are enough samples) and `kept`. Step 2: `edges` (Roberts magnitude), `bright` (inside its
         outlines), `regions` (their numbers, from 1). Step 3: `entropy` of each region at each plane in bits,
-        0 outside, and `winner`, the plane where it is lowest, -1 outside; numbers from Z on are probes.
-        With `subpixel` > 1 `fine` holds the masks (Z, H M, W M) that the pixels are made from.
+        0 outside, and `winner`, the plane of least entropy, -1 outside; from Z on these are probe planes.
+        With `subpixel` = M > 1 `fine` holds the masks (Z, H M, W M) of the voxels.
         """
         planes = with_probes(requested.planes, clear_px=PROBE_STEP_PX)
         sections = extend(requested, counts, planes)
         count = len(requested.planes)
         cell_px = _cell_px(sections)
-        first = [
+        step1 = [
             adaptive_threshold(counts, planes, p, cell_px, _tolerance_px(planes, p)) for p in range(count)
         ]
-        steps = {name: np.stack([maps[name] for maps in first]) for name in first[0]}
+        steps = {name: np.stack([maps[name] for maps in step1]) for name in step1[0]}
 
         window_px = section_window_px(sections)
         pooled = pooled_estimate(sections, window_px)
@@ -106,14 +112,14 @@ class ThreeStep:
         smooth = _smoothed(edges)
         fine = np.stack([self._bright(counts, pooled[p], sections, p, window_px) for p in range(count)])
         bright = _half_of_each_pixel(fine, self.subpixel)
-        anywhere: np.ndarray = np.logical_or.reduce(bright)
+        bright_at_any: np.ndarray = np.logical_or.reduce(bright)
         margin = int(LARGEST_BLUR_PX)
         if self.boundary:
             ridges = smooth[:count].max(axis=0)
-            regions = pieces_along_ridges(anywhere, ridges, margin**2)
+            regions = pieces_along_ridges(bright_at_any, ridges, margin**2)
         else:
-            ridges, regions = None, _tiles(anywhere, 2 * margin)
-        steps |= {"edges": edges[:count], "bright": bright, "regions": _for_each(regions, count)}
+            ridges, regions = None, _tiles(bright_at_any, 2 * margin)
+        steps |= {"edges": edges[:count], "bright": bright, "regions": _repeated(regions, count)}
 
         kept = np.ones_like(bright)
         if self.threshold:
@@ -122,7 +128,7 @@ class ThreeStep:
             entropies = edge_entropies(smooth, regions, margin)
             winner = planes_of_least_entropy(entropies, regions, ridges, window_px)[regions]
             kept &= winner == np.arange(count)[:, None, None]
-            steps |= {"entropy": entropies.T[:count][:, regions], "winner": _for_each(winner, count)}
+            steps |= {"entropy": entropies.T[:count][:, regions], "winner": _repeated(winner, count)}
         if self.subpixel > 1:
             M = self.subpixel
             steps["fine"] = fine & kept.repeat(M, axis=1).repeat(M, axis=2)
@@ -136,7 +142,7 @@ class ThreeStep:
         plane: int,
         window_px: int,
     ) -> np.ndarray:
-        """Step 2 on voxels M times finer: what is outlined, (H M, W M); without the step what is lit."""
+        """Step 2 on voxels M times finer, (H M, W M) bool; without it voxels with a photon near."""
         M = self.subpixel
         samples = _samples(sections, plane, window_px)
         if M > 1:
@@ -151,18 +157,19 @@ class ThreeStep:
 def adaptive_threshold(
     counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int, tolerance_px: float
 ) -> dict[str, np.ndarray]:
-    """Step 1: where the variance of the non-zero samples is at most T (Eq. 7), and all that it takes.
+    """Step 1: where the variance of the non-zero samples is at most T (Eq. 7), with the maps it follows from.
 
     Maps (H, W): `mean`, `variance` and `threshold` float32, `kept` and `answered` bool. T is the variance of
-    non-zero Poisson samples of the same mean, plus `SIGMAS` times the sampling error of a variance, about
-    var sqrt(2 / (n - 1)) for n samples, plus what the section changes over the shifts that a surface in
-    focus may have: up to `tolerance_px` either way and the rounding to whole pixels, each uniform. Where
-    there are fewer than `FEWEST_SAMPLES` the step does not object, nor to less than a window of cells.
+    non-zero Poisson samples of the same mean, plus `SIGMAS` times the sampling error of a variance, about var
+    sqrt(2 / (n - 1)) for n samples, plus the variance due to the slope of the section, over shifts that a
+    surface in focus may have: `tolerance_px` either way and the rounding to whole pixels, both uniform.
+    Points with fewer than `FEWEST_SAMPLES` are kept, and so are rejected regions smaller than a window of
+    cells.
     """
     samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
     limit = _threshold(samples, cell_px, tolerance_px)
     known = samples.number >= FEWEST_SAMPLES
-    # One window above T is chance: there are many, and the cells around share its samples.
+    # With so many windows, single ones exceed T by chance, and with them the cells that share their samples.
     rejected = large_pieces(known & (samples.variance > limit), WINDOW_CELLS**2)
     maps = {
         "mean": samples.mean.astype(np.float32),
@@ -183,7 +190,7 @@ def _threshold(samples: ViewSamples, cell_px: int, tolerance_px: float) -> np.nd
 
 
 def _tolerance_px(planes: FocalPlanes, plane: int) -> float:
-    """Blur half-extent halfway to the nearest other plane: what is nearer to this one may stay."""
+    """Blur half-extent halfway to the nearest other plane: points closer to this plane may remain."""
     apart = np.abs(planes.total_disparity_px - planes.total_disparity_px[plane])
     others = apart[apart > 0]
     return float(others.min()) / 4 if others.size else 0.0
@@ -210,23 +217,23 @@ def _edges(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
 def _smoothed(edges: np.ndarray) -> np.ndarray:
     from scipy.ndimage import gaussian_filter, uniform_filter
 
-    # As for outlines: from corners to pixels.
+    # Roberts magnitudes belong to pixel corners: the mean of four moves them to pixel centres.
     return gaussian_filter(uniform_filter(edges, 2, axes=(1, 2)), EDGE_SMOOTHING_PX, axes=(1, 2))
 
 
 def _half_of_each_pixel(fine: np.ndarray, M: int) -> np.ndarray:
     """Pixels (Z, H, W) of which at least half of the M x M voxels are set."""
     Z, H, W = fine.shape
-    parts = fine.reshape(Z, H // M, M, W // M, M)
-    return 2 * parts.sum(axis=(2, 4), dtype=np.int64) >= M * M
+    voxels = fine.reshape(Z, H // M, M, W // M, M)
+    return 2 * voxels.sum(axis=(2, 4), dtype=np.int64) >= M * M
 
 
-def _tiles(lit: np.ndarray, side_px: int) -> np.ndarray:
-    """Sub-images of what is lit without boundaries: square tiles, numbered from 1; 0 where it is dark."""
-    row, col = (np.arange(size) // side_px for size in lit.shape)
+def _tiles(mask: np.ndarray, side_px: int) -> np.ndarray:
+    """Square tiles of a mask (H, W), numbered from 1; 0 outside the mask."""
+    row, col = (np.arange(size) // side_px for size in mask.shape)
     numbers = 1 + row[:, None] * (col[-1] + 1) + col
-    return np.where(lit, numbers, 0).astype(np.int32)
+    return np.where(mask, numbers, 0).astype(np.int32)
 
 
-def _for_each(values: np.ndarray, planes: int) -> np.ndarray:
+def _repeated(values: np.ndarray, planes: int) -> np.ndarray:
     return np.broadcast_to(values, (planes, *values.shape))

@@ -46,11 +46,11 @@ def saved(tmp_path: Path) -> Results:
     return results
 
 
-@pytest.mark.parametrize("tells", [True, False])
-def test_masks_and_photons_come_back_as_they_were(tmp_path: Path, tells: bool) -> None:
+@pytest.mark.parametrize("has_photons", [True, False])
+def test_masks_and_photons_come_back_as_they_were(tmp_path: Path, has_photons: bool) -> None:
     dataset = dataset_of(tmp_path, 0.3)
     rng = np.random.default_rng(4)
-    kept = rng.random((2, dataset.counts.events.n.size)) < 0.5 if tells else None
+    kept = rng.random((2, dataset.counts.events.n.size)) < 0.5 if has_photons else None
     with Results(tmp_path / "out", dataset).writing() as results:
         results.save_segmented(masks_of(dataset, kept))
     (found,) = results.load_segmented()

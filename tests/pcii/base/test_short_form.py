@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hostile_names import NAMES
-from tiny_datasets import NESTED, OWN, as_told, write_dataset
+from tiny_datasets import NESTED, OWN, by_count, write_dataset
 
 from pcii.base.plain_text import visible
 from pcii.base.short_form import listed
@@ -26,7 +26,7 @@ def values(tmp_path: Path) -> list[tuple[object, str]]:
     counts, truth = dataset.counts, dataset.truth
     assert truth is not None
     sections = reconstruct(counts, [1.0, 2.0])
-    focus = as_told(counts, sections)
+    focus = by_count(counts, sections)
     z_mm = np.full((8, 12), np.nan)
     z_mm[0, :6] = np.arange(500, 506)
     depth = DepthMap(z_mm, np.zeros((8, 12)))
@@ -46,9 +46,9 @@ def values(tmp_path: Path) -> list[tuple[object, str]]:
         (photons, "PhotonTruth(photons=5, objects=1)"),
         (views, "Views(shape=2 x 2 x 8 x 12 x 1, cfa=GRBG)"),
         (sections, f"Sections(z_mm=[1, 2], shape=2 x 8 x 12 x 1, photons={kept}, subpixel=1)"),
-        (focus, "Segmented(method=as told, z_mm=[1, 2], shape=2 x 8 x 12, in_focus=[5.21%, 10.42%])"),
+        (focus, "Segmented(method=by count, z_mm=[1, 2], shape=2 x 8 x 12, in_focus=[5.21%, 10.42%])"),
         (depth, "DepthMap(shape=8 x 12, answered=6.25%, z_mm=500 to 505)"),
-        (score(focus, None, truth), "Score(methods=[as told], planes=4, objects=2)"),
+        (score(focus, None, truth), "Score(methods=[by count], planes=4, objects=2)"),
     ]
 
 
@@ -63,7 +63,7 @@ def test_each_value_says_what_it_is_in_a_line(values: list[tuple[object, str]]) 
 def test_a_score_shows_its_planes(values: list[tuple[object, str]]) -> None:
     page = values[-1][0]._repr_html_()  # type: ignore[attr-defined]
     assert page.count("<tr>") == 1 + 4
-    assert "<td>1</td><td>as told</td><td>object</td><td>near</td><td>0.5</td>" in page
+    assert "<td>1</td><td>by count</td><td>object</td><td>near</td><td>0.5</td>" in page
     assert "<td>–</td>" in page  # no object is named by pixel
 
 

@@ -18,7 +18,7 @@ def depth(two_squares) -> DepthMap:
     return estimate_depth(two_squares.counts, RANGE_MM)
 
 
-def spread_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
+def disparity_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
     """Errors in px of total disparity over one square; infinite where the method abstains."""
     z = depth.z_mm[scene.masks[plane]]
     errors = np.abs(6 / z - 6 / scene.z_mm[plane])  # six steps between seven cameras, each of 1 / z px
@@ -27,28 +27,28 @@ def spread_errors_px(depth: DepthMap, scene: Any, plane: int) -> np.ndarray:
 
 @pytest.mark.parametrize("plane", [0, 1])
 def test_depths_of_the_squares_are_right(depth, two_squares, plane):
-    errors = spread_errors_px(depth, two_squares, plane)
-    # Planes are 2 px of spread apart, and the parabola between them finds a quarter of that; nine tenths
-    # are at the nearest plane or the next, the rest of the outline may be mixed with the dark.
+    errors = disparity_errors_px(depth, two_squares, plane)
+    # Planes are 2 px of total disparity apart, and the parabola between them finds a quarter of that; nine
+    # tenths are at the nearest plane or the next, the rest of the outline may be mixed with the dark.
     assert np.median(errors) < 0.5
     assert (errors < 2.0).mean() > 0.9
 
 
 @pytest.mark.parametrize("plane", [0, 1])
 @pytest.mark.parametrize("beyond", [0.7, 1.0])
-def test_depths_between_planes_are_told_apart(two_squares, plane, beyond):
-    # Planes at 6.7, 8.7, ... px of spread, or 7, 9, ...: 0.7 or 1 px from the truth, 18 and 42 px.
+def test_depths_between_planes_are_distinguished(two_squares, plane, beyond):
+    # Planes at 6.7, 8.7, ... px of total disparity, or 7, 9, ...: 0.7 or 1 px from the truth, 18 and 42 px.
     shifted = (6 / (54 + beyond), 6 / (6 + beyond))
-    errors = spread_errors_px(estimate_depth(two_squares.counts, shifted), two_squares, plane)
-    # Shifts are whole pixels, so that planes up to 1 px from the truth may be the same section; their
-    # neighbours tell. Without the parabola it would be 0.7 or 1, with its sign reversed more.
+    errors = disparity_errors_px(estimate_depth(two_squares.counts, shifted), two_squares, plane)
+    # Shifts are whole pixels, so that planes up to 1 px from the truth may be the same section; the
+    # planes beside them differ. Without the parabola it would be 0.7 or 1, with its sign reversed more.
     assert np.median(errors) < 0.5
 
 
 @pytest.mark.parametrize("plane", [0, 1])
 def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
     flipped = PhotonCounts.from_dense(two_squares.dense[::-1, ::-1], two_squares.grid, cfa="GRBG")
-    errors = spread_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
+    errors = disparity_errors_px(estimate_depth(flipped, RANGE_MM), two_squares, plane)
     assert np.median(errors) > 0.5
 
 
@@ -130,7 +130,7 @@ def test_the_depth_of_a_slanted_card_is_monotone(turned):
     found = np.array([np.nanmedian(6 / z[:, x - 8 : x + 8]) for x in middle])
     true = 6 * (3.0 + 3.0 * middle / 159)
     assert np.all(np.diff(found) > 0)
-    # Bands of 16 px span 1.8 px of spread, planes 2: half of that.
+    # Bands of 16 px span 1.8 px of total disparity, planes 2: half of that.
     np.testing.assert_allclose(found, true, atol=1.0)
     assert np.isfinite(z[:, 16:-16]).mean() > 0.9
 

@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 import pytest
 from slow_clock import SlowClock
-from tiny_datasets import NESTED, OWN, as_told, two_rows, write_dataset
+from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
 from pcii.base import command_line
@@ -21,20 +21,20 @@ from pcii.core.estimates import DepthMap
 from pcii.evaluation.comparison import evaluate, find_datasets
 from pcii.evaluation.rows import ROWS, all_rows, append_row, claim_rows
 from pcii.evaluation.summary import summarise
-from pcii.evaluation.tables import markdown, overview, told
+from pcii.evaluation.tables import markdown, overview, with_interval
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
 from pcii.removal.methods import METHODS
 
 HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
-FAKES = ("as told", "two rows")
+FAKES = ("by count", "two rows")
 
 
 @pytest.fixture
 def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Makes the fake methods known; every call of one is noted."""
     noted: list[str] = []
-    for method in (as_told, two_rows):
+    for method in (by_count, two_rows):
         name = method.__name__.replace("_", " ")
 
         def noting(counts: Any, z_mm: Any, name: str = name, method: Any = method) -> Any:
@@ -68,20 +68,20 @@ def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) ->
     (group,) = evaluation["groups"]
     assert (group["title"], group["scene"], group["datasets"]) == ("by hand", "by hand", 3)
     assert json.loads((tmp_path / "out" / "evaluation.json").read_text()) == evaluation
-    told = result_of(evaluation, OWN, "as told")
-    near, far = told["planes"]
+    result = result_of(evaluation, OWN, "by count")
+    near, far = result["planes"]
     # 0.6, 0.8, 0.7 of the near object: mean 0.7, half width 4.302653 * 0.1 / sqrt(3) = 0.248414.
     assert near["z_mm"] == 1.0
-    assert near["object"]["iou"]["n"] == told["seeds"] == 3
+    assert near["object"]["iou"]["n"] == result["seeds"] == 3
     assert near["object"]["iou"]["mean"] == pytest.approx(0.7)
     assert near["object"]["iou"]["interval"] == pytest.approx([0.451586, 0.948414], abs=1e-6)
     assert near["object"]["precision"] == {"n": 3, "mean": 1.0, "interval": [1.0, 1.0]}
     assert near["object"]["photon_recall"] is None  # these photons have no known origin
     assert far["object"]["iou"]["mean"] == 1.0
     # Over both planes 0.8, 0.9, 0.85; the points of each object are in focus at its plane alone.
-    assert told["object"]["iou"]["mean"] == pytest.approx(0.85)
-    assert told["object"]["iou"]["interval"] == pytest.approx([0.725793, 0.974207], abs=1e-6)
-    assert told["pixel"]["iou"] == told["object"]["iou"]
+    assert result["object"]["iou"]["mean"] == pytest.approx(0.85)
+    assert result["object"]["iou"]["interval"] == pytest.approx([0.725793, 0.974207], abs=1e-6)
+    assert result["pixel"]["iou"] == result["object"]["iou"]
     # Of 24 pixels the near object is 10, the far one 0, in every dataset.
     rows = result_of(evaluation, OWN, "two rows")
     assert rows["object"]["iou"]["mean"] == pytest.approx(10 / 24 / 2)
@@ -90,14 +90,14 @@ def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) ->
     # Each object is flat and at its plane, so who knows the depths makes no mistake.
     assert rows["pixel"]["iou_oracle"]["mean"] == 1.0
     # 96 photons in the last view and 20 + 6, 8, 7 in the first, of four views.
-    assert told["photons_per_view"] == pytest.approx((96 + 20 + 7) / 4)
+    assert result["photons_per_view"] == pytest.approx((96 + 20 + 7) / 4)
 
 
 def test_methods_are_compared_on_the_same_datasets(series: Path, tmp_path: Path, calls: list[str]) -> None:
     (group,) = evaluate([series], tmp_path / "out", methods=FAKES)["groups"]
     nested, own = group["paired"]
     assert (nested["budget"], own["budget"]) == (NESTED, OWN)
-    assert own["methods"] == ["as told", "two rows"]
+    assert own["methods"] == ["by count", "two rows"]
     assert own["difference"]["mean"] == pytest.approx(0.85 - 10 / 48)
     assert own["p"] == 2 / 8
     assert own["exact"]
@@ -105,16 +105,18 @@ def test_methods_are_compared_on_the_same_datasets(series: Path, tmp_path: Path,
     assert nested["difference"]["interval"] == pytest.approx([1 - 10 / 48] * 2)
 
 
-def test_more_photons_that_make_it_worse_are_told(series: Path, tmp_path: Path, calls: list[str]) -> None:
+def test_a_significant_fall_with_more_photons_is_listed(
+    series: Path, tmp_path: Path, calls: list[str]
+) -> None:
     (group,) = evaluate([series], tmp_path / "out", methods=FAKES)["groups"]
     # From 1 to 0.8, 0.9, 0.85: -0.15, half width 4.302653 * 0.05 / sqrt(3) = 0.124207. "two rows" stays.
     (fall,) = group["monotonic"]
-    assert (fall["method"], fall["from"], fall["to"]) == ("as told", NESTED, OWN)
+    assert (fall["method"], fall["from"], fall["to"]) == ("by count", NESTED, OWN)
     assert fall["difference"]["mean"] == pytest.approx(-0.15)
     assert fall["difference"]["interval"] == pytest.approx([-0.274207, -0.025793], abs=1e-6)
 
 
-def test_a_fall_that_the_interval_explains_is_not_told(tmp_path: Path, calls: list[str]) -> None:
+def test_an_insignificant_fall_is_not_listed(tmp_path: Path, calls: list[str]) -> None:
     for seed, hits in ((1, 5), (2, 9)):  # -0.25 and -0.05: half width 12.7 * 0.1
         write_dataset(tmp_path / "data" / f"seed_{seed}", seed, {NESTED: 10, OWN: hits})
     (group,) = evaluate([tmp_path / "data"], tmp_path / "out", methods=FAKES)["groups"]
@@ -123,7 +125,7 @@ def test_a_fall_that_the_interval_explains_is_not_told(tmp_path: Path, calls: li
 
 def test_one_dataset_has_no_intervals(series: Path, tmp_path: Path, calls: list[str]) -> None:
     evaluation = evaluate([series / "seed_3"], tmp_path / "out", methods=FAKES, budgets=[OWN])
-    row = result_of(evaluation, OWN, "as told")
+    row = result_of(evaluation, OWN, "by count")
     assert row["object"]["iou"] == {"n": 1, "mean": pytest.approx(0.8), "interval": None}
     assert row["seconds"]["interval"] is None
     assert evaluation["groups"][0]["paired"][0]["p"] == 1.0
@@ -143,20 +145,22 @@ def change_recipe(dataset: Path, **settings: Any) -> None:
     write_manifest(dataset, manifest)
 
 
-def test_groups_of_one_title_are_told_by_what_differs(tmp_path: Path, calls: list[str]) -> None:
+def test_groups_of_one_title_are_labelled_by_the_settings_that_differ(
+    tmp_path: Path, calls: list[str]
+) -> None:
     data = [write_dataset(tmp_path / f"data {number}", 1, {OWN: 2 + number}) for number in range(4)]
     change_recipe(data[1], scene="another", grid={"rows": 4}, exposure=None)
     change_recipe(data[2], scene="another", grid={"rows": 6}, exposure={"time_s": 1.0})
-    change_recipe(data[3], title="of its own")  # which `title` of the manifest does not tell
+    change_recipe(data[3], title="of its own")  # the manifest's `title` stays the same
     other = write_dataset(tmp_path / "other", 1, {OWN: 9}, title="other")
-    evaluation = evaluate([*data, other], tmp_path / "out", methods=["as told"])
+    evaluation = evaluate([*data, other], tmp_path / "out", methods=["by count"])
     table = overview(evaluation["groups"])
     cells = {row[0]: row[2] for row in table.rows}
     assert len(table.rows) == len(cells) == 5
     assert cells["by hand (scene=another, grid.rows=6)"] == "0.700"
     assert cells["by hand (scene=another, grid.rows=4)"] == "0.650"
     assert cells["other"] == "0.950"
-    # These two have the same settings, and are told by their recipes' hashes.
+    # These two have the same settings, and differ by the hashes of their recipes.
     left = {row["label"]: row["recipe"][:8] for row in evaluation["groups"] if row["scene"] == "by hand"}
     assert list(left) == [f"by hand (scene=by hand, recipe {recipe})" for recipe in left.values()]
     page = (tmp_path / "out" / "evaluation.html").read_text()
@@ -176,7 +180,7 @@ def test_what_a_later_dataset_needs_compiled_is_no_time_of_the_method(
             clock.go_on(1 if loop.signatures else 100)
             loop(counts.total)
         clock.go_on(1)
-        return as_told(counts, sections)
+        return by_count(counts, sections)
 
     monkeypatch.setitem(METHODS, "late", late)
     first_total = open_dataset(series / "seed_3").counts.total
@@ -228,7 +232,7 @@ def test_table_1_is_counted_over_seeds() -> None:
     assert bird["mean_gap_bits"] == pytest.approx(0.5 / 3)
 
 
-def test_a_depth_map_without_answers_is_told_as_such(
+def test_a_depth_map_without_estimates_is_reported_as_such(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing = DepthMap(np.full((8, 12), np.nan), np.zeros((8, 12)))
@@ -242,10 +246,10 @@ def test_a_depth_map_without_answers_is_told_as_such(
 
 
 def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, calls: list[str]) -> None:
-    evaluate([series], tmp_path / "out", methods=["as told"])
+    evaluate([series], tmp_path / "out", methods=["by count"])
     assert len(calls) == 3 * 2 + 2  # a row for each dataset and budget, and one call that warms up by budget
     first = rows_of(tmp_path / "out")
-    evaluate([series, series / "seed_3"], tmp_path / "out", methods=["as told"])
+    evaluate([series, series / "seed_3"], tmp_path / "out", methods=["by count"])
     assert len(calls) == 8
     evaluate([series], tmp_path / "out", methods=FAKES)
     assert set(calls[8:]) == {"two rows"}
@@ -278,14 +282,14 @@ def without_seconds(evaluation: dict[str, Any]) -> dict[str, Any]:
 
 def test_parts_share_the_work(series: Path, tmp_path: Path, calls: list[str]) -> None:
     out = tmp_path / "out"
-    first = evaluate([series], out, methods=["as told"], part=(1, 2))
+    first = evaluate([series], out, methods=["by count"], part=(1, 2))
     assert {row["seed"] for row in rows_of(out)} == {3, 5}
     assert first["missing"] == 2
     assert "2 rows are still to be measured" in (out / "evaluation.md").read_text()
-    second = evaluate([series], out, methods=["as told"], part=(2, 2))
+    second = evaluate([series], out, methods=["by count"], part=(2, 2))
     assert len(rows_of(out)) == 6
     assert without_seconds(second) == without_seconds(
-        evaluate([series], tmp_path / "one", methods=["as told"])
+        evaluate([series], tmp_path / "one", methods=["by count"])
     )
 
 
@@ -363,7 +367,7 @@ def test_the_command_and_its_page(
     series: Path, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    command = ["evaluate", str(series), "-o", str(out), "--method", "as told", "--method", "two rows"]
+    command = ["evaluate", str(series), "-o", str(out), "--method", "by count", "--method", "two rows"]
     assert command_line.run(cli.app, command) == 0
     assert "evaluation.html" in capsys.readouterr().out
     page = (out / "evaluation.html").read_text()
@@ -372,7 +376,7 @@ def test_the_command_and_its_page(
     assert "://" not in page
     assert str(tmp_path) not in page
     assert "0.850 (0.726 to 0.974)" in page
-    assert "IoU of as told is worse with 50 photons than with 20" in page
+    assert "IoU of by count is lower with 50 photons than with 20" in page
     assert len(rows_of(out)) == 12
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
     assert command_line.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
@@ -388,10 +392,10 @@ def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str
     assert len({len(re.findall(r"(?<!\\)\|", line)) for line in lines}) == 1
     assert lines[0] == "| scene | method | 20 | 50 |"
     # The scene with one dataset and one budget.
-    assert r"| ball \| bird | as told | – | 0.750 |" in lines
+    assert r"| ball \| bird | by count | – | 0.750 |" in lines
 
 
-def test_means_are_told_with_their_interval() -> None:
-    assert told(None) == "–"
-    assert told({"mean": 0.5, "interval": None}) == "0.500"
-    assert told({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"
+def test_means_are_shown_with_their_interval() -> None:
+    assert with_interval(None) == "–"
+    assert with_interval({"mean": 0.5, "interval": None}) == "0.500"
+    assert with_interval({"mean": -0.03, "interval": [-0.074, 0.015]}, 2) == "-0.03 (-0.07 to 0.01)"

@@ -130,11 +130,11 @@ def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Ou
 def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None:
     texts = Read(pages["evaluation.html"]).texts
     for name in NAMES:
-        told = visible(name)
-        assert told in texts  # method, object
-        for scene in (told, "other"):
-            assert texts.count(f"{told} (scene={scene})") == 1 + 2  # heading, and by method in the overview
-        assert f"IoU of {told} is worse with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
+        shown = visible(name)
+        assert shown in texts  # method, object
+        for scene in (shown, "other"):
+            assert texts.count(f"{shown} (scene={scene})") == 1 + 2  # heading, and by method in the overview
+        assert f"IoU of {shown} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
@@ -163,7 +163,7 @@ def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) ->
         read = html.unescape(re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", in_markdown(name)))
         assert read == visible(name)
     lines = [line for line in text.splitlines() if line]
-    assert all(re.match(r"\||#+ |IoU of |Figures |p: ", line) for line in lines)
+    assert all(re.match(r"\||#+ |IoU of |Scores |p: ", line) for line in lines)
 
 
 def test_what_a_page_lacks_is_no_empty_place() -> None:

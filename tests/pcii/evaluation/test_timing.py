@@ -54,7 +54,7 @@ def loaded(file: Path) -> ModuleType:
     return module
 
 
-def test_what_compiles_nothing_is_called_once(clock: SlowClock) -> None:
+def test_work_that_compiles_nothing_is_called_once(clock: SlowClock) -> None:
     work, calls = counted(clock, lambda _: 7)
     assert timed(work) == (100.0, 7)
     assert len(calls) == 1

@@ -55,12 +55,12 @@ def reach(place_px: float, block: int, width_px: int, blocks: int) -> float:
 
 def views_along(shifts: list[int], size: int, blocks: int, width_px: int) -> list[float]:
     """Pairs of pixels and cameras in each block of an axis, in blocks of 2."""
-    seen = [0.0] * blocks
+    covering_views = [0.0] * blocks
     for shift in shifts:
         for place in range(size):
             if covered(place, shift, size):
-                seen[place // width_px] += 1 / 2
-    return seen
+                covering_views[place // width_px] += 1 / 2
+    return covering_views
 
 
 def covered(place: int, shift: int, size: int) -> bool:
@@ -81,7 +81,7 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
         width = 2 << scale
         rows, cols = -(-2 * h // (1 << scale)), -(-2 * w // (1 << scale))
         scales.append((width, rows, cols))
-    seen = [
+    covering_views = [
         (views_along(shift[0], H, rows, width), views_along(shift[1], W, cols, width))
         for width, rows, cols in scales
     ]
@@ -103,8 +103,8 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
     def samples(scale: int, y: float, x: float) -> float:
         """Per site of the pattern."""
         width, rows, cols = scales[scale]
-        down = sum(v * reach(y, b, width, rows) for b, v in enumerate(seen[scale][0]))
-        return down * sum(v * reach(x, b, width, cols) for b, v in enumerate(seen[scale][1]))
+        down = sum(v * reach(y, b, width, rows) for b, v in enumerate(covering_views[scale][0]))
+        return down * sum(v * reach(x, b, width, cols) for b, v in enumerate(covering_views[scale][1]))
 
     rate, cell = np.zeros(len(photons)), np.full(len(photons), -1)
     expected, gain, size = np.zeros((h, w)), np.zeros((h, w)), np.zeros((h, w))
@@ -114,7 +114,7 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
         y, x = row + 0.5, col + 0.5
         rates = []
         for scale in range(5):
-            # One photon tells no colour: 0.3 are thought to be of each in proportion to its sites.
+            # The prior of the colours' shares: 0.3 photons in proportion to the sites.
             wide, around = max(scale, 3), light(max(scale, 3), y, x, None, e)
             share = (light(wide, y, x, c, e) + 0.3 * sites[c] / sum(sites)) / (around + 0.3)
             rates.append(light(scale, y, x, None, e) * share / (samples(scale, y, x) * sites[c]))
@@ -125,7 +125,7 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
         size[row // 4, col // 4] += n * abs(math.log(rate[e] / base))
     for a, b in itertools.product(range(h), range(w)):
         blocks = [(y, x) for y in (2 * a, 2 * a + 1) for x in (2 * b, 2 * b + 1)]
-        here = {(y, x): seen[0][0][y] * seen[0][1][x] for y, x in blocks}
+        here = {(y, x): covering_views[0][0][y] * covering_views[0][1][x] for y, x in blocks}
         if not sum(here.values()):
             continue
         for y, x in blocks:
@@ -157,12 +157,12 @@ def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin
 def test_predictions_and_gains_are_those_of_all_other_photons(cfa, disparity):
     # Landing 16 px or more from the frame, between the centres of the widest blocks (see the next test).
     counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=40, seed=3, margin=20)
-    focus, seen = predictions_of(counts, plane_at(counts.grid, disparity))
+    focus, predictions = predictions_of(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
-    np.testing.assert_array_equal(seen.cell[0], twin.cell)
+    np.testing.assert_array_equal(predictions.cell[0], twin.cell)
     # Rates are kept in single precision, and sums of gains: a few roundings of 6e-8 each.
-    np.testing.assert_allclose(seen.rate[0], twin.rate, rtol=1e-6)
-    np.testing.assert_allclose(seen.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(predictions.rate[0], twin.rate, rtol=1e-6)
+    np.testing.assert_allclose(predictions.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
 
 
@@ -173,19 +173,19 @@ TINY = [((9, 11), 1), ((9, 11), 3), ((9, 11), 7.5), ((1, 1), 1), ((5, 2), 2), ((
 @pytest.mark.parametrize(("size", "disparity"), TINY)
 def test_photons_are_expected_where_the_section_says_up_to_the_frame(cfa, size, disparity):
     counts = scattered(unit_grid(2, 3, *size), cfa, photons=20, seed=1)
-    seen = predictions_of(counts, plane_at(counts.grid, disparity))[1]
+    predictions = predictions_of(counts, plane_at(counts.grid, disparity))[1]
     twin = focus_twin(counts, disparity)
-    np.testing.assert_array_equal(seen.cell[0], twin.cell)
-    np.testing.assert_allclose(seen.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_array_equal(predictions.cell[0], twin.cell)
+    np.testing.assert_allclose(predictions.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
 @pytest.mark.parametrize(("size", "disparity"), TINY)
 def test_predictions_at_the_frame_are_those_of_all_other_photons(cfa, size, disparity):
     counts = scattered(unit_grid(2, 3, *size), cfa, photons=20, seed=1)
-    focus, seen = predictions_of(counts, plane_at(counts.grid, disparity))
+    focus, predictions = predictions_of(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
-    np.testing.assert_allclose(seen.rate[0], twin.rate, rtol=1e-6)
+    np.testing.assert_allclose(predictions.rate[0], twin.rate, rtol=1e-6)
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
 
 
@@ -346,11 +346,11 @@ def test_depths_whose_shifts_are_all_even_do_not_attract_texture():
 def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
     grid = unit_grid(2, 2, *size)
     counts = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
-    focus, seen = predictions_of(counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0]))
+    focus, predictions = predictions_of(counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0]))
     assert cell_shape(counts) == (math.ceil(size[0] / 4), math.ceil(size[1] / 4))
-    assert focus.gain.shape == seen.expected.shape == (2, *cell_shape(counts))
+    assert focus.gain.shape == predictions.expected.shape == (2, *cell_shape(counts))
     assert focus.photons.shape == (2, counts.channel_count, *cell_shape(counts))
-    assert seen.rate.shape == seen.cell.shape == (2, 0)
+    assert predictions.rate.shape == predictions.cell.shape == (2, 0)
     assert not focus.gain.any()
     assert not focus.photons.any()
     assert not windowed(focus.gain, focus.photons).any()
@@ -360,10 +360,10 @@ def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
 def test_the_largest_counts_have_finite_gains(size):
     grid = unit_grid(3, 3, *size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 1 << 40), grid, cfa="GRBG")
-    focus, seen = predictions_of(
+    focus, predictions = predictions_of(
         counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0, 200.0])
-    )  # at the last some views see nothing
-    for values in (focus.gain, seen.rate, seen.expected, windowed(focus.gain, focus.photons)):
+    )  # some views do not reach the last
+    for values in (focus.gain, predictions.rate, predictions.expected, windowed(focus.gain, focus.photons)):
         assert np.all(np.isfinite(values))
 
 
@@ -375,8 +375,8 @@ def test_photons_are_counted_by_colour_and_cell():
         PhotonCounts.from_events(*events, grid, cfa="GRBG"), FocalPlanes.at_total_disparity(grid, 3.0)
     )
     expected = np.zeros((3, 2, 2))
-    expected[1, 0, 1] = 2  # green at (4, 4), lands in row 3
-    expected[1, 1, 1] = 1  # green at (3, 5), lands in row 5; the last photon leaves the frame for row 8
+    expected[1, 0, 1] = 2  # green at (4, 4), projected to row 3
+    expected[1, 1, 1] = 1  # green at (3, 5), projected to row 5; the last photon leaves the frame for row 8
     np.testing.assert_array_equal(focus.photons[0], expected)
 
 
@@ -533,11 +533,13 @@ def test_without_evidence_the_first_label_is_taken(labels):
 
 
 @pytest.mark.parametrize("rate", [0.05, 3.0])
-@pytest.mark.parametrize("lit", [1.0, 0.25])
-def test_typical_light_is_that_of_what_is_lit(rate, lit):
-    cells = np.random.default_rng(0).poisson(np.where(np.arange(200) < 200 * lit, rate, 0.0), (200, 200))
+@pytest.mark.parametrize("bright_share", [1.0, 0.25])
+def test_photon_weighted_mean_is_that_of_bright_cells(rate, bright_share):
+    cells = np.random.default_rng(0).poisson(
+        np.where(np.arange(200) < 200 * bright_share, rate, 0.0), (200, 200)
+    )
     # The pairs n (n - 1) tell it; of them there are rate^2 a cell.
-    pairs = 200 * 200 * lit * rate**2
+    pairs = 200 * 200 * bright_share * rate**2
     assert abs(photon_weighted_mean(cells.astype(np.float32)) / rate - 1) < 5 * np.sqrt(
         2 / pairs + 4 / (pairs / rate)
     )

@@ -74,7 +74,7 @@ def test_products_are_those_of_the_formula(cfa):
     for side, products in zip(SIDES_CELLS, halves.products, strict=True):
         expected = np.ones((-(-h // side), -(-w // side)))
         for half in (0, 1):
-            light, seen = np.zeros((2, *expected.shape))
+            photons, samples = np.zeros((2, *expected.shape))
             for k, l, i, j in np.ndindex(*grid.shape_KLHW):
                 # Disparity 2: shifts of whole blocks of 2 px down, of half a block across.
                 row, col = i + 2 * (k - 1), j + (2 * l - 1)
@@ -83,16 +83,16 @@ def test_products_are_those_of_the_formula(cfa):
                 whole &= all(0 <= at < 38 and 0 <= at - (2 * l - 1) < 38 for at in cols)
                 if whole and (k + l) % 2 == half:
                     block = row // 4 // side, col // 4 // side
-                    light[block] += film[k, l, i, j]
-                    seen[block] += 1
-            smooth = np.zeros_like(light)
-            for a, b in np.ndindex(*light.shape):
+                    photons[block] += film[k, l, i, j]
+                    samples[block] += 1
+            smooth = np.zeros_like(photons)
+            for a, b in np.ndindex(*photons.shape):
                 near = np.s_[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2]
-                around, views = light[near].sum() - light[a, b], seen[near].sum() - seen[a, b]
-                smooth[a, b] = seen[a, b] * around / views if views * seen[a, b] > 0 else 0.0
-                light[a, b] = light[a, b] if views * seen[a, b] > 0 else 0.0
+                around, views = photons[near].sum() - photons[a, b], samples[near].sum() - samples[a, b]
+                smooth[a, b] = samples[a, b] * around / views if views * samples[a, b] > 0 else 0.0
+                photons[a, b] = photons[a, b] if views * samples[a, b] > 0 else 0.0
             scale = smooth + smooth.mean() + (smooth.mean() == 0)
-            expected *= (light - smooth) / scale
+            expected *= (photons - smooth) / scale
         np.testing.assert_allclose(products[0], expected, rtol=1e-9, atol=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""The loops that predict photons from a section: in parts, and where views are hidden."""
+"""The loops that predict photons from a section: in chunks, and where views are hidden."""
 
 import numpy as np
 from twins import even_light, unit_grid
@@ -16,25 +16,25 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     events = counts.events
     hidden = ((events.k + events.l) % 2 == 0) & (events.j < 32)
     # The shifts are 0: of the left half every second view is hidden.
-    seen = np.repeat(np.where(np.arange(16) < 8, 0.5, 1.0)[None], 16, axis=0).astype(np.float32)
+    view_share = np.repeat(np.where(np.arange(16) < 8, 0.5, 1.0)[None], 16, axis=0).astype(np.float32)
     none = np.zeros(4, np.int32)
     N = events.n.size
-    cell, own, base = np.zeros(N, np.int32), np.zeros(N, np.float32), np.zeros(N, np.float32)
+    cell, rates, base = np.zeros(N, np.int32), np.zeros(N, np.float32), np.zeros(N, np.float32)
     samples, mean, blurred = np.zeros((3, 16, 16), np.float32)
     where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
     weight = (~hidden).astype(np.float32)
     sites = np.array([4.0])
     cells_of_events(*where[:4], none, none, (64, 64), cell)
-    section = PlaneView(none, none, 64, 64, sites, seen, 1.0)
-    predict(PlacedEvents(*where, weight, cell), section, Predicted(own, base, samples, mean, blurred))
+    section = PlaneView(none, none, 64, 64, sites, view_share, 1.0)
+    predict(PlacedEvents(*where, weight, cell), section, Predicted(rates, base, samples, mean, blurred))
     for part in (np.s_[:, :8], np.s_[:, 8:]):
         photons = rate * 4 * views * 64 * 32 / 4 / 2  # per block and view; half of them are seen on the left
         assert abs(mean[part].mean() / (4 * rate) - 1) < 5 / np.sqrt(photons)
     # A hidden event is predicted, too, and takes no part in it: those beside it are all alike.
-    assert abs(own[hidden].mean() / rate - 1) < 0.02
+    assert abs(rates[hidden].mean() / rate - 1) < 0.02
 
 
-def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
+def test_events_are_predicted_the_same_in_chunks_and_only_if_selected():
     K, L, H, W = 4, 5, 96, 128
     counts = even_light(unit_grid(K, L, H, W), 0.02, seed=3, cfa="GRBG")
     events = counts.events
@@ -44,11 +44,11 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     cell = np.zeros(N, np.int32)
     cells_of_events(*where, rows, cols, (H, W), cell)
     assert (cell < 0).any()
-    weight, seen = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
+    weight, view_share = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
     colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)
     about = (
         PlacedEvents(*where, colours, n, weight, cell),
-        PlaneView(rows, cols, H, W, sites, seen, 1.0),
+        PlaneView(rows, cols, H, W, sites, view_share, 1.0),
     )
 
     def outputs():
@@ -59,17 +59,17 @@ def test_events_are_predicted_the_same_in_parts_and_only_if_asked_for():
     predict(*about, by_one)
     for found, expected in zip(by_one[:3], whole[:3], strict=True):
         np.testing.assert_array_equal(found, expected)
-    asked = rng.random(N) < 0.5
+    selected = rng.random(N) < 0.5
     in_rows = ((np.arange(h) >= 5) & (np.arange(h) < h - 2))[:, None] & np.ones(w, dtype=bool)
-    for parts in (1, 3):
+    for chunks in (1, 3):
         rate, base, samples, mean, blurred = predicted = outputs()
-        predict_shared(parts, asked, (5, h - 2), 0, *about, predicted)
+        predict_shared(chunks, selected, (5, h - 2), 0, *about, predicted)
         for found, expected in ((rate, whole[0]), (base, whole[1])):
-            np.testing.assert_array_equal(found, np.where(asked, expected, -1))
+            np.testing.assert_array_equal(found, np.where(selected, expected, -1))
         for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
             np.testing.assert_array_equal(found, np.where(in_rows, expected, -1))
         # The widest window alone: scale 4, of 2 px << 4.
         rate, base, samples, mean, blurred = predicted = outputs()
-        predict_shared(parts, asked, (0, h), 4, *about, predicted)
-        np.testing.assert_array_equal(base, np.where(asked, whole[1], -1))
+        predict_shared(chunks, selected, (0, h), 4, *about, predicted)
+        np.testing.assert_array_equal(base, np.where(selected, whole[1], -1))
         np.testing.assert_array_equal(blurred, whole[4])

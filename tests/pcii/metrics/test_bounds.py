@@ -20,7 +20,7 @@ from pcii.metrics.bounds import (
 )
 from pcii.sections.reconstruction import reconstruct
 
-GRID = unit_grid(5, 5, 1, 8)  # total spread 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
+GRID = unit_grid(5, 5, 1, 8)  # total disparity 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
 Z = np.array([4 / 40, 4 / 30])
 
 
@@ -29,9 +29,9 @@ def sections(grid: CameraGrid = GRID, z_mm: np.ndarray = Z) -> Sections:
 
 
 def truth() -> Truth:
-    """Eight pixels in a row by spread: two of object 1, four of object 2, backdrop in focus, nothing."""
-    spread = np.array([[40.0, 36.0, 34.0, 30.0, 28.0, 20.0, 31.0, np.nan]])
-    z = np.where(np.isnan(spread), np.inf, 4 / np.nan_to_num(spread, nan=1.0))
+    """Eight pixels in a row: two of object 1, four of object 2, backdrop in focus, nothing."""
+    total_px = np.array([[40.0, 36.0, 34.0, 30.0, 28.0, 20.0, 31.0, np.nan]])
+    z = np.where(np.isnan(total_px), np.inf, 4 / np.nan_to_num(total_px, nan=1.0))
     return Truth(z, np.array([[1, 1, 2, 2, 2, 2, 0, 0]]), {1: "near", 2: "far"})
 
 
@@ -124,7 +124,7 @@ def test_the_best_estimate_from_poisson_counts_reaches_the_bound_and_no_more() -
     assert estimate.std() == pytest.approx(bound, rel=4 / np.sqrt(2 * trials))
 
 
-def test_nothing_to_tell_depth_by_has_no_bound() -> None:
+def test_without_information_on_depth_there_is_no_bound() -> None:
     grid = unit_grid(3, 3, 4, 4)
     assert depth_bound_px(grid, 0, (0.1, 0.1)) is None
     assert depth_bound_px(grid, 100, (0.0, 0.0)) is None

@@ -9,7 +9,7 @@ from pcii.core.estimates import DepthMap
 from pcii.core.truth import Truth
 from pcii.metrics.depth_accuracy import depth_errors, fine_structures, hci_errors, near_edges
 
-GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total spread 2 / z px
+GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total disparity 2 / z px
 
 
 def errors(true: np.ndarray, estimate: np.ndarray, grid: CameraGrid = GRID) -> dict[str, float | None]:
@@ -106,7 +106,7 @@ def test_fattening_is_around_a_rod_and_thinning_is_on_it() -> None:
         assert (found["fine_fattening"], found["fine_thinning"]) == (around, on)
 
 
-def test_all_pixels_and_those_of_objects_are_told_apart() -> None:
+def test_all_pixels_and_those_of_objects_are_distinguished() -> None:
     z = np.full((40, 50), 0.5)
     ids = np.zeros((40, 50), dtype=int)
     ids[20:] = 1  # of the 10 rows inside the border the lower 5

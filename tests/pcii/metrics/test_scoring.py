@@ -105,16 +105,16 @@ def test_a_missing_answer_is_bad_and_never_good() -> None:
     assert result.depth["mae_mm"] == 0.0
 
 
-def test_depth_errors_are_counted_in_pixels_of_total_spread() -> None:
+def test_depth_errors_are_in_px_of_total_disparity() -> None:
     z, confidence = depth_of(truth())
-    # At 541 mm the total spread is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
+    # At 541 mm the total disparity is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
     z[4:10, 4:7] += 9.0
     z[4:10, 7:10] += 20.0
     result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
     assert result.depth["bad_1px"] == 0.36
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
-    # Total spread is 9 x 250 / (0.0352 z) = 63920.45 / z px: less by 1.9334 and by 4.2121 px.
+    # Total disparity is 9 x 250 / (0.0352 z) = 63920.45 / z px: less by 1.9334 and by 4.2121 px.
     assert result.depth["mae_px"] == pytest.approx((18 * 1.9334 + 18 * 4.2121) / 100, abs=1e-4)
     assert result.depth["median_px"] == 0.0
 
@@ -129,7 +129,7 @@ def test_a_depth_map_alone_is_scored_with_the_grid() -> None:
         score([], depth, truth())
 
 
-def test_what_is_claimed_of_an_empty_dark_is_told() -> None:
+def test_the_claimed_share_of_an_empty_dark_scene() -> None:
     masks = np.zeros((2, 24, 32), dtype=bool)
     masks[1, :6, :8] = True  # 48 of 768 pixels
     empty = Truth(np.full((24, 32), np.inf), np.zeros((24, 32), dtype=int), {})
@@ -167,14 +167,14 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     """Precision and recall of four events of 3, 1, 2 and 1 photons; the third sent one photon of each kind.
 
     They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
-    that a picture of 200 px is needed to see all of them land.
+    that a picture of 200 px is needed to contain all of them.
     """
     wide = paper_grid(200, 200)
     i, j, n = np.array([100, 110, 120, 199]), np.array([100, 100, 100, 30]), np.array([3, 1, 2, 1])
     zero = np.zeros(4, dtype=int)
     counts = PhotonCounts.from_events(zero, zero, i, j, n, wide)
     where = {"k": zero, "l": zero, "i": i, "j": j}
-    # The last photon lands left of the section and counts for nothing.
+    # The last photon is projected left of the section and does not count.
     photons = PhotonTruth(
         **{name: column.repeat(n) for name, column in where.items()},
         object_id=np.array([1, 1, 1, 2, 1, 2, 1]),
@@ -185,7 +185,7 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     z[0], ids[0], z[1], ids[1] = 541.0, 1, 625.0, 2
     true = Truth(z, ids, {1: "near", 2: "far"}, photons)
     masks = np.zeros((1, 200, 200), dtype=bool)
-    masks[0, 41, 41] = True  # where the event of three photons lands
+    masks[0, 41, 41] = True  # where the event of three photons is projected to
     said = None if kept is None else np.array([kept])
     focus = Segmented(masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
     rows = score(focus, None, true).planes
@@ -194,7 +194,7 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     return row["photon_precision"], row["photon_recall"]
 
 
-def test_photons_count_once_each_and_by_the_mask_if_nothing_is_said_of_them() -> None:
+def test_photons_count_once_each_and_by_the_mask_without_photon_in_focus() -> None:
     # Of object 1 four photons land inside: three of the first event, one of the third.
     assert photon_score(None) == (1.0, 3 / 4)
 
@@ -206,5 +206,5 @@ def test_what_is_said_of_events_goes_before_the_mask() -> None:
 
 
 def test_photons_of_other_events_are_refused() -> None:
-    with pytest.raises(InputError, match=r"^photon_in_focus: tells of 3 events, .* of 4$"):
+    with pytest.raises(InputError, match=r"^photon_in_focus: has 3 events, .* to 4$"):
         photon_score([True] * 3)

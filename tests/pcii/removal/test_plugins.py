@@ -74,7 +74,7 @@ def test_nothing_is_imported_before_it_is_asked_for(tmp_path, monkeypatch):
         segment(counts(), 1.0, method="broken")
 
 
-def test_an_unknown_method_is_told_with_those_of_packages(tmp_path, monkeypatch):
+def test_an_unknown_method_is_reported_with_those_of_packages(tmp_path, monkeypatch):
     install(tmp_path, monkeypatch, good="strange_code:good")
     with pytest.raises(InputError, match=r"no removal named 'magic'; use three-step, .*, good$"):
         segment(counts(), 1.0, method="magic")
@@ -106,8 +106,8 @@ def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
         ("number", r"is int, which cannot be called$"),
     ],
 )
-def test_nonsense_is_told_in_one_sentence(tmp_path, monkeypatch, name, sentence):
+def test_nonsense_is_reported_in_one_sentence(tmp_path, monkeypatch, name, sentence):
     install(tmp_path, monkeypatch, **{name: f"strange_code:{name}"})
-    told = name.replace("_", "-")
-    with pytest.raises(InputError, match=rf"^method: '{told}' of the package strange {sentence}"):
-        segment(counts(), 1.0, method=told)
+    method = name.replace("_", "-")
+    with pytest.raises(InputError, match=rf"^method: '{method}' of the package strange {sentence}"):
+        segment(counts(), 1.0, method=method)

@@ -3,7 +3,7 @@ import pytest
 from twins import even_light, paper_grid, unit_grid
 
 from pcii.core.focal_planes import FocalPlanes
-from pcii.evidence.focus_likelihood import Focus, focus_evidence
+from pcii.evidence.focus_likelihood import FocusEvidence, focus_evidence
 from pcii.evidence.half_agreement import Halves, halves_of
 from pcii.removal.likelihood.regions import (
     Planes,
@@ -40,12 +40,12 @@ def box(top: int, left: int, height: int, width: int) -> np.ndarray:
     return mask
 
 
-def focus_with(*gains: tuple[int, np.ndarray, float]) -> Focus:
+def focus_with(*gains: tuple[int, np.ndarray, float]) -> FocusEvidence:
     """Evidence that is 0 but for (depth, where, nats in all)."""
     gain = np.zeros((SPREAD_PX.size, *SHAPE), np.float32)
     for depth, where, nats in gains:
         gain[depth][where] += nats / where.sum()
-    return Focus(SEARCHED, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
+    return FocusEvidence(SEARCHED, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
 
 
 def test_without_photons_nothing_is_bright():

@@ -57,7 +57,7 @@ def test_the_planted_fault_of_swapped_depths_is_seen_by_the_threshold(two_square
     assert kept[0][two_squares.masks[0]].mean() < 0.7
 
 
-def test_entropy_alone_tells_the_planes_of_square_sub_images(two_squares):
+def test_entropy_alone_finds_the_planes_of_square_sub_images(two_squares):
     alone = ThreeStep(threshold=False, boundary=False)
     focus = pcii.segment(two_squares.counts, two_squares.z_mm, method=alone)
     for plane, own in enumerate(two_squares.masks):
