@@ -66,7 +66,7 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.dataset.series",
 }
-SMALL_ROOMS = {"depth", "removal.three_step"}
+SMALL_ROOMS = {"depth"}
 
 
 def modules(package: str) -> dict[str, ast.Module]:

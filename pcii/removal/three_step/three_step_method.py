@@ -16,40 +16,25 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.estimates import Segmented
-from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.imaging.bright_regions import (
     EDGE_SMOOTHING_PX,
     SMALLEST_REGION_PX,
     brightness,
-    large_pieces,
     outlined,
     roberts_magnitude,
 )
 from pcii.imaging.watershed_pieces import pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
+from pcii.removal.three_step.variance_threshold import adaptive_threshold, cell_px_for, tolerance_px
 from pcii.sections.photon_statistics import (
-    ViewSamples,
-    cells_to_pixels,
-    photons_around_a_photon,
     pooled_estimate,
     section_window_px,
-    truncated_poisson_variance,
-    view_samples,
 )
 from pcii.sections.probe_planes import PROBE_STEPS_PX, with_probes
 from pcii.sections.reconstruction import extend, reconstruct
 
-WINDOW_CELLS = 4
-PHOTONS_PER_SAMPLE = 10.0
-LARGEST_CELL_PX = 8
-"""Eq. 7 pools over 4 x 4 cells of a size at which a view has about 10 photons in them where the photons
-are."""
-SIGMAS = 3.0
-"""By how many standard deviations of the sample variance T exceeds its expectation."""
-FEWEST_SAMPLES = 8
-"""With fewer non-zero samples than this a point is not removed."""
 PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
 LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2
 """Half-extent, at the farthest probe plane, of the blur of a point in focus at a requested plane."""
@@ -100,9 +85,9 @@ class ThreeStep:
         planes = with_probes(requested.planes, clear_px=PROBE_STEP_PX)
         sections = extend(requested, counts, planes)
         count = len(requested.planes)
-        cell_px = _cell_px(sections)
+        cell_px = cell_px_for(sections)
         step1 = [
-            adaptive_threshold(counts, planes, p, cell_px, _tolerance_px(planes, p)) for p in range(count)
+            adaptive_threshold(counts, planes, p, cell_px, tolerance_px(planes, p)) for p in range(count)
         ]
         steps = {name: np.stack([maps[name] for maps in step1]) for name in step1[0]}
 
@@ -152,57 +137,6 @@ class ThreeStep:
         if not self.boundary:
             return pooled.max(axis=-1) > 0
         return outlined(pooled, samples, SMALLEST_REGION_PX, M)[1]
-
-
-def adaptive_threshold(
-    counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int, tolerance_px: float
-) -> dict[str, np.ndarray]:
-    """Step 1: where the variance of the non-zero samples is at most T (Eq. 7), with the maps it follows from.
-
-    Maps (H, W): `mean`, `variance` and `threshold` float32, `kept` and `answered` bool. T is the variance of
-    non-zero Poisson samples of the same mean, plus `SIGMAS` times the sampling error of a variance, about var
-    sqrt(2 / (n - 1)) for n samples, plus the variance due to the slope of the section, over shifts that a
-    surface in focus may have: `tolerance_px` either way and the rounding to whole pixels, both uniform.
-    Points with fewer than `FEWEST_SAMPLES` are kept, and so are rejected regions smaller than a window of
-    cells.
-    """
-    samples = view_samples(counts, planes, plane, cell_px=cell_px, window_cells=WINDOW_CELLS)
-    limit = _threshold(samples, cell_px, tolerance_px)
-    known = samples.number >= FEWEST_SAMPLES
-    # With so many windows, single ones exceed T by chance, and with them the cells that share their samples.
-    rejected = large_pieces(known & (samples.variance > limit), WINDOW_CELLS**2)
-    maps = {
-        "mean": samples.mean.astype(np.float32),
-        "variance": samples.variance.astype(np.float32),
-        "threshold": limit.astype(np.float32),
-        "answered": known,
-        "kept": ~rejected,
-    }
-    return {name: cells_to_pixels(cells, cell_px, counts.grid) for name, cells in maps.items()}
-
-
-def _threshold(samples: ViewSamples, cell_px: int, tolerance_px: float) -> np.ndarray:
-    noise = truncated_poisson_variance(samples.mean)
-    noise = noise * (1 + SIGMAS * np.sqrt(2 / np.maximum(samples.number - 1, 1)))
-    # The two diagonal differences of Roberts' cross square to twice the squared slope per cell.
-    slope2 = roberts_magnitude(samples.mean) ** 2 / (2 * cell_px**2)
-    return noise + slope2 * (tolerance_px**2 / 3 + 1 / 12)
-
-
-def _tolerance_px(planes: FocalPlanes, plane: int) -> float:
-    """Blur half-extent halfway to the nearest other plane: points closer to this plane may remain."""
-    apart = np.abs(planes.total_disparity_px - planes.total_disparity_px[plane])
-    others = apart[apart > 0]
-    return float(others.min()) / 4 if others.size else 0.0
-
-
-def _cell_px(sections: Sections) -> int:
-    """Cell size at which a window holds `PHOTONS_PER_SAMPLE` photons per view where the photons are."""
-    per_view = photons_around_a_photon(sections) / sections.grid.view_count
-    if per_view == 0:
-        return LARGEST_CELL_PX
-    window_px = np.sqrt(PHOTONS_PER_SAMPLE / per_view)
-    return int(np.clip(np.ceil(window_px / WINDOW_CELLS), 1, LARGEST_CELL_PX))
 
 
 def _samples(sections: Sections, plane: int, window: int) -> float:
