@@ -19,7 +19,7 @@ from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spec.scene import Scene
-from simgen.spectral.spectra import patch_names
+from simgen.spectral.spectra import colour_science, patch_names
 
 pytestmark = [
     pytest.mark.renders,
@@ -90,7 +90,7 @@ def by_patch(image: np.ndarray) -> np.ndarray:
 
 def integrated(camera: str, lamp: str) -> np.ndarray:
     """Raw channels (24, 3) of the patches, up to one factor: colour-science's own integration."""
-    import colour
+    colour = colour_science()
 
     curves = colour.MSDS_CAMERA_SENSITIVITIES[camera]
     shape = colour.SpectralShape(380, 780, 1)
@@ -166,7 +166,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
 
 def photons_of_grey(camera: str | None) -> np.ndarray:
     """Photons (3,) that a lumen second of D65, reflected by neutral 5, gives pixels: by spectra, by hand."""
-    import colour
+    colour = colour_science()
 
     shape = colour.SpectralShape(380, 780, 1)
     wavelength_nm = np.arange(380, 781.0)
