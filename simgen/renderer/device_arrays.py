@@ -6,6 +6,8 @@ import numpy as np
 
 from simgen.renderer.backend import load_drjit
 
+ALIGNMENT_BYTES = 64
+
 
 def unsigned(mi: Any, values: np.ndarray) -> Any:
     """Whole numbers from 0 as a flat array of 32 bits."""
@@ -40,4 +42,17 @@ def gathered(array: Any, index: Any, active: Any = True) -> Any:
 def _upload(kind: Any, values: np.ndarray, dtype: Any) -> Any:
     flat = np.ascontiguousarray(values, dtype=dtype).ravel()
     # Where NumPy happened to keep a single number is compiled into the kernel, if it is handed over.
-    return opaque(kind, flat[0].item()) if flat.size == 1 else kind(flat)
+    return opaque(kind, flat[0].item()) if flat.size == 1 else kind(_aligned(flat))
+
+
+def _aligned(flat: np.ndarray) -> np.ndarray:
+    """A copy (N,) that begins at a multiple of `ALIGNMENT_BYTES`.
+
+    Where the renderer reads NumPy's memory in place its alignment is compiled into the kernel, and NumPy's
+    own is a matter of chance: each combination that a kernel's arrays have would wait for a compiler.
+    """
+    memory = np.empty(flat.nbytes + ALIGNMENT_BYTES, np.uint8)
+    begin = -memory.ctypes.data % ALIGNMENT_BYTES
+    copy = memory[begin : begin + flat.nbytes].view(flat.dtype)
+    copy[...] = flat
+    return copy

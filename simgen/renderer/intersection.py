@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from simgen.renderer.backend import load_drjit, shape_numbers
+from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
 
 SHY_OF_TARGET = 1e-4
@@ -30,7 +31,8 @@ def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: n
         return found
     dr = load_drjit()
     origins = np.broadcast_to(origin_mm, unit.shape)
-    hit = scene.ray_intersect_preliminary(mi.Ray3f(_column(mi.Point3f, origins), _column(mi.Vector3f, unit)))
+    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origins), _vectors(mi, mi.Vector3f, unit))
+    hit = scene.ray_intersect_preliminary(ray)
     shape = dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0)
     return render_scene.object_of_shape[np.array(shape)]
 
@@ -45,8 +47,8 @@ def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndar
         rows = _rows(np.column_stack([origin_mm, unit, reach]))
         rays = (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
         return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(unit))
-    ray = mi.Ray3f(_column(mi.Point3f, origin_mm), _column(mi.Vector3f, unit))
-    ray.maxt = mi.Float(reach.astype(np.float32))
+    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin_mm), _vectors(mi, mi.Vector3f, unit))
+    ray.maxt = floats(mi, reach)
     return np.array(scene.ray_test(ray))
 
 
@@ -54,8 +56,8 @@ def _one_by_one(mi: Any) -> bool:
     return mi.variant().startswith("scalar")
 
 
-def _column(kind: Any, rows: np.ndarray) -> Any:
-    return kind(np.ascontiguousarray(rows.T, dtype=np.float32))
+def _vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:
+    return kind(*(floats(mi, column) for column in rows.T))
 
 
 def _rows(array: np.ndarray) -> Iterator[list[float]]:

@@ -9,6 +9,7 @@ import numpy as np
 from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
 from simgen.cameras.rig import Camera, Rig
 from simgen.renderer.backend import load_drjit
+from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
 
 # The pinhole is the origin of every ray, so nothing nearer than this is ever cut away in practice.
@@ -65,7 +66,7 @@ def film_rays(
     def of_camera(values: np.ndarray) -> Any:
         if (values == values.flat[0]).all():
             return float(values.flat[0])  # what all cameras share needs no look-up
-        return dr.gather(mi.Float, mi.Float(values.astype(np.float32).ravel()), camera)
+        return dr.gather(mi.Float, floats(mi, values), camera)
 
     def turned(*vector: Any) -> list[Any]:
         columns = range(len(vector))

@@ -6,10 +6,9 @@ Everything here is on the renderer's side: Dr.Jit arrays with an element for eac
 from collections.abc import Iterator
 from typing import Any, Protocol
 
-import numpy as np
-
 from simgen.base.srgb import LUMINANCE
 from simgen.renderer.backend import load_drjit
+from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral.filters import CELLS, HEROES, Filters
 from simgen.spectral.spectra import WAVELENGTH_NM
@@ -77,9 +76,9 @@ class Wavelengths:
     def __init__(self, mi: Any, filters: Filters) -> None:
         self.mi, self.channels = mi, len(filters.sensitivity)
         self.cell_nm = mi.Float(filters.wavelength_nm.ravel())
-        self.sensitivity = mi.Float(filters.sensitivity.astype(np.float32).ravel())
-        self.light = mi.Float(filters.light.astype(np.float32))
-        self.white = mi.Float(filters.white.astype(np.float32))
+        self.sensitivity = floats(mi, filters.sensitivity)
+        self.light = floats(mi, filters.light)
+        self.white = floats(mi, filters.white)
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
         """See `Light`."""
