@@ -3,6 +3,7 @@
 The paper's recipe. Dense views are timed on a few views and scaled to all, since each costs the same.
 """
 
+import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.drawn import KINDS, TUNING, write_drawn
 from benchmarks.timing import timed
 from simgen.base import random_streams as seeds
+from simgen.dataset.generation import generate
+from simgen.dataset.prepared import prepare
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
@@ -86,6 +90,8 @@ def table() -> Iterator[str]:
     yield from _costs(recipe, (seconds - base) / 900_000, costs)
     yield ""
     yield from _growth()
+    yield ""
+    yield from _drawn(base)
 
 
 def _costs(recipe: Recipe, per_photon: float, dense_s: dict[int, float]) -> Iterator[str]:
@@ -110,6 +116,37 @@ def _growth() -> Iterator[str]:
         drawn, _ = thin_photons(setup, recipe.photons, seed=1)
         seconds = time.perf_counter() - start
         yield f"| {budget:.0e} | {seconds:.2f} | {1e6 * seconds / drawn.k.size:.2f} |"
+
+
+def _drawn(base_s: float) -> Iterator[str]:
+    """Scenes drawn at random, four of each kind, against the paper's scene; and each as a new dataset."""
+    yield "| drawn scenes 100 to 103 | against the paper's | kept | draws | above the rule | dataset, fresh |"
+    yield "|---|---|---|---|---|---|"
+    with tempfile.TemporaryDirectory() as folder:
+        for kind in KINDS:
+            shares, kept, draws, above, fresh = [], [], [], 0, []
+            for number in range(TUNING, TUNING + 4):
+                recipe, near = load_recipe(str(write_drawn(Path(folder), kind, number)))
+                start = time.perf_counter()
+                generate(recipe, near, Path(folder) / f"{kind}_{number}_data")
+                fresh.append(time.perf_counter() - start)
+                prepared = prepare(recipe, near)
+                grid, depth = recipe.grid.camera_grid(), recipe.render.max_depth
+                setup = Setup(prepared.render_scene(), grid, recipe.cfa, depth)
+                seconds, log = timed(
+                    lambda seed, setup=setup, photons=recipe.photons: thin_photons(setup, photons, seed=seed)[
+                        1
+                    ]
+                )
+                shares.append(seconds / base_s)
+                kept.append(log["kept_share"])
+                draws.append(log["attempts"])
+                above += log["clump_pairs"] > log["clump_pairs_allowed"]
+            yield (
+                f"| {kind} | {np.mean(shares):.2f} x ({min(shares):.2f} to {max(shares):.2f}) "
+                f"| {np.mean(kept):.0%} | {np.mean(draws):.1f} | {above} of 4 "
+                f"| {np.mean(fresh):.1f} s ({max(fresh):.1f}) |"
+            )
 
 
 def _row(name: str, seconds: float, base: float, log: dict[str, Any]) -> str:

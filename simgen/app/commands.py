@@ -1,6 +1,7 @@
 """The `simgen` command."""
 
 import json
+import math
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -200,7 +201,13 @@ def _made(folder: Path, manifest: dict[str, Any]) -> str:
     seconds = sum(manifest["timings_s"].values())
     photons = manifest["photons"]
     caught = f", {photons['total']} photons" if photons else ""
-    return f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
+    line = f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
+    if photons and photons.get("clump_pairs", 0) > photons.get("clump_pairs_allowed", math.inf):
+        line += (
+            f"\n{photons['clump_pairs']} pairs of photons came of one path each, where at most "
+            f"{photons['clump_pairs_allowed']:g}: a test of the counts might tell them from Poisson ones"
+        )
+    return line
 
 
 @app.command

@@ -17,6 +17,7 @@ from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
+from simgen.photons.pilot import MOST_RAYS
 from simgen.spec.camera_grid import Grid
 from simgen.spec.recipe import Exposure, Photons, Products, Sensor
 
@@ -185,7 +186,7 @@ def rounded(value: float, digits: int) -> str:
 
 def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
     """Tiles of the majorant for first hits at these depths, as of `disparity_layers.layers_for`; or inf."""
-    tile_px, longer = tile_px_for(grid), max(grid.pitch_mm)
+    tile_px, longer = tile_px_for(grid, MOST_RAYS), max(grid.pitch_mm)
     with np.errstate(over="ignore", divide="ignore"):
         disparity_px = np.float64(grid.focal_mm) * longer / grid.pixel_mm / z_mm
     if not np.isfinite(disparity_px).all():

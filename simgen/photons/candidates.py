@@ -87,13 +87,31 @@ class CandidateSampler(Protocol):
         """
         ...
 
-    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
-        """A pilot: `number` candidates of all views and the first group, of which `follow` are followed.
+    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
+        """A pilot: about so many rays, evenly over the films, of which about `follow` are followed.
 
-        Those that fall beside the film are left out. Where nothing follows one, its `light` is NaN (see
-        `Samples`); how many are not followed depends on the backend.
+        Of a ray that is not followed `light` is NaN (see `Samples`); backends may leave such out.
         """
         ...
+
+
+def even_film_points(
+    grid: CameraGrid, number: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """View, row and column (N,) of about `number` points: one in each cell of a lattice over the film.
+
+    Rows and columns are float64 in [0, H) and [0, W); views take turns. Points come in random order, so that
+    the first of them are spread over the film as all are.
+    """
+    rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
+    cols = max(1, round(number / rows))
+    cell = rng.permutation(rows * cols)
+    row, col = np.divmod(cell, cols)
+    down, right = rng.random((2, cell.size))
+    # Rounding must not move a point onto the next film.
+    i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
+    j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
+    return rng.permutation(cell.size) % grid.view_count, i, j
 
 
 def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:

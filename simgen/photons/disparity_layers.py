@@ -12,11 +12,12 @@ import numpy as np
 from pcii.core.camera_grid import CameraGrid
 
 TILES_ACROSS = 256
-"""The longer side of a film has about so many tiles, whatever its pixels."""
+"""The longer side of a film has at most about so many tiles, whatever its pixels."""
+RAYS_PER_TILE = 4
+"""Of a pilot: with one in each quarter of a tile hardly a piece of surface is missed."""
 LAYER_BLUR_TILES = 0.5
 """Layers are so thin that their tiles are off by no more than this share of a tile in any view."""
 MOST_LAYERS = 64
-_RING = np.array([(a, b) for a in range(-1, 3) for b in range(-1, 3)])
 
 
 @dataclass(frozen=True)
@@ -100,15 +101,6 @@ class DisparityLayers:
         """Flat indices (N, (2 reach + 1)^2) of the tiles up to `reach` away; the border's own beyond it."""
         layer, row, col = self.split(tiles)
         offsets = np.argwhere(np.ones((2 * reach + 1, 2 * reach + 1))) - reach
-        return self._beside(layer, row, col, offsets)
-
-    def ring(self, doubled: np.ndarray) -> np.ndarray:
-        """Flat indices (N, 16) of the 2 x 2 tiles that each tile of twice the size holds, and around."""
-        layer, row, col = self.merged(2).split(doubled)
-        return self._beside(layer, 2 * row, 2 * col, _RING)
-
-    def _beside(self, layer: np.ndarray, row: np.ndarray, col: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-        """Flat indices (N, M) of the tiles at M offsets from each; of those on the border beyond it."""
         near_row = np.clip(row[:, None] + offsets[:, 0], 0, self.rows - 1)
         near_col = np.clip(col[:, None] + offsets[:, 1], 0, self.cols - 1)
         return self.flat(layer[:, None], near_row, near_col)
@@ -150,6 +142,8 @@ def _from_zero(shifts_px: np.ndarray) -> np.ndarray:
     return even - even.min(axis=1, keepdims=True)
 
 
-def tile_px_for(grid: CameraGrid) -> int:
-    """Side of the fine tiles."""
-    return 2 * max(1, round(max(grid.height, grid.width) / (2 * TILES_ACROSS)))
+def tile_px_for(grid: CameraGrid, rays: int) -> int:
+    """Side of tiles that hold `RAYS_PER_TILE` of so many rays over the film; no finer than `TILES_ACROSS`."""
+    finest = max(grid.height, grid.width) / TILES_ACROSS
+    side = np.sqrt(RAYS_PER_TILE * grid.height * grid.width / rays)
+    return 2 * max(1, round(max(finest, side) / 2))

@@ -15,12 +15,10 @@ may be left out for having looked black.
 Plain NumPy; see `candidates` for use.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.photons.disparity_layers import DisparityLayers, Samples, tile_px_for
+from simgen.photons.disparity_layers import DisparityLayers, Samples
 
 COARSE_TILES = 8
 """Coarse tiles are 8 x 8 tiles."""
@@ -32,6 +30,8 @@ SMALL_SAMPLE = 16
 """A bound comes from at least so many followed paths."""
 FAINT = 4.0
 """A coarse tile's bound is raised for what exceeds it by less; for more a tile is listed."""
+GAP_TILES = 3
+"""Of a layer gaps of so many tiles to every side are closed."""
 LIFT = 1.25
 """Where a path exceeds its bound, the bound is raised above it by this factor."""
 
@@ -50,7 +50,7 @@ class Majorant:
 
     def __init__(self, grid: CameraGrid, layers: DisparityLayers, dim: np.ndarray) -> None:
         self.layers, self.dim = layers, dim
-        self.coarse_px = COARSE_TILES * tile_px_for(grid)
+        self.coarse_px = COARSE_TILES * layers.tile_px
         self.coarse_cols = -(-grid.width // self.coarse_px)
         self.coarse_count = -(-grid.height // self.coarse_px) * self.coarse_cols
         self.row, self.col = np.divmod(np.arange(self.coarse_count), self.coarse_cols)
@@ -95,8 +95,7 @@ class Majorant:
         owner = self.owner_of(over)
         faint = (owner < self.coarse_count) & (over.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
-            lifted, height = _largest(owner[faint], LIFT * over.light[faint])
-            self.bound[lifted] = np.maximum(self.bound[lifted], height)
+            _raise(self.bound, owner[faint], LIFT * over.light[faint])
             over = over.take(~faint)
         if not over.k.size:
             return
@@ -110,34 +109,66 @@ class Majorant:
             (self.bound, over.light),
             (self.radiance_ratio_bound, over.light / over.guess),
         ):
-            lifted, height = _largest(entry, LIFT * needed.repeat(around.shape[1], axis=0))
-            levels[lifted] = np.maximum(levels[lifted], height)
+            _raise(levels, entry, LIFT * needed.repeat(around.shape[1], axis=0))
 
 
 def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.ndarray) -> Majorant:
     """The majorant that a pilot suggests; `dim` (C,) is the bound of the coarse tiles.
 
-    A tile is listed, and its largest guess looked up, with what lies within half a tile around it.
+    A tile is listed with the eight around it, and has the largest guess of these nine: what one ray showed
+    of it is off by what other cameras see beside. Gaps of up to `GAP_TILES` between listed tiles of a layer
+    are listed too, with the largest guess around them: a surface goes on between the places where rays
+    happened to hit it.
     """
     above_dim = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
     samples = samples.take(np.asarray(above_dim))
-    half = replace(layers, tile_px=layers.tile_px // 2, rows=2 * layers.rows, cols=2 * layers.cols)
-    halves = half.tiles_of(samples)
-    tiles, followed = half.merge(halves, 2), samples.followed
+    tiles, followed = layers.tiles_of(samples), samples.followed
     light = samples.light[followed]
     near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
-    found, guess = _largest(halves, samples.guess)
-    radiance_ratio_bound = near.largest(half.merge(found, 2))[:, dim.size :]
-    bright = (guess * radiance_ratio_bound > dim).any(axis=1)
-    listed = _distinct(half.merge(half.around(found[bright]).ravel(), 2))
-    table = np.zeros((half.tiles, dim.size), dtype=np.float32)
-    table[found] = guess
-    found = near.largest(listed)
-    light, radiance_ratio_bound = found[:, : dim.size], found[:, dim.size :]
+    table = np.zeros((layers.tiles, dim.size), dtype=np.float32)
+    _raise(table, tiles, samples.guess)
+    found = np.flatnonzero(table.any(axis=1))
+    bright = (table[found] * near.largest(found)[:, dim.size :] > dim).any(axis=1)
+    listed = _without_gaps(layers, _distinct(layers.around(found[bright]).ravel()))
+    guess = _filled(layers, listed, _highest(table, layers.around(listed)))
+    highest = near.largest(listed)
+    light, radiance_ratio_bound = highest[:, : dim.size], highest[:, dim.size :]
     majorant = Majorant(grid, layers, dim)
-    guess = _highest(table, half.ring(listed))
     majorant.list_tiles(listed, np.minimum(light, guess * radiance_ratio_bound), radiance_ratio_bound)
     return majorant
+
+
+def _without_gaps(layers: DisparityLayers, tiles: np.ndarray) -> np.ndarray:
+    """These tiles (N,), sorted, and those in gaps between them: a closing of each layer by a square."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    closed = []
+    side, per_layer = 2 * GAP_TILES + 1, layers.rows * layers.cols
+    for own in np.split(tiles, np.flatnonzero(np.diff(tiles // per_layer)) + 1):
+        if not own.size:
+            continue
+        layer, row, col = layers.split(own)
+        top, left = row.min(), col.min()
+        mask = np.zeros((row.max() - top + 1 + 2 * side, col.max() - left + 1 + 2 * side), dtype=bool)
+        mask[row - top + side, col - left + side] = True
+        mask = minimum_filter(maximum_filter(mask, side), side)
+        row, col = np.nonzero(mask)
+        closed.append(layers.flat(layer[0], row + top - side, col + left - side))
+    return np.concatenate(closed) if closed else tiles
+
+
+def _filled(layers: DisparityLayers, tiles: np.ndarray, guess: np.ndarray) -> np.ndarray:
+    """The guesses (N, C) of tiles, and where there is none the largest of those up to `GAP_TILES` away."""
+    empty = guess.max(axis=1, initial=0) <= 0
+    if not empty.any():
+        return guess
+    near = layers.around(tiles[empty], GAP_TILES)
+    table = np.full(layers.tiles, tiles.size)
+    table[tiles] = np.arange(tiles.size)
+    known = np.concatenate([guess, np.zeros((1, guess.shape[1]), guess.dtype)])
+    guess = guess.copy()
+    guess[empty] = _highest(known, table[near])
+    return guess
 
 
 class _Near:
@@ -150,8 +181,7 @@ class _Near:
             merged = layers.merged(side)
             blocks = layers.merge(tiles, side)
             largest = np.zeros((merged.tiles, values.shape[1]), dtype=np.float32)
-            found, highest = _largest(blocks, values)
-            largest[found] = highest
+            _raise(largest, blocks, values)
             number = np.bincount(blocks, minlength=merged.tiles)
             self.levels.append((side, merged, largest, number))
 
@@ -185,11 +215,7 @@ def _distinct(keys: np.ndarray) -> np.ndarray:
     return keys[np.diff(keys, prepend=-1) > 0]
 
 
-def _largest(keys: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct keys, sorted, and the largest of `values` (N, C) that each has."""
-    order = np.argsort(keys)
-    keys, values = keys[order], values[order]
-    first = np.flatnonzero(np.diff(keys, prepend=-1))
-    if not first.size:
-        return keys, values
-    return keys[first], np.maximum.reduceat(values, first, axis=0)
+def _raise(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:
+    """Raise rows (N,), of which some may be the same, of a table (T, C) to at least `values` (N, C)."""
+    for column, heights in zip(table.T, values.astype(table.dtype).T, strict=True):
+        np.maximum.at(column, rows, heights)

@@ -6,14 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Setup, paths_of
-from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
-from simgen.photons.majorant import COARSE_TILES, DIM_SHARE, Majorant, fit
+from simgen.photons.candidates import CandidateSampler, Setup, paths_of
+from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
+from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
 
-EVEN_PATHS = 1 << 15
-AIMED_CANDIDATES = (1 << 14, 1 << 18)
-"""Candidates of the second set, at least and at most; within that, as many as photons are wanted."""
+FIRST_RAYS = 1 << 14
+"""The first look, of which every ray is followed."""
+RAYS_PER_PHOTON = 2.5
+MOST_RAYS = RAYS_PER_TILE * TILES_ACROSS**2
+"""The second look has so many rays for each photon that is wanted, until tiles are as fine as they get."""
 FOLLOWED_SHARE = 0.5
 AMBIENT_SHARE = 3.0
 """Light that surfaces throw at each other is guessed to be so many times the mean radiance."""
@@ -40,41 +42,42 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     `expected` says how many photons are wanted in all, given the mean radiance per colour: the effort
     is what they deserve.
 
-    First paths go evenly through all films. They show which depths there are and where it is bright. A
-    second set is drawn from that, most of it only to see what it hits.
+    A first look, with few rays, shows how bright it is. The second, evenly spread too, shows what there is to
+    see; tiles are so large that each holds several of its rays.
     """
     ambient = surroundings(setup)
-    even, paths = _look_evenly(setup, seed, ambient)
-    mean = even.light.mean(axis=0)
-    if not even.light.any():
+    first, paths = _first_look(setup, seed, ambient)
+    mean = first.light.mean(axis=0)
+    if not mean.any():
         return Pilot(None, mean, ambient, paths, max_dark_candidates=0)
     ambient = ambient + AMBIENT_SHARE * mean.mean()
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
-    grid = setup.grid
-    fine_px = tile_px_for(grid)
-    coarse = fit(grid, layers_for(grid, COARSE_TILES * fine_px, even.z_mm), even, dim)
-    sampler = sampler_for(setup, coarse, [np.arange(4)], ambient)
-    path_seed = seeds.integer(seed, stage="aimed pilot")
-    candidates = int(np.clip(expected(mean), *AIMED_CANDIDATES))
-    followed = int(FOLLOWED_SHARE * candidates)
-    aimed = sampler.trace_pilot(candidates, followed, path_seed)
-    known = even.join(aimed)
-    majorant = fit(grid, layers_for(grid, fine_px, known.z_mm), known, dim)
-    return Pilot(
-        majorant, mean, ambient, paths + paths_of(sampler, candidates, followed), sampler.max_dark_candidates
-    )
+    sampler = _sampler_of_films(setup, ambient)
+    rays = int(np.clip(RAYS_PER_PHOTON * expected(mean) / sampler.paths_each, FIRST_RAYS, MOST_RAYS))
+    followed = int(FOLLOWED_SHARE * rays)
+    known = first.join(sampler.trace_evenly(rays, followed, seeds.integer(seed, stage="second pilot")))
+    layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
+    majorant = fit(setup.grid, layers, known, dim)
+    paths += paths_of(sampler, rays, followed)
+    return Pilot(majorant, mean, ambient, paths, sampler.max_dark_candidates)
 
 
-def _look_evenly(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
-    nowhere = layers_for(setup.grid, tile_px_for(setup.grid), np.array([np.inf]))
-    flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
-    sampler = sampler_for(setup, flat, [np.arange(4)], ambient)
-    round_number, paths, spent = 0, EVEN_PATHS, 0
+def _first_look(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
+    sampler = _sampler_of_films(setup, ambient)
+    round_number, rays, spent = 0, FIRST_RAYS, 0
     while True:
-        path_seed = seeds.integer(seed, stage="even pilot", round_number=round_number)
-        even = sampler.trace_pilot(paths, paths, path_seed)
-        spent += paths_of(sampler, paths, paths)
-        if even.light.any() or paths >= sampler.max_dark_candidates:
-            return even, spent
-        round_number, paths = round_number + 1, paths * 4
+        path_seed = seeds.integer(seed, stage="first pilot", round_number=round_number)
+        found = sampler.trace_evenly(rays, rays, path_seed)
+        found = found.take(found.followed)
+        spent += paths_of(sampler, rays, rays)
+        if found.light.any() or rays >= sampler.max_dark_candidates:
+            return found, spent
+        round_number, rays = round_number + 1, rays * 4
+
+
+def _sampler_of_films(setup: Setup, ambient: np.ndarray) -> CandidateSampler:
+    """A sampler that knows of nothing but the films."""
+    nowhere = layers_for(setup.grid, tile_px_for(setup.grid, MOST_RAYS), np.array([np.inf]))
+    flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
+    return sampler_for(setup, flat, [np.arange(4)], ambient)

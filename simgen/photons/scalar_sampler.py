@@ -12,7 +12,7 @@ import numpy as np
 
 from pcii.core.bayer import colour_cells
 from simgen.base.srgb import LUMINANCE
-from simgen.photons.candidates import Accepted, Setup, chances
+from simgen.photons.candidates import Accepted, Setup, chances, even_film_points
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
 from simgen.renderer.backend import shape_numbers
@@ -89,11 +89,15 @@ class ScalarSampler:
             over=self._samples(candidates.take(over), z_mm[over], light[over]),
         )
 
-    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
+    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
         """See `candidates`; only those that are followed are traced."""
         rng = np.random.default_rng(seed)
-        candidates = self._draw(rng, np.zeros(min(number, follow), dtype=np.int64), None)
-        candidates = candidates.take(self._inside(candidates))
+        view, i, j = (part[:follow] for part in even_film_points(self.setup.grid, rays, rng))
+        k, l = np.divmod(view, self.setup.grid.cols)
+        row, col = i.astype(np.int64), j.astype(np.int64)
+        colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
+        lens_point = self._lens_points(rng, view.size)
+        candidates = _Candidates(k, l, row, col, i - 0.5, j - 0.5, np.zeros_like(k), colour, *lens_point)
         turns = enumerate(self._in_colours(candidates))
         light = np.sum([self._follow(recoloured, rng, seed + turn) for turn, recoloured in turns], axis=0)
         return self._samples(candidates, self._first_hits(candidates)[1], light)
@@ -129,11 +133,14 @@ class ScalarSampler:
         row -= np.where(layer < 0, 0, majorant.layers.row_shift[layer, k])
         col -= np.where(layer < 0, 0, majorant.layers.col_shift[layer, l])
         row_px, col_px = row + down % 1 - 0.5, col + right % 1 - 0.5
-        lens_point, rig = np.zeros((2, group.size)), self.setup.rig
-        if rig.lens is not None:
-            lens_point = rig.lens_points(rng.random((2, group.size)))
+        lens_point = self._lens_points(rng, group.size)
         colour = colour_cells(self.setup.cfa).ravel()[cell]
         return _Candidates(k, l, row, col, row_px, col_px, entry, colour, *lens_point)
+
+    def _lens_points(self, rng: np.random.Generator, number: int) -> np.ndarray:
+        if self.setup.rig.lens is None:
+            return np.zeros((2, number))
+        return self.setup.rig.lens_points(rng.random((2, number)))
 
     def _inside(self, candidates: _Candidates) -> np.ndarray:
         """Numbers of those that fall on the film."""

@@ -13,10 +13,11 @@ that are kept are the photons.
 Where a path exceeds the majorant (L > M) it gives floor(L / M) photons and one more with the remaining
 probability: the mean stays exact, but these photons come in clumps. Each round lifts the majorant where it
 was exceeded, for the rounds after it: a kept photon has the density L / E whatever majorant it was drawn
-from. Photons from clumps are counted, and if they are more than 1 in 10 000 everything is drawn anew from
-the majorant as it is by then.
+from. Clumps are counted, and if a test of the counts could see them (`pairs_allowed`) everything is drawn
+anew from the majorant as it is by then.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -34,13 +35,12 @@ from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
-OVERSHOOT_SHARE = 1e-4
-ATTEMPTS = 12
+ATTEMPTS = 4
 WARM_UP_SHARE = 0.15
 """The warm-up's rounds aim for this share of the photons, but take so many candidates at least, at most."""
 WARM_UP_CANDIDATES = (1 << 13, 1 << 17)
 WARM_UP_ROUNDS = 2
-EXCESS_SHARE = 5e-5
+EXCESS_SHARE = 1e-5
 """Share of the light that the warm-up leaves above the majorant."""
 LIKELY_SHARE = 0.3
 """Share of the candidates that are kept, until it is known."""
@@ -54,6 +54,8 @@ class _Tally:
     followed: int = 0
     kept: int = 0
     overshoot: int = 0
+    pairs: int = 0
+    """Of photons that one path gave."""
 
 
 def thin_photons(
@@ -90,18 +92,20 @@ class _Drawing:
 
     def run(self) -> tuple[PhotonTable, dict[str, Any]]:
         """Warm up and draw, anew if too many photons came in clumps."""
-        paths = self.pilot.paths
-        drawn: list[PhotonTable] = []
+        paths, photons, allowed = self.pilot.paths, no_photons(), 0.0
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
             self.scopes.start()
             self.tally = _Tally()
             drawn = list(self._exposed() if self.gain is not None else self._budgeted())
+            photons = joined([no_photons(), *drawn])
+            drawn.clear()  # of tens of millions of photons none is kept twice while they are sorted
+            photons = photons.by_pixel(self.setup.grid)
             paths += self.tally.paths
             self.attempt += 1
-            enough = self.tally.overshoot <= OVERSHOOT_SHARE * self.tally.kept
-            if enough or self.attempt == ATTEMPTS:
+            allowed = pairs_allowed(photons.k.size, math.prod(self.setup.grid.shape_KLHW))
+            if self.tally.pairs <= allowed or self.attempt == ATTEMPTS:
                 break
         tally, scopes = self.tally, self.scopes
         log = {
@@ -111,13 +115,13 @@ class _Drawing:
             "kept": tally.kept,
             "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
             "overshoot_photons": tally.overshoot,
+            "clump_pairs": tally.pairs,
+            "clump_pairs_allowed": round(allowed, 2),
             "attempts": self.attempt,
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        photons = joined([no_photons(), *drawn])
-        drawn.clear()  # there may be tens of millions of photons: none is kept twice while they are sorted
-        return photons.by_pixel(self.setup.grid), log
+        return photons, log
 
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""
@@ -210,10 +214,24 @@ class _Drawing:
         self.tally.followed += found.ratio.size
         self.tally.paths += paths_of(sampler, owner.size, found.ratio.size)
         self.tally.kept += path.size
-        self.tally.overshoot += int((np.diff(path) == 0).sum())
+        of_path = np.bincount(path)
+        self.tally.overshoot += int(np.maximum(of_path - 1, 0).sum())
+        self.tally.pairs += int((of_path * (of_path - 1) // 2).sum())
         self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)
         photons = found.photons.take(path)
         return replace(photons, n=np.ones_like(photons.n), scope=scope, rank=rank)
+
+
+def pairs_allowed(photons: int, pixels: int) -> float:
+    """How many pairs of photons that one path gave no test of the counts can tell from chance.
+
+    Poisson counts with the rates r_x have r_x^2 / 2 pairs of photons in pixel x on average, and as much
+    variance; clumps add a share of r_x. A test that knows all rates weighs the pairs of each pixel by
+    1 / r_x: then chance has the variance P / 2 over P pixels, and a share of 1 / sqrt(2 P) of the photons is
+    one standard deviation. No other weights see clumps better. So much is allowed, P being all `pixels` of
+    all views.
+    """
+    return photons / float(np.sqrt(2 * pixels))
 
 
 def _factor(ratio: np.ndarray) -> float:

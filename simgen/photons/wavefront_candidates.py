@@ -102,13 +102,34 @@ class MajorantArrays:
         col_px = mi.Float(col) + (right - dr.floor(right)) - 0.5
         colour = dr.gather(mi.UInt32, self.colour, cell)
         wavelength_sample = light.wavelength_samples(sampler, len(group))
-        lens_point = None
-        if self.setup.rig.lens is not None:
-            radius_mm = self.setup.rig.lens.aperture_mm / 2
-            lens_point = radius_mm * mi.warp.square_to_uniform_disk_concentric(sampler.next_2d())
+        lens_point = self._lens_point(sampler)
         return Candidates(
             k, l, row, col, row_px, col_px, entry, colour, wavelength_sample, inside, lens_point
         )
+
+    def at(self, sampler: Any, view: np.ndarray, i: np.ndarray, j: np.ndarray, light: Light) -> Candidates:
+        """Candidates (N,) of no entry at given views and places: rows and columns in [0, H) and [0, W)."""
+        mi, dr = self.setup.render_scene.mi, load_drjit()
+        k, l = np.divmod(view, self.setup.grid.cols)
+        row, col = i.astype(np.int64), j.astype(np.int64)
+        colour = gathered(self.colour, unsigned(mi, row % 2 * 2 + col % 2))
+        return Candidates(
+            *(unsigned(mi, camera) for camera in (k, l)),
+            *(signed(mi, pixel) for pixel in (row, col)),
+            *(floats(mi, place - 0.5) for place in (i, j)),
+            entry=dr.zeros(mi.UInt32, view.size),
+            colour=colour,
+            wavelength_sample=light.wavelength_samples(sampler, view.size),
+            inside=dr.full(mi.Bool, True, view.size),
+            lens_point=self._lens_point(sampler),
+        )
+
+    def _lens_point(self, sampler: Any) -> Any:
+        if self.setup.rig.lens is None:
+            return None
+        radius_mm = self.setup.rig.lens.aperture_mm / 2
+        mi = self.setup.render_scene.mi
+        return radius_mm * mi.warp.square_to_uniform_disk_concentric(sampler.next_2d())
 
     def owner_of(self, candidates: Candidates, z_mm: Any) -> Any:
         """The entry that each candidate's path, which hits something at depth `z_mm`, belongs to."""

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from simgen.photons.candidates import Accepted, Setup, nothing
+from simgen.photons.candidates import Accepted, Setup, even_film_points, nothing
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
 from simgen.photons.wavefront_candidates import Candidates, MajorantArrays
@@ -95,16 +95,14 @@ class WavefrontSampler:
             else nothing(setup.channels).over,
         )
 
-    def trace_pilot(self, number: int, follow: int, seed: int) -> Samples:
+    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
         """See `candidates`."""
         setup = self.setup
         mi, dr = setup.render_scene.mi, load_drjit()
-        sampler = _sampler(mi, seed, number)
-        views = _views(setup, sampler, None)
-        candidates = self.arrays.draw(sampler, dr.zeros(mi.UInt32, number), views, self.light)
+        view, i, j = even_film_points(setup.grid, rays, np.random.default_rng(seed))
+        candidates = self.arrays.at(_sampler(mi, seed, view.size), view, i, j, self.light)
         dr.eval(vars(candidates))
-        candidates = _take(candidates, dr.compress(candidates.inside))
-        some = dr.arange(mi.UInt32, min(follow, len(candidates.k)))
+        some = dr.arange(mi.UInt32, min(follow, view.size))
         guess, light = [0.0] * setup.channels, [0.0] * setup.channels
         z_mm = None
         for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):

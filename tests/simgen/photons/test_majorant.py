@@ -8,6 +8,7 @@ import pytest
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
 from simgen.photons.majorant import Majorant, fit
+from simgen.photons.pilot import MOST_RAYS
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
 DIM = np.array([0.02, 0.01, 0.03])
@@ -34,7 +35,7 @@ def pilot(seed: int, number: int = 4000) -> Samples:
 @pytest.fixture
 def majorant() -> Majorant:
     samples = pilot(1)
-    return fit(GRID, layers_for(GRID, tile_px_for(GRID), samples.z_mm), samples, DIM)
+    return fit(GRID, layers_for(GRID, tile_px_for(GRID, MOST_RAYS), samples.z_mm), samples, DIM)
 
 
 def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Majorant) -> None:
@@ -101,7 +102,7 @@ def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) 
 
 def test_tiles_follow_a_sheared_grid_too() -> None:
     sheared = replace(GRID, shear_px=(9.5, -6.0))
-    layers = layers_for(sheared, tile_px_for(GRID), np.array([300.0, 420.0, np.inf]))
+    layers = layers_for(sheared, tile_px_for(GRID, MOST_RAYS), np.array([300.0, 420.0, np.inf]))
     assert layers.row_shift.min() == layers.col_shift.min() == 0
     k, l = (index.ravel() for index in np.indices((3, 4)))
     layer = layers.layer_of(np.array([420.0]))[0]
@@ -110,3 +111,22 @@ def test_tiles_follow_a_sheared_grid_too() -> None:
     # As without shear: half a tile of blur, and half of 2 px.
     assert np.ptp((row + layers.row_shift[layer, k]) / layers.tile_px) <= 1 + 2 / layers.tile_px
     assert np.ptp((col + layers.col_shift[layer, l]) / layers.tile_px) <= 1 + 2 / layers.tile_px
+
+
+def test_a_gap_in_a_surface_is_listed_with_the_bound_of_what_is_around_it() -> None:
+    # One camera, one depth; rays everywhere but in a square of 3 x 3 tiles.
+    grid = replace(GRID, rows=1, cols=1)
+    tile_px = tile_px_for(grid, MOST_RAYS)
+    row, col = (part.ravel() for part in np.mgrid[0:96, 0:128])
+    gap = (row // tile_px >= 20) & (row // tile_px < 23) & (col // tile_px >= 30) & (col // tile_px < 33)
+    row, col = row[~gap], col[~gap]
+    zero, light = np.zeros_like(row), np.ones((row.size, 3))
+    samples = Samples(zero, zero, row, col, np.full(row.size, 300.0), light, light)
+    majorant = fit(grid, layers_for(grid, tile_px, samples.z_mm), samples, DIM)
+    middle = np.array([21 * tile_px])
+    inside = Samples(
+        zero[:1], zero[:1], middle, np.array([31 * tile_px]), np.array([300.0]), light[:1], light[:1]
+    )
+    (entry,) = majorant.owner_of(inside)
+    assert majorant.layer[entry] >= 0
+    np.testing.assert_allclose(majorant.bound[entry], 1.0, rtol=1e-6)
