@@ -15,7 +15,7 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
-from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, seen_alone
+from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, pixels_without_occluders
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes
 from simgen.photons.counting_plan import plan
@@ -209,7 +209,7 @@ def _hidden_shares(
         others = [box for other, box in boxes.items() if other != number]
         if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
             continue
-        alone = seen_alone(render_scene, target.scene, target.folder, number, grid)
+        alone = pixels_without_occluders(render_scene, target.scene, target.folder, number, grid)
         before = alone & (owner > 0) & (owner != number)
         shares[number] = float(before.sum() / alone.sum()) if alone.any() else 0.0
     return shares

@@ -30,10 +30,13 @@ class OnFilm:
     """Whether part of it falls on the film of the virtual centre or of a corner camera."""
 
 
-def seen_alone(
+def pixels_without_occluders(
     render_scene: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid
 ) -> np.ndarray:
-    """Where the virtual centre sees object `number` (from 1), alone but for the lamps, (H, W) bool."""
+    """Pixels (H, W), bool, of object `number` (from 1) at the virtual centre with all other objects removed.
+
+    Area lamps stay: they may hide it too.
+    """
     lamps = tuple(light for light in scene.lights if isinstance(light, AreaLight))
     return _seen(render_scene, scene, folder, number, grid, lamps)
 

@@ -6,7 +6,7 @@ from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Rig
-from simgen.photons.rendering_noise import NOISE_SHARE, Probe, depths_seen, probe
+from simgen.photons.rendering_noise import NOISE_SHARE, Probe, first_hit_depths_mm, probe
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spec.recipe import MOST_PATHS, Photons
 
@@ -93,7 +93,7 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
         photons_per_view=per_view,
         noise=noise,
         normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
-        depths_mm=depths_seen(render_scene, grid) if thins else (),
+        depths_mm=first_hit_depths_mm(render_scene, grid) if thins else (),
     )
 
 

@@ -91,7 +91,7 @@ class DisparityLayers:
         """One index for the tile (row, column) of a layer."""
         return (layer * self.rows + row) * self.cols + col
 
-    def split(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def layer_row_col(self, tiles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Layer, row and column of flat indices."""
         rest, col = np.divmod(tiles, self.cols)
         layer, row = np.divmod(rest, self.rows)
@@ -99,7 +99,7 @@ class DisparityLayers:
 
     def around(self, tiles: np.ndarray, reach: int = 1) -> np.ndarray:
         """Flat indices (N, (2 reach + 1)^2) of the tiles up to `reach` away; the border's own beyond it."""
-        layer, row, col = self.split(tiles)
+        layer, row, col = self.layer_row_col(tiles)
         offsets = np.argwhere(np.ones((2 * reach + 1, 2 * reach + 1))) - reach
         near_row = np.clip(row[:, None] + offsets[:, 0], 0, self.rows - 1)
         near_col = np.clip(col[:, None] + offsets[:, 1], 0, self.cols - 1)
@@ -112,7 +112,7 @@ class DisparityLayers:
 
     def merge(self, tiles: np.ndarray, side: int) -> np.ndarray:
         """Flat indices, in `merged(side)`, of the tiles that these lie in."""
-        layer, row, col = self.split(tiles)
+        layer, row, col = self.layer_row_col(tiles)
         return self.merged(side).flat(layer, row // side, col // side)
 
 

@@ -77,7 +77,7 @@ class Majorant:
 
         `bound` is raised to `dim`.
         """
-        layer, row, col = self.layers.split(tiles)
+        layer, row, col = self.layers.layer_row_col(tiles)
         self.entry_of[tiles] = np.arange(self.layer.size, self.layer.size + tiles.size)
         self.layer, self.row = np.append(self.layer, layer), np.append(self.row, row)
         self.col = np.append(self.col, col)
@@ -142,19 +142,19 @@ def _without_gaps(layers: DisparityLayers, tiles: np.ndarray) -> np.ndarray:
     """These tiles (N,), sorted, and those in gaps between them: a closing of each layer by a square."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
+    if not tiles.size:
+        return tiles
     closed = []
     side, per_layer = 2 * GAP_TILES + 1, layers.rows * layers.cols
-    for own in np.split(tiles, np.flatnonzero(np.diff(tiles // per_layer)) + 1):
-        if not own.size:
-            continue
-        layer, row, col = layers.split(own)
+    for in_layer in np.split(tiles, np.flatnonzero(np.diff(tiles // per_layer)) + 1):
+        layer, row, col = layers.layer_row_col(in_layer)
         top, left = row.min(), col.min()
         mask = np.zeros((row.max() - top + 1 + 2 * side, col.max() - left + 1 + 2 * side), dtype=bool)
         mask[row - top + side, col - left + side] = True
         mask = minimum_filter(maximum_filter(mask, side), side)
         row, col = np.nonzero(mask)
         closed.append(layers.flat(layer[0], row + top - side, col + left - side))
-    return np.concatenate(closed) if closed else tiles
+    return np.concatenate(closed)
 
 
 def _filled(layers: DisparityLayers, tiles: np.ndarray, guess: np.ndarray) -> np.ndarray:
@@ -162,12 +162,9 @@ def _filled(layers: DisparityLayers, tiles: np.ndarray, guess: np.ndarray) -> np
     empty = guess.max(axis=1, initial=0) <= 0
     if not empty.any():
         return guess
-    near = layers.around(tiles[empty], GAP_TILES)
-    table = np.full(layers.tiles, tiles.size)
-    table[tiles] = np.arange(tiles.size)
-    known = np.concatenate([guess, np.zeros((1, guess.shape[1]), guess.dtype)])
-    guess = guess.copy()
-    guess[empty] = _highest(known, table[near])
+    table = np.zeros((layers.tiles, guess.shape[1]), guess.dtype)
+    table[tiles] = guess
+    guess[empty] = _highest(table, layers.around(tiles[empty], GAP_TILES))
     return guess
 
 

@@ -12,10 +12,10 @@ from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
 
 FIRST_RAYS = 1 << 14
-"""The first look, of which every ray is followed."""
+"""Rays of the first pilot, all of which are followed."""
 RAYS_PER_PHOTON = 2.5
 MOST_RAYS = RAYS_PER_TILE * TILES_ACROSS**2
-"""The second look has so many rays for each photon that is wanted, until tiles are as fine as they get."""
+"""The second pilot has so many rays for each photon that is wanted, until tiles are as fine as they get."""
 FOLLOWED_SHARE = 0.5
 AMBIENT_SHARE = 3.0
 """Light that surfaces throw at each other is guessed to be so many times the mean radiance."""
@@ -42,11 +42,11 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     `expected` says how many photons are wanted in all, given the mean radiance per colour: the effort
     is what they deserve.
 
-    A first look, with few rays, shows how bright it is. The second, evenly spread too, shows what there is to
-    see; tiles are so large that each holds several of its rays.
+    A first pilot of few rays measures the mean radiance. A second, also spread evenly, finds the surfaces;
+    tiles are so large that each holds several of its rays.
     """
     ambient = surroundings(setup)
-    first, paths = _first_look(setup, seed, ambient)
+    first, paths = _first_pilot(setup, seed, ambient)
     mean = first.light.mean(axis=0)
     if not mean.any():
         return Pilot(None, mean, ambient, paths, max_dark_candidates=0)
@@ -63,7 +63,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     return Pilot(majorant, mean, ambient, paths, sampler.max_dark_candidates)
 
 
-def _first_look(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
+def _first_pilot(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
     sampler = _sampler_of_films(setup, ambient)
     round_number, rays, spent = 0, FIRST_RAYS, 0
     while True:

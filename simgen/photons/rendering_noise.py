@@ -78,7 +78,7 @@ def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: in
     return Probe(float((first + second).mean() / 2), float(variance))
 
 
-def depths_seen(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
+def first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
     """Up to `DEPTHS` depths in mm, of what a coarse look from the corner cameras finds; inf for nothing."""
     small, ends = _coarse(grid), [(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
     z_mm = np.concatenate([first_hits_of_view(render_scene, small, k, l).z_mm.ravel() for k, l in ends])

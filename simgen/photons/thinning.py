@@ -92,21 +92,19 @@ class _Drawing:
 
     def run(self) -> tuple[PhotonTable, dict[str, Any]]:
         """Warm up and draw, anew if too many photons came in clumps."""
-        paths, photons, allowed = self.pilot.paths, no_photons(), 0.0
+        paths, drawn, allowed = self.pilot.paths, list[PhotonTable](), 0.0
         if self.pilot.majorant is not None:
             paths += self._warm_up()
         while self.pilot.majorant is not None:
             self.scopes.start()
             self.tally = _Tally()
             drawn = list(self._exposed() if self.gain is not None else self._budgeted())
-            photons = joined([no_photons(), *drawn])
-            drawn.clear()  # of tens of millions of photons none is kept twice while they are sorted
-            photons = photons.by_pixel(self.setup.grid)
             paths += self.tally.paths
             self.attempt += 1
-            allowed = pairs_allowed(photons.k.size, math.prod(self.setup.grid.shape_KLHW))
+            allowed = pairs_allowed(self.tally.kept, math.prod(self.setup.grid.shape_KLHW))
             if self.tally.pairs <= allowed or self.attempt == ATTEMPTS:
                 break
+            drawn.clear()  # before as many are drawn again
         tally, scopes = self.tally, self.scopes
         log = {
             "method": "thinning",
@@ -121,7 +119,9 @@ class _Drawing:
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        return photons, log
+        photons = joined([no_photons(), *drawn])
+        drawn.clear()  # of tens of millions of photons none is kept twice while they are sorted
+        return photons.by_pixel(self.setup.grid), log
 
     def _expected(self, mean: np.ndarray) -> float:
         """Photons that are expected in all, given the mean radiance of each colour."""

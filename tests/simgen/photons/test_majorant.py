@@ -79,7 +79,7 @@ def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) ->
     over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
     over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
     majorant.lift(over, reach)
-    _, row, col = majorant.layers.split(majorant.layers.tiles_of(over))
+    _, row, col = majorant.layers.layer_row_col(majorant.layers.tiles_of(over))
     bright = np.flatnonzero(majorant.bound[:, 1] > 40)
     apart = np.maximum(abs(majorant.row[bright] - row), abs(majorant.col[bright] - col))
     assert bright.size == (2 * reach + 1) ** 2
