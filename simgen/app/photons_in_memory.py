@@ -17,6 +17,7 @@ from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
 from simgen.dataset.prepared import Prepared, capture_of, needs_of
 from simgen.dataset.resources import check_resources
+from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
@@ -72,7 +73,8 @@ def draw_photons(
         return sense(image, recipe.cfa)
 
     if made.thins:
-        arrivals, _ = thin(capture, render_scene, recipe.render.max_depth, made, report)
+        setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
+        arrivals, _ = thin(capture, setup, made, report=report)
     else:
         arrivals, _ = draw_from_views(capture, mosaic_of, made, report)
     counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed).by_pixel(grid)

@@ -161,25 +161,32 @@ def _ink(text: str, size: float) -> Any:
 
 def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
     generator = np.random.default_rng(texture.seed)
-    shared = _spectral_noise(generator, texture.exponent, canvas)
+    amplitude = _amplitude(texture.exponent, canvas)
+    shared = _spectral_noise(generator, amplitude, canvas)
     channels = []
     for mean in srgb_to_linear(np.array(texture.colour)).tolist():
         mixed = shared
         if texture.chroma > 0:
-            own = _spectral_noise(generator, texture.exponent, canvas)
+            own = _spectral_noise(generator, amplitude, canvas)
             mixed = math.sqrt(1 - texture.chroma) * shared + math.sqrt(texture.chroma) * own
             mixed /= mixed.std()
         channels.append(np.clip(mean * (1 + texture.contrast * mixed), 0, 1).astype(np.float32))
     return np.stack(channels, axis=-1)
 
 
-def _spectral_noise(generator: np.random.Generator, exponent: float, canvas: _Canvas) -> np.ndarray:
-    """Normal noise (H, W), periodic, with amplitude ~ frequency^-exponent, mean 0 and deviation 1."""
+def _amplitude(exponent: float, canvas: _Canvas) -> np.ndarray:
+    """Of each frequency of `np.fft.rfft2`: frequency^-exponent, and 0 for the mean."""
     columns, rows = canvas.columns, canvas.rows
     across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])
     frequency = np.hypot(down[:, None], across)
-    frequency[0, 0] = 1.0  # the mean, which is taken out below
-    spectrum = np.fft.rfft2(generator.standard_normal((rows, columns))) * frequency**-exponent
-    spectrum[0, 0] = 0
-    noise = np.fft.irfft2(spectrum, (rows, columns))
+    frequency[0, 0] = 1.0
+    amplitude = frequency**-exponent
+    amplitude[0, 0] = 0.0
+    return amplitude
+
+
+def _spectral_noise(generator: np.random.Generator, amplitude: np.ndarray, canvas: _Canvas) -> np.ndarray:
+    """Normal noise (H, W), periodic, of the given spectrum, with mean 0 and deviation 1."""
+    shape = canvas.rows, canvas.columns
+    noise = np.fft.irfft2(np.fft.rfft2(generator.standard_normal(shape)) * amplitude, shape)
     return noise / noise.std()

@@ -19,16 +19,22 @@ from simgen.spec.scene import scene_files
 
 def identity_of(prepared: Prepared) -> str:
     """Hash of all that decides the dataset's content, but for the machine."""
-    scene, folder, curves = prepared.scene, prepared.folder, prepared.curves
-    assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
-    content = {
+    content = content_of_scene(prepared) | {
         "recipe": prepared.recipe.model_dump(mode="json"),
-        "scene": scene.model_dump(mode="json"),
-        "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
-        "sensitivities": None if curves is None else curves.tolist(),
         "format_version": FORMAT_VERSION,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def content_of_scene(prepared: Prepared) -> dict[str, Any]:
+    """All that decides what the sensor sees of a scene: its values, hashes of its files, sensitivities."""
+    scene, folder, curves = prepared.scene, prepared.folder, prepared.curves
+    assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
+    return {
+        "scene": scene.model_dump(mode="json"),
+        "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
+        "sensitivities": None if curves is None else curves.tolist(),
+    }
 
 
 def finished(out: Path, identity: str) -> dict[str, Any] | None:

@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,10 @@ from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
 from simgen.dataset.resources import check_resources
+from simgen.dataset.reuse import InCommon, Reuse, in_common
+from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan, plan
+from simgen.photons.exploration import explore
 from simgen.photons.photon_counting import draw_from_views, thin, write_counts
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -48,12 +52,15 @@ class _Clock:
         self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
 
 
-def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> dict[str, Any]:
+def generate(
+    recipe: Recipe, near: Path, out: Path, report: Report = silent, reuse: Reuse | None = None
+) -> dict[str, Any]:
     """Make the dataset of `recipe` in the folder `out`; return its manifest.
 
     `near` is the recipe's folder, beside which scenes are looked up. An unfinished dataset of the
     same recipe is resumed, a finished one is checked and left alone; a folder that holds anything
-    else is refused with `InputError`.
+    else is refused with `InputError`. What the dataset has in common with those made before with the same
+    `reuse` is not made again.
     """
     prepared = prepare(recipe, near)
     identity = identity_of(prepared)
@@ -64,18 +71,20 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     check_resources(needs, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)
     clock, made, capture = _Clock(), None, capture_of(recipe)
+    common = in_common(reuse or Reuse(), prepared, engine)
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
-        render_scene = prepared.render_scene()
+        render_scene = common.scene(prepared.render_scene)
     if recipe.products.counts:  # likewise: too much light
         with clock.stage("plan"):
-            made = plan(capture, render_scene, engine["kind"], least_samples(recipe))
+            samples = least_samples(recipe)
+            made = common.plan(partial(plan, capture, render_scene, engine["kind"], samples))
             check_resources(needs, made, out)
     with claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return whole(out, identity)
         sweep_temporaries(out)
-        photons = _work(prepared, capture, render_scene, made, out, clock, report)
+        photons = _work(prepared, capture, render_scene, made, common, out, clock, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
         with clock.stage("hash"):
             budgets = (None, *recipe.photons.nested)
@@ -99,6 +108,7 @@ def _work(
     capture: Capture,
     render_scene: RenderScene,
     made: Plan | None,
+    common: InCommon,
     out: Path,
     clock: _Clock,
     report: Report,
@@ -109,10 +119,13 @@ def _work(
     if products.truth or products.view_truth:
         request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
         with clock.stage("truth"):
-            write_truth(request, render_scene, capture.rig, out, report)
+            common.truth(out / TRUTH, lambda: write_truth(request, render_scene, capture.rig, out, report))
     if made is not None and thins:
         with clock.stage("photons"):
-            arrivals, photons = thin(capture, render_scene, recipe.render.max_depth, made, report)
+            setup = Setup(render_scene, capture.rig, capture.cfa, recipe.render.max_depth)
+            light = capture.photons, capture.photons_per_radiance
+            explored = common.exploration(partial(explore, setup, *light))
+            arrivals, photons = thin(capture, setup, made, explored, report)
             photons |= write_counts(capture, recipe.sensor, arrivals, out, with_origins=products.truth)
     views = RenderedViews(
         capture.rig,

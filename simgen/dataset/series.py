@@ -7,6 +7,7 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.io.dataset_layout import MANIFEST, MARKER
 from simgen.dataset.generation import generate
+from simgen.dataset.reuse import Reuse
 from simgen.spec.recipe import SEED_LIMIT, Recipe
 
 MOST_SEEDS = 1000
@@ -35,11 +36,13 @@ def generate_series(
     """Make the dataset of each of `count` seeds in its folder of `out`; yield folder and manifest.
 
     Each is what `generate` makes of the recipe with that seed, resumed and left alone likewise. One process
-    makes all, so that the renderer compiles once. Raises `InputError` as `generate` and `at_seeds` do.
+    makes all, so that the renderer compiles once, and what does not depend on the seed is made once.
+    Raises `InputError` as `generate` and `at_seeds` do.
     """
     recipes = at_seeds(recipe, count)
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for those of several seeds")
+    reuse = Reuse()
     for seeded in recipes:
         folder = folder_of(out, seeded)
-        yield folder, generate(seeded, near, folder)
+        yield folder, generate(seeded, near, folder, reuse=reuse)

@@ -15,6 +15,8 @@ may be left out for having looked black.
 Plain NumPy; see `candidates` for use.
 """
 
+from copy import copy
+
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
@@ -58,6 +60,14 @@ class Majorant:
         self.bound = np.tile(DIM_MARGIN * dim, (self.coarse_count, 1))
         self.radiance_ratio_bound = np.full(self.bound.shape, ENDLESS)
         self.entry_of = np.full(layers.tiles, -1, dtype=np.int32)
+
+    def copy(self) -> "Majorant":
+        """Another of the same bounds, which is lifted on its own."""
+        other = copy(self)
+        # What `list_tiles` appends to is replaced; these are changed in place.
+        for name in ("bound", "radiance_ratio_bound", "entry_of"):
+            setattr(other, name, getattr(self, name).copy())
+        return other
 
     @property
     def side_px(self) -> np.ndarray:

@@ -15,10 +15,10 @@ from pcii.io.zarr_groups import write_arrays_safely
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan
+from simgen.photons.exploration import Exploration
 from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
-from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import detect, nested_subset, saturate
 from simgen.sensor.mosaic import draw_counts, fixed_totals, photon_rates, scope_energies
 from simgen.sensor.photon_table import PhotonTable
@@ -26,15 +26,20 @@ from simgen.spec.recipe import MOST_PHOTONS, Sensor
 
 
 def thin(
-    capture: Capture, render_scene: RenderScene, max_depth: int, made: Plan, report: Report = silent
+    capture: Capture,
+    setup: Setup,
+    made: Plan,
+    explored: Exploration | None = None,
+    report: Report = silent,
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them."""
     grid = capture.grid
     photons, log = thin_photons(
-        Setup(render_scene, capture.rig, capture.cfa, max_depth),
+        setup,
         capture.photons,
         seed=capture.seed,
         photons_per_radiance=capture.photons_per_radiance,
+        explored=explored,
         report=report,
     )
     return photons, log | {

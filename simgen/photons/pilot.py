@@ -11,6 +11,9 @@ from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples
 from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
 
+EXPLORATION_SEED = 0
+"""What is found before photons are drawn decides their cost, not where they fall: with one seed for all,
+datasets that differ in nothing but their seed have it in common."""
 FIRST_RAYS = 1 << 14
 """Rays of the first pilot, all of which are followed."""
 RAYS_PER_PHOTON = 2.5
@@ -36,7 +39,7 @@ class Pilot:
     """Where so many candidates of a scope find no light it has none."""
 
 
-def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) -> Pilot:
+def send_pilot(setup: Setup, expected: Callable[[np.ndarray], float]) -> Pilot:
     """Find where there is light, and how much at most.
 
     `expected` says how many photons are wanted in all, given the mean radiance per colour: the effort
@@ -46,7 +49,7 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     tiles are so large that each holds several of its rays.
     """
     ambient = surroundings(setup)
-    first, paths = _first_pilot(setup, seed, ambient)
+    first, paths = _first_pilot(setup, ambient)
     mean = first.light.mean(axis=0)
     if not mean.any():
         return Pilot(None, mean, ambient, paths, max_dark_candidates=0)
@@ -56,18 +59,20 @@ def explore(setup: Setup, expected: Callable[[np.ndarray], float], seed: int) ->
     sampler = _sampler_of_films(setup, ambient)
     rays = int(np.clip(RAYS_PER_PHOTON * expected(mean) / sampler.paths_each, FIRST_RAYS, MOST_RAYS))
     followed = int(FOLLOWED_SHARE * rays)
-    known = first.join(sampler.trace_evenly(rays, followed, seeds.integer(seed, stage="second pilot")))
+    known = first.join(
+        sampler.trace_evenly(rays, followed, seeds.integer(EXPLORATION_SEED, stage="second pilot"))
+    )
     layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
     majorant = fit(setup.grid, layers, known, dim)
     paths += paths_of(sampler, rays, followed)
     return Pilot(majorant, mean, ambient, paths, sampler.max_dark_candidates)
 
 
-def _first_pilot(setup: Setup, seed: int, ambient: np.ndarray) -> tuple[Samples, int]:
+def _first_pilot(setup: Setup, ambient: np.ndarray) -> tuple[Samples, int]:
     sampler = _sampler_of_films(setup, ambient)
     round_number, rays, spent = 0, FIRST_RAYS, 0
     while True:
-        path_seed = seeds.integer(seed, stage="first pilot", round_number=round_number)
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
         found = sampler.trace_evenly(rays, rays, path_seed)
         found = found.take(found.followed)
         spent += paths_of(sampler, rays, rays)

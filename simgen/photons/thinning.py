@@ -25,26 +25,15 @@ from typing import Any
 import numpy as np
 
 from pcii.base.progress import Report, silent
-from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Setup, paths_of
-from simgen.photons.majorant import Majorant
+from simgen.photons.exploration import LEAST_SHARE, Exploration, explore
 from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, places, scopes_for
-from simgen.photons.pilot import explore
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
 ATTEMPTS = 4
-WARM_UP_SHARE = 0.15
-"""The warm-up's rounds aim for this share of the photons, but take so many candidates at least, at most."""
-WARM_UP_CANDIDATES = (1 << 13, 1 << 17)
-WARM_UP_ROUNDS = 2
-EXCESS_SHARE = 1e-5
-"""Share of the light that the warm-up leaves above the majorant."""
-LIKELY_SHARE = 0.3
-"""Share of the candidates that are kept, until it is known."""
-LEAST_SHARE = 1e-4
 
 
 @dataclass
@@ -64,6 +53,7 @@ def thin_photons(
     *,
     seed: int,
     photons_per_radiance: float | None = None,
+    explored: Exploration | None = None,
     report: Report = silent,
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """All photons of all views, ordered by view and pixel, and a log of how they came about.
@@ -71,31 +61,39 @@ def thin_photons(
     One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
+    `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
+    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it.
     """
-    return _Drawing(setup, photons, seed, photons_per_radiance, report).run()
+    if explored is None:
+        explored = explore(setup, photons, photons_per_radiance)
+    return _Drawing(setup, photons, seed, photons_per_radiance, explored, report).run()
 
 
 class _Drawing:
-    """One run: the settings, what the pilot found, and what has been drawn so far."""
+    """One run: the settings, what was explored, and what has been drawn so far."""
 
     def __init__(
-        self, setup: Setup, photons: Photons, seed: int, photons_per_radiance: float | None, report: Report
+        self,
+        setup: Setup,
+        photons: Photons,
+        seed: int,
+        photons_per_radiance: float | None,
+        explored: Exploration,
+        report: Report,
     ) -> None:
         self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
         self.gain = photons_per_radiance
         self.groups = cell_groups(photons.scope, setup.cfa)
         self.scopes = scopes_for(photons, setup.grid.view_count, len(self.groups), seed)
         self.tally = _Tally()
-        self.pilot = explore(setup, self._expected, seed)
-        self.share = LIKELY_SHARE
+        self.explored, self.share = explored, explored.share
+        self.majorant = None if explored.majorant is None else explored.majorant.copy()
         self.attempt = 0
 
     def run(self) -> tuple[PhotonTable, dict[str, Any]]:
-        """Warm up and draw, anew if too many photons came in clumps."""
-        paths, drawn, allowed = self.pilot.paths, list[PhotonTable](), 0.0
-        if self.pilot.majorant is not None:
-            paths += self._warm_up()
-        while self.pilot.majorant is not None:
+        """Draw, anew if too many photons came in clumps."""
+        paths, drawn, allowed = self.explored.paths, list[PhotonTable](), 0.0
+        while self.majorant is not None:
             self.scopes.start()
             self.tally = _Tally()
             drawn = list(self._exposed() if self.gain is not None else self._budgeted())
@@ -123,45 +121,16 @@ class _Drawing:
         drawn.clear()  # of tens of millions of photons none is kept twice while they are sorted
         return photons.by_pixel(self.setup.grid), log
 
-    def _expected(self, mean: np.ndarray) -> float:
-        """Photons that are expected in all, given the mean radiance of each colour."""
-        if self.gain is None:
-            return float(self.scopes.wanted.sum())
-        grid, cells = self.setup.grid, colour_cells(self.setup.cfa).ravel()
-        return float(self.gain * mean[cells].mean() * grid.view_count * grid.height * grid.width)
-
-    def _warm_up(self) -> int:
-        """Draw candidates for nothing but to lift the majorant where it is exceeded; how many paths it took.
-
-        What is learned here costs no photon its independence.
-        """
-        aim = WARM_UP_SHARE * self._expected(self.pilot.mean) / LIKELY_SHARE
-        number = int(np.clip(aim, *WARM_UP_CANDIDATES))
-        majorant, paths = self._majorant(), 0
-        for done in range(WARM_UP_ROUNDS):
-            group = np.arange(number) % len(self.groups)
-            path_seed = seeds.integer(self.seed, stage="warm-up", round_number=done)
-            sampler = self._sampler()
-            found = sampler.try_candidates(group, None, path_seed)
-            paths += paths_of(sampler, number, found.ratio.size)
-            factor = _factor(found.ratio)
-            self.share = max(found.photons.n.sum() / number / factor, LEAST_SHARE)
-            majorant.scale(factor)
-            majorant.lift(found.over)
-        return paths
-
-    def _majorant(self) -> Majorant:
-        assert self.pilot.majorant is not None
-        return self.pilot.majorant
-
     def _sampler(self) -> CandidateSampler:
-        return sampler_for(self.setup, self._majorant(), self.groups, self.pilot.ambient)
+        assert self.majorant is not None
+        return sampler_for(self.setup, self.majorant, self.groups, self.explored.ambient)
 
     def _budgeted(self) -> Iterator[PhotonTable]:
         """Rounds of candidates until every scope has its photons, or is dark."""
+        most_dark = self.explored.max_dark_candidates
         for part, block in enumerate(self.scopes.blocks()):
             round_number = 0
-            while (wanting := np.intersect1d(self.scopes.open(self.pilot.max_dark_candidates), block)).size:
+            while (wanting := np.intersect1d(self.scopes.open(most_dark), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = candidates_needed(missing, round_number, self.share)
                 yield self._round(wanting, candidates, self._sampler(), part, round_number)
@@ -232,14 +201,3 @@ def pairs_allowed(photons: int, pixels: int) -> float:
     all views.
     """
     return photons / float(np.sqrt(2 * pixels))
-
-
-def _factor(ratio: np.ndarray) -> float:
-    """By how much to raise all limits for the light above them to be at most `EXCESS_SHARE`."""
-    allowed = EXCESS_SHARE * ratio.sum()
-    ratio = np.sort(ratio)[::-1]
-    # Above the n-th largest lies the sum of the n - 1 that are larger less as many times itself.
-    above = np.cumsum(ratio) - np.arange(1, ratio.size + 1) * ratio
-    if allowed <= 0:
-        return 1.0
-    return float(np.clip(ratio[min(np.searchsorted(above, allowed), ratio.size - 1)], 0.5, 2.0))

@@ -13,7 +13,7 @@ from simgen.renderer.backend import shape_numbers
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape, pose_of
-from simgen.renderer.mitsuba_surfaces import matt, surface_plugin, two_sided
+from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_plugin, two_sided
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spectral.filters import Filters, filters_for
@@ -51,8 +51,9 @@ def build(
         "type": "scene",
         "integrator": {"type": "path", "max_depth": max_depth},
     }
-    for number, thing in enumerate(scene.objects, start=1):
-        plugins[f"object{number}"] = _object(mi, thing, assets)
+    patterns = painted_patterns(scene.objects)
+    for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
+        plugins[f"object{number}"] = _object(mi, thing, assets, pattern)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
@@ -87,9 +88,9 @@ def _object_id(shape_id: str) -> int:
     return int(shape_id.removeprefix("object")) if shape_id.startswith("object") else 0
 
 
-def _object(mi: Any, thing: SceneObject, assets: Assets) -> Any:
+def _object(mi: Any, thing: SceneObject, assets: Assets, pattern: np.ndarray | None) -> Any:
     try:
-        surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets))
+        surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
         return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None

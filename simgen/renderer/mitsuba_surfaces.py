@@ -1,6 +1,9 @@
 """Materials as Mitsuba's surfaces."""
 
 import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -10,8 +13,8 @@ from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
 from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin
 from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic
+from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
-from simgen.spec.textures import Texture
 
 
 def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
@@ -26,17 +29,30 @@ def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
     return {"type": "diffuse", "reflectance": reflectance}
 
 
-def surface_plugin(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
-    """The surface of an object of this shape, from the front."""
+def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
+    """The pixels of each object's pattern (see `paint`), None if it carries none; several at a time."""
+
+    def pixels(thing: SceneObject) -> np.ndarray | None:
+        texture = thing.material.texture
+        return None if texture is None or isinstance(texture, str) else paint(texture, aspect_of(thing.shape))
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from pool.map(pixels, things)
+
+
+def surface_plugin(
+    mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
+) -> dict[str, Any]:
+    """The surface of an object of this shape, from the front; `pattern` are its pixels if it carries one."""
     match material.finish:
         case Matt():
-            return matt(_reflectance(mi, material, shape, assets))
+            return matt(_reflectance(mi, material, shape, assets, pattern))
         case Plastic(roughness=alpha):
             return {
                 "type": "roughplastic",
                 "distribution": "ggx",
                 "alpha": alpha,
-                "diffuse_reflectance": _reflectance(mi, material, shape, assets),
+                "diffuse_reflectance": _reflectance(mi, material, shape, assets, pattern),
             }
         case Metal(name=name, roughness=alpha):
             return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
@@ -45,7 +61,9 @@ def surface_plugin(mi: Any, material: Material, shape: Shape, assets: Assets) ->
             return {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
 
 
-def _reflectance(mi: Any, material: Material, shape: Shape, assets: Assets) -> dict[str, Any]:
+def _reflectance(
+    mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
+) -> dict[str, Any]:
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
@@ -53,9 +71,11 @@ def _reflectance(mi: Any, material: Material, shape: Shape, assets: Assets) -> d
         raise InputError(
             f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates"
         )
+    pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
+    assert pixels is not None
     return {
         "type": "bitmap",
-        "bitmap": _bitmap(mi, _pixels(material.texture, shape, assets)),
+        "bitmap": _bitmap(mi, _in_renderers_order(pixels, shape)),
         # Linear already, so colours are left as they are, but for being made spectra where these are asked.
         "raw": not is_spectral(mi),
         "filter_type": "bilinear",
@@ -70,14 +90,10 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
     return bitmap
 
 
-def _pixels(texture: str | Texture, shape: Shape, assets: Assets) -> np.ndarray:
-    """Linear reflectance (H, W, 3), float32, in the order that the renderer takes it for this shape."""
-    if isinstance(texture, str):
-        pixels = assets.image(texture)
-    else:
-        pixels = paint(texture, aspect_of(shape))
+def _in_renderers_order(pixels: np.ndarray, shape: Shape) -> np.ndarray:
+    """A texture's pixels (H, W, 3) in the order that the renderer takes them for this shape."""
     if isinstance(shape, Card):
-        pixels = np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
+        return np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
     return pixels
 
 

@@ -20,6 +20,7 @@ from pcii.io.verification import verify
 from simgen.dataset.prepared import capture_of, least_samples
 from simgen.photons import counting_plan as module
 from simgen.photons import photon_counting
+from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import PROBE_SEED, Plan
 from simgen.photons.photon_counting import draw_from_views, write_counts
 from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, NORMALISER_ERROR, probe
@@ -58,7 +59,9 @@ def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
 
 
 def thin(made: Recipe, render_scene: RenderScene) -> PhotonTable:
-    return photon_counting.thin(capture_of(made), render_scene, made.render.max_depth, PLAN)[0]
+    capture = capture_of(made)
+    setup = Setup(render_scene, capture.rig, capture.cfa, made.render.max_depth)
+    return photon_counting.thin(capture, setup, PLAN)[0]
 
 
 def dense(made: Recipe) -> PhotonTable:

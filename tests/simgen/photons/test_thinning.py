@@ -278,7 +278,7 @@ def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     scene = lit([plastic, gold], [lamp, EVENLY])
     budget = 30_000 if COMPILED else 6000
     drawn, log = draw_with_log(scene, 1, budget=budget)
-    assert log["overshoot_photons"] <= max(1e-4 * log["kept"], 3)
+    assert log["clump_pairs"] <= log["clump_pairs_allowed"]
     views = [
         render_view(scene, GRID, k, l, samples_per_pixel=8192, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
@@ -475,3 +475,11 @@ def test_points_of_a_pilot_are_spread_evenly_over_film_and_views(size: tuple[int
     rows = max(1, round(np.sqrt(number * size[0] / size[1])))
     in_rows = np.bincount((i * rows / size[0]).astype(int), minlength=rows)
     assert in_rows.max() == in_rows.min()
+
+
+def test_photons_per_radiance_are_asked_for_with_an_exposure_and_no_budget(scene: RenderScene) -> None:
+    setup = Setup(scene, GRID, "GRBG", DEPTH)
+    with pytest.raises(ValueError, match="photons_per_radiance: needed"):
+        thin_photons(setup, Photons(scope="exposure"), seed=1)
+    with pytest.raises(ValueError, match="and for no others"):
+        thin_photons(setup, Photons(budget=10), seed=1, photons_per_radiance=0.1)

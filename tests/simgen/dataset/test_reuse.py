@@ -1,0 +1,110 @@
+"""What is reused between datasets changes none of them, whatever was made before; and work is done once."""
+
+from pathlib import Path
+
+import pytest
+from test_generation import digest
+
+from simgen.dataset import generation as module
+from simgen.dataset.generation import generate
+from simgen.dataset.prepared import Prepared
+from simgen.dataset.reuse import Reuse
+from simgen.spec.recipe import load_recipe
+
+pytestmark = pytest.mark.renders
+TOML = """
+scene = "plain_pair"
+seed = 3
+[grid]
+rows = 2
+cols = 2
+pitch_mm = [18.0, 18.0]
+pixel_mm = 1.0
+height = 32
+width = 36
+[photons]
+budget = 100
+"""
+ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
+OTHERS = {
+    "another seed": ["seed=4"],
+    "another budget": ["photons.budget=300"],
+    "another scene": ["scene=two_objects"],
+    "another grid": ["grid.pitch_mm=[9.0,18.0]"],
+    "errors of cameras": [ERRORS],
+    "errors of cameras from another seed": [ERRORS, "seed=4"],
+    "other planes": ["analysis.z_mm=[500.0]"],
+    "other truth": ["products.visibility=true"],
+    "monochrome": ["sensor.cfa=none"],
+    "longer paths": ["render.max_depth=5"],
+    "an exposure": ["photons.scope=exposure", "exposure.time_s=0.001", "exposure.f_number=4.0"],
+}
+
+
+@pytest.fixture
+def recipe_file(tmp_path: Path) -> str:
+    path = tmp_path / "tiny.toml"
+    path.write_text(TOML)
+    return str(path)
+
+
+def test_datasets_are_the_same_whatever_was_made_before(recipe_file: str, tmp_path: Path) -> None:
+    reuse = Reuse()
+    for name, overrides in {"first": list[str](), **OTHERS, "the first again": []}.items():
+        recipe, near = load_recipe(recipe_file, overrides)
+        generate(recipe, near, tmp_path / "reused" / name, reuse=reuse)
+        generate(recipe, near, tmp_path / "alone" / name)
+        assert digest(tmp_path / "reused" / name) == digest(tmp_path / "alone" / name), name
+
+
+@pytest.mark.parametrize(
+    ("overrides", "again"),
+    [
+        (["seed=4"], set[str]()),
+        (["photons.budget=300"], {"plan", "explore"}),
+        (["analysis.z_mm=[500.0]"], {"write_truth"}),
+        (["grid.pitch_mm=[9.0,18.0]"], {"plan", "explore", "write_truth"}),
+        ([ERRORS, "seed=4"], {"plan", "explore", "write_truth"}),
+        (["scene=two_objects"], {"render_scene", "plan", "explore", "write_truth"}),
+    ],
+)
+def test_only_what_depends_on_a_change_is_made_again(
+    recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
+) -> None:
+    made: list[str] = []
+    for owner, name in (
+        (Prepared, "render_scene"), (module, "plan"), (module, "explore"), (module, "write_truth"),
+    ):  # fmt: skip
+        work = getattr(owner, name)
+
+        def watched(*args: object, work: object = work, name: str = name) -> object:
+            made.append(name)
+            assert callable(work)
+            return work(*args)
+
+        monkeypatch.setattr(owner, name, watched)
+    reuse = Reuse()
+    generate(*load_recipe(recipe_file), tmp_path / "first", reuse=reuse)
+    assert sorted(made) == ["explore", "plan", "render_scene", "write_truth"]
+    made.clear()
+    generate(*load_recipe(recipe_file, overrides), tmp_path / "second", reuse=reuse)
+    assert set(made) == again
+
+
+def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -> None:
+    scene = tmp_path / "own"
+    scene.mkdir()
+    (scene / "scene.toml").write_text(
+        'title = "one card"\n[[objects]]\nname = "card"\nposition_mm = [0.0, 0.0, 500.0]\n'
+        'shape = { type = "mesh", file = "card.obj" }\nmaterial = { reflectance = [0.5, 0.5, 0.5] }\n'
+        '[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 100.0\n'
+    )
+    reuse, digests = Reuse(), set[str]()
+    for size in (30, 60):
+        corners = "\n".join(f"v {x * size} {y * size} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        (scene / "card.obj").write_text(f"{corners}\nf 1 2 3\nf 1 3 4\n")
+        recipe, near = load_recipe(recipe_file, [f"scene={scene}"])
+        out = tmp_path / f"of {size}"
+        generate(recipe, near, out, reuse=reuse)
+        digests.add(str(digest(out)))
+    assert len(digests) == 2
