@@ -5,6 +5,8 @@ candidates            Candidates of photons: rays drawn from a majorant, and fol
 counting_plan         How photon counts will be made: thinned one by one or drawn from rendered views, and
                       what led to it.
 disparity_layers      Layers of disparity and their tiles: pieces of surface that all views share.
+exploration           What is found out about a scene's light before photons are drawn: the majorant, and
+                      what it keeps.
 majorant              How bright it can get where: the majorant from which photon candidates are drawn.
 photon_counting       The photon counts of a dataset: thinned or drawn from views, counted by the sensor,
                       written.

@@ -10,6 +10,7 @@ import pytest
 from pcii.base.progress import silent
 from pcii.core.bayer import colour_index
 from simgen.dataset.prepared import capture_of
+from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Plan, plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
@@ -53,7 +54,9 @@ def planned(thins: bool) -> Plan:
 
 
 def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
-    return thin(capture_of(made), built, made.render.max_depth, planned(True))[0]
+    capture = capture_of(made)
+    setup = Setup(built, capture.rig, capture.cfa, made.render.max_depth)
+    return thin(capture, setup, planned(True))[0]
 
 
 def dense(made: Recipe, built: RenderScene) -> PhotonTable:
