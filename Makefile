@@ -41,7 +41,7 @@ test: llvm
 	$(BIN)/python -m pytest -n 2 -m "not slow"
 
 bench: llvm
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'
 	$(BIN)/python -m benchmarks $(TABLES)
 
 gallery: llvm

@@ -5,13 +5,14 @@ Without names all but "removal", which takes days (see there for how to make it 
 
 import sys
 
-from benchmarks import accuracy, colour, photons, removal, sections
+from benchmarks import accuracy, collections, colour, photons, removal, sections
 
 TABLES = {
     "sections": sections.table,
     "accuracy": accuracy.table,
     "photons": photons.table,
     "colour": colour.table,
+    "collections": collections.table,
     "removal": removal.table,
 }
 LONG = ("removal",)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.drawn import KINDS, TUNING, write_drawn
+from benchmarks.drawn import KINDS, TUNING, write_recipe
 from benchmarks.timing import timed
 from simgen.base import random_streams as seeds
 from simgen.dataset.generation import generate
@@ -126,7 +126,7 @@ def _drawn(base_s: float) -> Iterator[str]:
         for kind in KINDS:
             shares, kept, draws, above, fresh = [], [], [], 0, []
             for number in range(TUNING, TUNING + 4):
-                recipe, near = load_recipe(str(write_drawn(Path(folder), kind, number)))
+                recipe, near = load_recipe(str(write_recipe(Path(folder), kind, number)))
                 start = time.perf_counter()
                 generate(recipe, near, Path(folder) / f"{kind}_{number}_data")
                 fresh.append(time.perf_counter() - start)

@@ -6,8 +6,8 @@ BENCH_SEEDS    datasets of each scene, 20
 BENCH_BUDGETS  photons per view, "30 100 300 1000 3000 10000 300000", the last of which stands for full light;
                the most are drawn, and of those the others
 BENCH_METHODS  methods by name, with commas between them; all
-BENCH_PART     i/n: only every n-th dataset from the i-th on, so that n processes share the work
-BENCH_DRAWN    a-b: instead of the corpus the random scenes of these numbers, of every kind (drawn.py)
+BENCH_WORKERS  processes that share the scoring (1); each is slower than one alone
+BENCH_DRAWN    a-b: instead of the corpus the drawn scenes of these numbers, of every kind (drawn.py)
 BENCH_OUT      where datasets and scores are kept, out/benchmark; what is there is not made again
 """
 
@@ -18,17 +18,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from benchmarks.drawn import KINDS, TUNING, write_drawn
+from benchmarks.drawn import KINDS, TUNING, write_recipe
+from pcii.base.crew import Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
-from pcii.evaluation.comparison import evaluate, part_of
+from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.rows import recipe_of
 from pcii.evaluation.tables import Table, markdown, overview, tables_of
-from pcii.io.dataset_layout import MANIFEST, read_manifest
+from pcii.io.dataset_layout import read_manifest
 from simgen.base.strict_models import Strict, read_toml, validate
 from simgen.dataset.generation import generate
-from simgen.dataset.series import at_seeds, folder_of
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.recipe import Recipe
+from simgen.spec.sweeps import load_sweep
 
 CORPUS = Path(__file__).with_name("corpus.toml")
 BUDGETS = "30 100 300 1000 3000 10000 300000"
@@ -70,13 +71,13 @@ def load_corpus(path: Path = CORPUS) -> tuple[Entry, ...]:
 
 
 def drawn_corpus(numbers: str, folder: Path) -> tuple[Entry, ...]:
-    """Random scenes of every kind, of the numbers "a-b", written into a folder; else `InputError`."""
+    """Drawn scenes of every kind, of the numbers "a-b", with recipes in a folder; else `InputError`."""
     first, _, last = numbers.partition("-")
     if not (first.isdecimal() and (last or first).isdecimal()):
         raise InputError(f"BENCH_DRAWN: expected numbers of scenes such as 100-103, got {numbers!r}")
     return tuple(
         Entry(
-            recipe=str(write_drawn(folder, kind, number)),
+            recipe=str(write_recipe(folder, kind, number)),
             half="train" if number < TUNING else "test",
             kind=hard,
         )
@@ -92,9 +93,14 @@ def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int
     nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
     series: list[list[Work]] = []
     for entry in entries:
-        recipe, near = load_recipe(entry.recipe, [*light, *nothing_more, f"title={entry.name}"])
+        sweep = load_sweep(entry.recipe, [*light, *nothing_more, f"title={entry.name}"], seeds=seeds)
         folder = out / "data" / entry.name
-        series.append([Work(entry, own, near, folder_of(folder, own)) for own in at_seeds(recipe, seeds)])
+        series.append(
+            [
+                Work(entry, sweep.recipe(number), sweep.near, folder / sweep.folder(number))
+                for number in range(len(sweep))
+            ]
+        )
     return [work for step in zip(*series, strict=True) for work in step]
 
 
@@ -104,19 +110,17 @@ def table() -> Iterator[str]:
     budgets = [int(text) for text in setting("BENCH_BUDGETS", BUDGETS).split()]
     methods = [name.strip() for name in setting("BENCH_METHODS", "").split(",") if name.strip()]
     out = Path(setting("BENCH_OUT", "out/benchmark"))
-    number, parts = part_of(setting("BENCH_PART", "1/1"))
+    crew = Crew(int(setting("BENCH_WORKERS", "1")))
     drawn = setting("BENCH_DRAWN", "")
     corpus = drawn_corpus(drawn, out / "drawn") if drawn else load_corpus()
     works = work_list(corpus, out, int(setting("BENCH_SEEDS", "20")), budgets)
-    own = [work for position, work in enumerate(works) if position % parts == number - 1]
     with Stages() as progress:
-        for done, work in enumerate(own, start=1):
+        for done, work in enumerate(works, start=1):
             generate(work.recipe, work.near, work.folder)
-            progress("datasets", done, len(own))
-        folders = [work.folder for work in own]
-        evaluation = evaluate(folders, out / "scores", methods=methods, report=progress)
-    made = [work for work in works if (work.folder / MANIFEST).is_file()]
-    yield from report(evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in made})
+            progress("datasets", done, len(works))
+        folders = [work.folder for work in works]
+        evaluation = evaluate(folders, out / "scores", methods=methods, crew=crew, report=progress)
+    yield from report(evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in works})
 
 
 def report(evaluation: Mapping[str, Any], entry_of: Mapping[str, Entry]) -> Iterator[str]:

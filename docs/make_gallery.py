@@ -4,7 +4,7 @@ from pathlib import Path
 
 from simgen.figures.preview_picture import write_preview
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import load_scene
+from simgen.spec.scene import is_drawn, load_scene
 
 DOCS = Path(__file__).resolve().parent
 SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"
@@ -17,7 +17,8 @@ HEAD = """# Scenes
 What ships in `scenes/`: `simgen check NAME` and `simgen preview NAME -o look.png` take a scene by its name,
 `simgen generate data_recipes/NAME.toml -o out/NAME` makes the data of a recipe. Each scene.toml has comments
 to learn from. Pictures from the virtual centre of the paper's camera grid; the frame in the left one is what
-the others show enlarged. All of this page is made by `make gallery`.
+the others show enlarged. Of a [distribution of scenes](scenes.md#scenes-by-distribution) draw 0 is shown. All
+of this page is made by `make gallery`.
 """
 
 
@@ -25,6 +26,11 @@ def scene_names() -> list[str]:
     """Of the scenes that ship, the paper's first."""
     names = {file.parent.name for file in SCENES.glob("*/scene.toml")}
     return sorted(names, key=lambda name: (name != "two_objects", name))
+
+
+def shown_draw(name: str) -> int | None:
+    """Which draw of a scene is shown: none of a scene that is one."""
+    return 0 if is_drawn(str(SCENES / name)) else None
 
 
 def page() -> str:
@@ -35,7 +41,7 @@ def page() -> str:
         recipes.setdefault(recipe.scene, []).append(f"`{file.stem}`")
     parts = [HEAD]
     for name in scene_names():
-        scene, _ = load_scene(str(SCENES / name))
+        scene, _ = load_scene(str(SCENES / name), number=shown_draw(name))
         purpose = " ".join(scene.description.split())
         made = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
         parts.append(f"## {name}\n\n{purpose}{made}\n\n![{scene.title}](gallery/{name}.jpg)\n")
@@ -48,7 +54,11 @@ def main() -> None:
     folder.mkdir(exist_ok=True)
     for name in scene_names():
         write_preview(
-            str(SCENES / name), folder / f"{name}.jpg", SAMPLES_PER_PIXEL, dots_per_inch=DOTS_PER_INCH
+            str(SCENES / name),
+            folder / f"{name}.jpg",
+            SAMPLES_PER_PIXEL,
+            scene_number=shown_draw(name),
+            dots_per_inch=DOTS_PER_INCH,
         )
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
 

@@ -33,7 +33,7 @@ Made by `docs/make_removal_scores.py` from one seed of each scene of the benchma
 photons.
 
 ```
-BENCH_SEEDS=1 make bench TABLES=removal     # an hour and a half on two cores, shared by BENCH_PART
+BENCH_SEEDS=1 make bench TABLES=removal     # an hour and a half on two cores, shared by BENCH_WORKERS
 ```
 
 [Removal of defocused points](../removal.md) describes the methods; [the likelihood method](likelihood.md) and

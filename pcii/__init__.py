@@ -15,6 +15,7 @@ from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.comparison import evaluate
+from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.metrics.scoring import score
 from pcii.removal.methods import removal_methods, segment
@@ -24,6 +25,7 @@ from pcii.sections.reconstruction import reconstruct, reconstruct_each
 
 __all__ = [
     "CameraGrid",
+    "Collection",
     "Dataset",
     "DepthMap",
     "InputError",
@@ -37,6 +39,7 @@ __all__ = [
     "demosaic",
     "estimate_depth",
     "evaluate",
+    "open_collection",
     "open_dataset",
     "reconstruct",
     "reconstruct_each",

@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simgen.app.library import (
+        Crew,
         RecipeFile,
         SceneFile,
         generate,
+        generate_collection,
         load_recipe,
         load_scene,
         preview,
@@ -22,10 +24,12 @@ if TYPE_CHECKING:
     from simgen.app.photons_in_memory import draw_photons
 
 __all__ = [
+    "Crew",
     "RecipeFile",
     "SceneFile",
     "draw_photons",
     "generate",
+    "generate_collection",
     "load_recipe",
     "load_scene",
     "preview",

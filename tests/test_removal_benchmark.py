@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
-from benchmarks.drawn import KINDS, write_drawn
+from benchmarks.drawn import KINDS, write_recipe
 from benchmarks.removal import Entry, by_half_and_kind, drawn_corpus, load_corpus, report, work_list
 from pcii.base.errors import InputError
+from simgen.dataset.prepared import prepare
+from simgen.drawn import GENERATORS
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import load_scene
 
 
 def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:
@@ -34,18 +35,13 @@ def test_a_corpus_that_is_told_wrongly_is_refused(tmp_path: Path) -> None:
         load_corpus(path)
 
 
-def test_drawn_scenes_are_whole_and_always_the_same(tmp_path: Path) -> None:
-    # All that a reader of scenes refuses would come to light here: colours beyond white, things without room.
+def test_every_kind_of_drawn_scene_is_seen_by_the_papers_cameras(tmp_path: Path) -> None:
+    assert {f"drawn_{kind}" for kind in KINDS} == GENERATORS.keys()
     for kind in KINDS:
-        for number in range(5):
-            path = write_drawn(tmp_path, kind, number)
-            recipe, near = load_recipe(str(path))
-            scene, _ = load_scene(recipe.scene, near)
-            assert len(scene.objects) >= 2
-            assert len(recipe.analysis.z_mm) >= 2
-            text = (tmp_path / f"{kind}_{number}" / "scene.toml").read_text()
-            write_drawn(tmp_path / "again", kind, number)
-            assert (tmp_path / "again" / f"{kind}_{number}" / "scene.toml").read_text() == text
+        recipe, near = load_recipe(str(write_recipe(tmp_path, kind, 7)))
+        paper, _ = load_recipe("paper")
+        assert (recipe.grid, recipe.cfa, recipe.photons) == (paper.grid, paper.cfa, paper.photons)
+        assert prepare(recipe, near).scene.title == f"Drawn: {kind} 7"
 
 
 def test_drawn_scenes_are_a_corpus(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from cyclopts import App, Parameter
 from pcii.app.results import Results
 from pcii.base import command_line
 from pcii.base.command_line import say
+from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 from pcii.io.dataset import Dataset, open_dataset
 
@@ -238,7 +239,7 @@ def evaluate(
     out: Out,
     method: Annotated[tuple[str, ...], Parameter(negative=())] = (),
     budget: Annotated[tuple[float, ...], Parameter(negative=())] = (),
-    part: str = "1/1",
+    crew: Annotated[Crew, Parameter(name="*")] = ALONE,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
@@ -249,28 +250,23 @@ def evaluate(
 
         pcii evaluate out/twenty -o out/compared
 
-        pcii evaluate out/twenty out/slats -o out/compared --method likelihood --budget 300 --part 1/2
+        pcii evaluate out/twenty out/slats -o out/compared --method likelihood --budget 300 --workers 2
 
     Parameters
     ----------
     datasets
-        Dataset folders, or folders of dataset folders, as made by `simgen generate --seeds`.
+        Dataset folders, collections as `simgen generate` makes them, or folders of dataset folders.
     out
         Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
         A method of removal, or "depth"; may be repeated. Default: all.
     budget
         A photon budget that every dataset has; may be repeated. Default: all that each has.
-    part
-        i/n: score only every n-th dataset from the i-th, so that n processes can share one OUT.
     """
     from pcii.evaluation.comparison import evaluate as compare
-    from pcii.evaluation.comparison import part_of
 
     with Stages() as report:
-        result = compare(datasets, out, methods=method, budgets=budget, part=part_of(part), report=report)
-    if result["missing"]:
-        say(f"{result['missing']} rows are still to be measured, by other parts")
+        compare(datasets, out, methods=method, budgets=budget, crew=crew, report=report)
     say(f"report: {out / 'evaluation.html'}")
 
 

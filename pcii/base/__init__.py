@@ -1,12 +1,18 @@
 """Tools that know nothing of imaging: errors, progress, commands, safe files, compiled loops.
 
-command_line    Running of command lines: error messages of one sentence, exit codes, and Ctrl-C.
-compiled_loops  Compilation of loops with Numba, which needs no system library.
-errors          The exception that is raised for invalid input.
-plain_text      Display of text from untrusted files: markup is escaped, invisible characters are made
-                visible.
-progress        Progress of long work, compilation included: bars on a terminal, plain lines in a log.
-safe_files      Atomic writing of files and folders: whatever has its final name is complete.
-short_form      Short representations of objects that hold large arrays: one line, and a small table in
-                notebooks.
+command_line      Running of command lines: error messages of one sentence, exit codes, and Ctrl-C.
+compiled_loops    Compilation of loops with Numba, which needs no system library.
+crew              Who does a job: this process, several of this machine, or a Dask cluster.
+dask_cluster      A job's pieces as tasks of a Dask cluster, all of whose workers see the same file
+                  system.
+errors            The exception that is raised for invalid input.
+jobs              Jobs of many pieces.
+plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
+                  visible.
+progress          Progress of long work, compilation included: bars on a terminal, plain lines in a log.
+safe_files        Atomic writing of files and folders: whatever has its final name is complete.
+short_form        Short representations of objects that hold large arrays: one line, and a small table in
+                  notebooks.
+worker_processes  Worker processes of this machine that share a job's pieces; one that dies harms no other
+                  piece.
 """

@@ -88,6 +88,8 @@ def _failed(fault: Exception) -> int:
         return 141
     if isinstance(fault, MemoryError):
         return _fail(1, f"not enough memory: {fault}")
+    if isinstance(fault, OSError) and fault.filename is not None:
+        return _fail(1, f"{fault.filename}: {fault.strerror}")
     return _fail(1, f"{type(fault).__name__}: {' '.join(str(fault).split())}")
 
 

@@ -44,6 +44,11 @@ class _CompilingListener(event.Listener):
 event.register("numba:compile", _CompilingListener())
 
 
+def use_threads(count: int) -> None:
+    """Run compiled loops of this process on so many threads, at most as many as Numba has."""
+    nb.set_num_threads(min(count, nb.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+
+
 def threads() -> int:
     """Number of threads that run a compiled loop."""
     return nb.get_num_threads()

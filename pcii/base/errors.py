@@ -6,3 +6,7 @@ class InputError(ValueError):
 
     The commands print the sentence and exit with code 2.
     """
+
+
+class BusyError(InputError):
+    """Another process is at this work."""

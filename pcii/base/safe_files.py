@@ -99,6 +99,17 @@ def sweep_temporaries(root: Path) -> None:
 
 
 @contextmanager
+def named_in_errors(path: Path) -> Iterator[None]:
+    """Name `path` in errors of the operating system that name no file, such as of a full disk."""
+    try:
+        yield
+    except OSError as fault:
+        if fault.errno is None or fault.filename is not None:
+            raise
+        raise OSError(fault.errno, os.strerror(fault.errno), str(path)) from fault
+
+
+@contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
     """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
@@ -115,6 +126,20 @@ def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
                 file.seek(0)
                 yield file
                 return
+
+
+def is_locked(path: Path) -> bool:
+    """Whether another process holds the lock on a file; a file that does not exist is not made."""
+    import fcntl
+
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    return False
 
 
 def _is_same_file(file: IO[bytes], path: Path) -> bool:

@@ -2,10 +2,12 @@
 
 import re
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.depth.depth_map import estimate_depth
@@ -23,6 +25,7 @@ from pcii.evaluation.rows import (
 )
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.timing import timed
+from pcii.io.collection_layout import is_collection, read_index
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import MANIFEST, MARKER, TRUTH
 from pcii.io.suggested_depths import depth_range_of, planes_of
@@ -55,20 +58,19 @@ def evaluate(
     *,
     methods: Sequence[str] = (),
     budgets: Sequence[float] = (),
-    part: tuple[int, int] = (1, 1),
+    crew: Crew = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score methods on datasets and compare them; returns the content of evaluation.json (`summarise`).
 
-    `datasets` are dataset folders, or folders of dataset folders. `methods` default to all; "depth" is the
-    depth map. `budgets` default to all that each dataset has. With `part` (i, n) only every n-th dataset from
-    the i-th is scored, so that n processes can share the work on one `out`.
+    `datasets` are dataset folders, collections, or folders of dataset folders. `methods` default to all;
+    "depth" is the depth map. `budgets` default to all that each dataset has. `crew` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again;
-    evaluation.json, .html and .md summarise all of them. `missing` counts requested rows that are not
-    measured yet. The seconds of a row are the wall time of the method alone, after a warm-up call, in a call
-    in which no code was compiled or imported. Raises `InputError` for a dataset without truth, depths or
-    counts, or an unknown method or budget:
+    evaluation.json, .html and .md summarise all of them. The seconds of a row are the wall time of the method
+    alone, after a warm-up call, in a call in which no code was compiled or imported; where several processes
+    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths or counts, or an
+    unknown method or budget:
 
     >>> evaluate(["out/no-such-dataset"], "out/compared")
     Traceback (most recent call last):
@@ -79,22 +81,17 @@ def evaluate(
     """
     folder = Path(out)
     tasks = _tasks([open_dataset(path) for path in find_datasets(datasets)], _checked(methods), budgets)
-    index, count = part
-    if not 1 <= index <= count:
-        raise InputError(f"part: expected one of 1/{count} to {count}/{count}, got {index}/{count}")
     claim_rows(folder)
     with all_rows(folder) as rows:
-        done = {key_of(row) for row in rows}
-    share = [task for position, each in enumerate(tasks) if position % count == index - 1 for task in each]
-    remaining = [task for task in share if task.key not in done]
-    warm: set[tuple[float | None, str]] = set()
-    for finished, task in enumerate(remaining, start=1):
-        append_row(folder, _measured(task, warm))
-        report("scores", finished, len(remaining))
-    with all_rows(folder) as rows:
         measured = {key_of(row) for row in rows}
-        missing = sum(task.key not in measured for each in tasks for task in each)
-        result = {"missing": missing, **summarise(rows)}
+    remaining = [task for task in tasks if task.key not in measured]
+    with closing(crew.run(Measuring(remaining, folder.resolve()), range(len(remaining)))) as work:
+        for finished, done in enumerate(work, start=1):
+            if done.fault:
+                raise InputError(done.fault)
+            report("scores", finished, len(remaining))
+    with all_rows(folder) as rows:
+        result = summarise(rows)
         write_evaluation(folder, result)
     return result
 
@@ -112,6 +109,9 @@ def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
             continue
         if not path.is_dir():
             raise InputError(f"{path}: there is no such dataset folder")
+        if is_collection(path):
+            found += [path / row["path"] for row in read_index(path)]
+            continue
         inside = [
             folder
             for folder in path.iterdir()
@@ -129,14 +129,6 @@ def _is_begun(folder: Path) -> bool:
     return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
 
 
-def part_of(text: str) -> tuple[int, int]:
-    """The part (i, n) that `i/n` names; `InputError` for anything else."""
-    match = re.fullmatch(r"(\d+)/(\d+)", text)
-    if match is None:
-        raise InputError(f"--part: expected i/n such as 1/2, got {text!r}")
-    return int(match[1]), int(match[2])
-
-
 def _checked(methods: Sequence[str]) -> tuple[str, ...]:
     known = known_methods()
     for name in methods:
@@ -145,8 +137,8 @@ def _checked(methods: Sequence[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(methods)) or known
 
 
-def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float]) -> list[list[Task]]:
-    """The tasks of each dataset; raises `InputError` for what a dataset lacks before any work is done."""
+def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float]) -> list[Task]:
+    """The tasks, dataset by dataset; raises `InputError` for what a dataset lacks before any work is done."""
     tasks: dict[str, list[Task]] = {}
     for dataset in datasets:
         if not dataset.has(TRUTH):
@@ -157,7 +149,31 @@ def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequenc
             dataset.at_budget(budget)
         each = [Task(dataset, budget, method) for budget in chosen for method in methods]
         tasks.setdefault(identity_of(dataset.manifest), each)
-    return list(tasks.values())
+    return [task for each in tasks.values() for task in each]
+
+
+class Measuring:
+    """The job of measuring `tasks`: each piece adds a row to those in the folder `out`."""
+
+    def __init__(self, tasks: Sequence[Task], out: Path) -> None:
+        self.tasks, self.out = tasks, out
+        self.warm: set[tuple[float | None, str]] = set()
+
+    def __call__(self, piece: int) -> bool:
+        """Measure a task and add its row; raises `InputError` for a dataset that is damaged."""
+        append_row(self.out, _measured(self.tasks[piece], self.warm))
+        return True
+
+    def name(self, piece: int) -> str:
+        """Dataset and method."""
+        task = self.tasks[piece]
+        return f"{task.dataset.path}, {task.method}"
+
+    def use_threads(self, count: int) -> None:
+        """Let compiled loops run on so many threads."""
+        from pcii.base import compiled_loops
+
+        compiled_loops.use_threads(count)
 
 
 def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:

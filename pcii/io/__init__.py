@@ -1,15 +1,19 @@
 """Files: datasets and lists of results, sealed and checked, and what a dataset's recipe suggests.
 
-dataset           Datasets: counts, truth and radiance of a dataset folder, checked when they are read.
-dataset_layout    The dataset folder on disk: its files, their arrays and its manifest.
-manifest_schema   Pydantic models of the manifests; members that they do not name are allowed and ignored.
-results_list      The file results.json: the dataset of the results in a folder, and their files with size
-                  and SHA-256.
-sealed_json       JSON documents that list the files of a folder and end in a checksum of the document
-                  itself.
-stored_radiance   Radiance on disk, one EXR file per view, each read when it is used.
-suggested_depths  Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
-verification      Comparison of all files of a dataset, or of a folder of results, with its manifest.
-zarr_groups       Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and
-                  meaning.
+collection         Collections of datasets, opened one by one as they are used.
+collection_layout  The folder of a collection of datasets: what they have in common, and the index of
+                   them.
+dataset            Datasets: counts, truth and radiance of a dataset folder, checked when they are read.
+dataset_layout     The dataset folder on disk: its files, their arrays and its manifest.
+manifest_schema    Pydantic models of the manifests; members that they do not name are allowed and
+                   ignored.
+results_list       The file results.json: the dataset of the results in a folder, and their files with
+                   size and SHA-256.
+sealed_json        JSON documents that list the files of a folder and end in a checksum of the document
+                   itself.
+stored_radiance    Radiance on disk, one EXR file per view, each read when it is used.
+suggested_depths   Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
+verification       Comparison of all files of a dataset, of results or of a collection with its manifest.
+zarr_groups        Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and
+                   meaning.
 """

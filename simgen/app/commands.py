@@ -1,23 +1,30 @@
 """The `simgen` command."""
 
-import json
 import math
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
 from pcii.base import command_line
 from pcii.base.command_line import say
+from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
+from simgen.app.scene_commands import check, draw, preview, scenes, schema
 
 app = App(
     name="simgen",
     help="Make photon-limited elemental images from physics, with their truth.",
     version=lambda: version("photon-integral-imaging"),
 )
+
+MOST_TOLD = 5
+"""Faults of datasets that a collection's last lines tell."""
+
+for command in (scenes, schema, check, preview, draw):
+    app.command(command)
 
 
 @app.command
@@ -46,119 +53,19 @@ def doctor(*, require_compiled: bool = False) -> None:
 
 
 @app.command
-def scenes() -> None:
-    """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
-
-    Example:  simgen scenes
-    """
-    from simgen.spec.scene import load_scene, scene_names
-
-    for name in scene_names():
-        scene, _ = load_scene(name)
-        things = ", ".join(thing.name for thing in scene.objects) or "no objects"
-        say(f"{name:20} {scene.title} ({things})")
-
-
-@app.command
-def schema(what: Literal["scene", "recipe"]) -> None:
-    """Print the JSON Schema of scene or recipe files, for completion in editors.
-
-    Example:  simgen schema recipe > recipe.schema.json
-    """
-    from simgen.base.strict_models import schema_of
-    from simgen.spec.recipe import Recipe
-    from simgen.spec.scene import Scene
-
-    model = {"scene": Scene, "recipe": Recipe}[what]
-    json.dump(schema_of(model), sys.stdout, indent=2)
-    say("")
-
-
-@app.command
-def check(
-    target: str,
-    *,
-    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
-) -> int:
-    """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
-
-    Disparities, blur between objects, what is hidden or cut, colours that shifts leave out, photons per
-    object and voxel, size, memory and time. Leaves with exit code 0 if nothing is bad, 1 if something
-    is, 2 for a file that is not valid.
-
-    Examples:
-
-        simgen check two_objects
-
-        simgen check paper --set grid.pitch_mm=[2.5,2.5]
-
-    Parameters
-    ----------
-    target
-        A recipe, or a scene, which is looked at with the paper's camera grid; by name or path.
-    set
-        Override one value of the recipe, such as photons.budget=300; may be repeated.
-    json_
-        Print the findings as JSON.
-    """
-    from dataclasses import asdict
-
-    from simgen.check.linter import lint
-
-    line, findings = lint(target, set)
-    bad = sum(finding.verdict == "bad" for finding in findings)
-    if json_:
-        say(json.dumps([asdict(finding) for finding in findings], indent=2))
-    else:
-        warnings = sum(finding.verdict == "warn" for finding in findings)
-        say(line)
-        for finding in findings:
-            say(finding.line())
-        say(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
-    return 1 if bad else 0
-
-
-@app.command
-def preview(
-    target: str,
-    *,
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
-    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    samples_per_pixel: int = 32,
-) -> None:
-    """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
-
-    In full light and in sRGB, whatever the recipe's camera and photons.
-
-    Example:  simgen preview two_objects -o look.png
-
-    Parameters
-    ----------
-    target
-        A recipe, or a scene, which is looked at with the paper's field of view; by name or path.
-    out
-        The picture to write, .png or .jpg, in a folder that exists.
-    set
-        Override one value of the recipe, such as grid.pixel_mm=0.02; may be repeated.
-    samples_per_pixel
-        Light paths per pixel; more is slower and less noisy.
-    """
-    from simgen.figures.preview_picture import write_preview
-
-    write_preview(target, out, samples_per_pixel, overrides=set)
-    say(f"{out}")
-
-
-@app.command
 def generate(
     recipe: str,
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
     seeds: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
-) -> None:
-    """Make the dataset of a recipe; run again to resume.
+    scenes: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
+    crew: Annotated[Crew, Parameter(name="*")] = ALONE,
+) -> int:
+    """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
+
+    A field that takes one value may have a list, any field { each = [...] } or { range = [first, end] }:
+    OUT then has a folder for each combination, and an index of them.
 
     Examples:
 
@@ -168,32 +75,42 @@ def generate(
 
         simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
 
+        simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
+
+        simgen generate drawn_crossing -o out/crossings --scenes 1000
+
     Parameters
     ----------
     recipe
-        Path of a recipe file, or name of one that ships.
+        Path of a recipe file, or name of one that ships; or a scene, seen by the paper's cameras.
     out
-        Folder for the dataset: new, empty, or the same recipe's unfinished one.
+        Folder for the dataset or collection: new, empty, or an unfinished one of the same recipe.
     set
         Override one value of the recipe, such as photons.budget=300; may be repeated.
     seeds
-        Make so many datasets, in folders seed_7, seed_8, ... of OUT: of the recipe's seed and those that
-        follow. Each is whole; radiance is rendered for each, so leave it out where nothing needs it.
+        Make so many datasets, of the recipe's seed and those that follow. Each is whole; radiance is rendered
+        for each, so leave it out where nothing needs it.
+    scenes
+        Make datasets of so many draws of a scene that is a distribution, from the recipe's scene_number on.
     """
+    from simgen.collection.whole_collection import generate_collection
     from simgen.dataset.generation import generate as make
-    from simgen.dataset.series import generate_series
     from simgen.renderer import backend
-    from simgen.spec.recipe import load_recipe
+    from simgen.spec.sweeps import load_sweep
 
-    resolved, near = load_recipe(recipe, set)
+    sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes)
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:
-        if seeds is None:
-            say(_made(out, make(resolved, near, out, report)))
-            return
-        for done, (folder, manifest) in enumerate(generate_series(resolved, near, out, seeds), start=1):
-            say(_made(folder, manifest))
-            report("datasets", done, seeds)
+        if not sweep.axes:
+            say(_made(out, make(sweep.recipe(0), sweep.near, out, report)))
+            return 0
+        faults = generate_collection(sweep, out, crew, report)
+    say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
+    for fault in faults[:MOST_TOLD]:
+        print(f"not made: {fault}", file=sys.stderr)
+    if len(faults) > MOST_TOLD:
+        print(f"and {len(faults) - MOST_TOLD} more were not made", file=sys.stderr)
+    return 1 if faults else 0
 
 
 def _made(folder: Path, manifest: dict[str, Any]) -> str:

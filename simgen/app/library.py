@@ -5,13 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pcii.base.crew import ALONE, Crew
+from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.io.collection import Collection, open_collection
+from simgen.collection import whole_collection as collections
 from simgen.dataset import generation
 from simgen.figures.preview_picture import write_preview
 from simgen.spec import recipe as recipes
 from simgen.spec import scene as scenes
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
+from simgen.spec.sweeps import load_sweep
 
 
 @dataclass(frozen=True)
@@ -30,15 +35,18 @@ class RecipeFile:
     folder: Path
 
 
-def load_scene(name_or_path: str | Path) -> SceneFile:
+def load_scene(name_or_path: str | Path, number: int | None = None) -> SceneFile:
     """A scene by the name of one that ships, or by the path of its folder or scene.toml.
 
-    Raises `pcii.InputError` for a scene that is missing or wrong, with the field at fault.
+    Of a distribution of scenes `number` says which one. Raises `pcii.InputError` for a scene that is missing
+    or wrong, with the field at fault.
 
     >>> load_scene("two_objects").scene.title
     'Tricoloured ball and toy bird'
+    >>> len(load_scene("drawn_room", 17).scene.objects)
+    5
     """
-    return SceneFile(*scenes.load_scene(str(name_or_path)))
+    return SceneFile(*scenes.load_scene(str(name_or_path), number=number))
 
 
 def load_recipe(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RecipeFile:
@@ -64,9 +72,44 @@ def generate(recipe: RecipeFile, out: str | Path, report: Report = silent) -> di
     return generation.generate(recipe.recipe, recipe.folder, Path(out), report)
 
 
-def preview(name_or_path: str | Path, out: str | Path, samples_per_pixel: int = 32) -> None:
+def generate_collection(
+    name_or_path: str | Path,
+    out: str | Path,
+    overrides: Sequence[str] = (),
+    *,
+    seeds: int | None = None,
+    scenes: int | None = None,
+    crew: Crew = ALONE,
+    report: Report = silent,
+) -> Collection:
+    """Make all datasets of a recipe whose fields have several values in the folder `out`, and open them.
+
+    What `simgen generate` does of such a recipe, with its options; `crew` does the work. Raises
+    `pcii.InputError` for a recipe that is wrong or has one value for each field, for a folder that holds
+    something else, and, once all others are made, for a dataset that could not be made.
+
+    >>> collection = generate_collection("paper", "out/dimmer", ["photons.budget=[100,300]"], seeds=5,
+    ...                                  crew=Crew(workers=2))                      # doctest: +SKIP
+    >>> [dataset.counts.total for dataset in collection.where(budget=100)]          # doctest: +SKIP
+    """
+    sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes)
+    if not sweep.axes:
+        raise InputError(f"{sweep.source}: no field has several values; use simgen.generate for one dataset")
+    faults = collections.generate_collection(sweep, Path(out), crew, report)
+    if faults:
+        raise InputError(
+            f"{len(faults)} of {len(sweep)} datasets were not made, the first because {faults[0]}"
+        )
+    return open_collection(out)
+
+
+def preview(
+    name_or_path: str | Path, out: str | Path, samples_per_pixel: int = 32, scene_number: int | None = None
+) -> None:
     """Write a picture (PNG or JPEG) of a scene or recipe from the virtual centre, with depth and objects.
+
+    Of a distribution of scenes `scene_number` says which one.
 
     Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
     """
-    write_preview(str(name_or_path), Path(out), samples_per_pixel)
+    write_preview(str(name_or_path), Path(out), samples_per_pixel, scene_number=scene_number)

@@ -54,7 +54,7 @@ LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
 
 def _one_line(title: str) -> str:
     if not re.fullmatch(LINE, title):
-        raise ValueError(f"a title is one line without control characters, not {_repr(title)}")
+        raise ValueError(f"a title is one line without control characters, not {shown_value(title)}")
     return title
 
 
@@ -117,7 +117,8 @@ def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _repr(value: Any) -> str:
+def shown_value(value: Any) -> str:
+    """A TOML value as an error shows it, however large it is."""
     if isinstance(value, bool):
         return str(value).lower()
     try:
@@ -153,7 +154,7 @@ def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
         message = first["msg"][0].lower() + first["msg"][1:]
         for theirs, ours in _IN_TOML.items():
             message = message.replace(theirs, ours)
-        text = f"'{where}': {message}, got {_repr(first['input'])}"
+        text = f"'{where}': {message}, got {shown_value(first['input'])}"
     more = len(errors) - 1
     return text + (f" (and {more} more)" if more else "")
 

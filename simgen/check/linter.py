@@ -1,25 +1,53 @@
 """`simgen check`: what a scene or recipe will give, found without rendering it, but for one coarse probe."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
+from pcii.base.errors import InputError
 from simgen.check.costs import cost_findings, hopeless
 from simgen.check.depths import depth_findings
 from simgen.check.expected_photons import photon_findings
+from simgen.check.many_draws import draw_findings
 from simgen.check.scene_facts import Facts, Finding
 from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
-from simgen.check.targets import load_target
+from simgen.check.targets import load_target, target_recipe
 from simgen.dataset.prepared import needs_of
+from simgen.spec.scene import Scene, is_drawn, load_scene
+
+DRAWS = 20
+"""So many draws of a distribution of scenes are looked at."""
 
 
-def lint(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[str, list[Finding]]:
-    """A line that says what was checked, and all findings. Raises `InputError` for invalid files."""
-    target = load_target(name_or_path, overrides)
-    recipe, grid = target.recipe, target.recipe.grid
-    views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
-    pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
-    line = f"{recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    return line, hopeless(needs_of(recipe)) or findings(probe_scene(target))
+def lint(
+    name_or_path: str, overrides: Sequence[str] = (), scene_number: int | None = None
+) -> tuple[str, list[Finding]]:
+    """A line that says what was checked, and all findings. Raises `InputError` for invalid files.
+
+    `scene_number` says which draw of a distribution of scenes is looked at; without it, the first few are,
+    less closely.
+    """
+    recipe, near = target_recipe(name_or_path, overrides)
+    views = (
+        f"{recipe.grid.rows} x {recipe.grid.cols} views of {recipe.grid.height} x {recipe.grid.width} pixels"
+    )
+    pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
+    seen_by = f"{views}, {pitch}, {recipe.sensor.cfa}"
+    if scene_number is None and recipe.scene_number is None and is_drawn(recipe.scene, near):
+        scenes = {number: _draw(recipe.scene, near, number) for number in range(DRAWS)}
+        line = f"{recipe.title or recipe.scene}, draws 0 to {DRAWS - 1}: {seen_by}"
+        return line, draw_findings(scenes, recipe.grid.camera_grid(), recipe.analysis.z_mm)
+    target = load_target(name_or_path, overrides, scene_number)
+    line = f"{target.recipe.title or target.scene.title}: {seen_by}"
+    return line, hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
+
+
+def _draw(name_or_path: str, near: Path | None, number: int) -> Scene | InputError:
+    """A draw of a distribution of scenes, or what is wrong with it."""
+    try:
+        return load_scene(name_or_path, near, number)[0]
+    except InputError as fault:
+        return fault
 
 
 def findings(facts: Facts) -> list[Finding]:

@@ -6,56 +6,52 @@ from pathlib import Path
 
 from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
-from simgen.base.strict_models import read_toml, suggestion
+from simgen.base.strict_models import suggestion
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.spec.materials import Glass
 from simgen.spec.recipe import Recipe, Render, load_recipe
-from simgen.spec.scene import find_scene, scene_names
+from simgen.spec.scene import is_scene, scene_names
+from simgen.spec.scene_generators import generators
 
 GLASS_DEPTH = 8
 """Longest light path with which a scene with glass is looked at: through a ball or a pane and back."""
 
 
-def load_target(name_or_path: str, overrides: Sequence[str] = ()) -> Prepared:
-    """A recipe with its scene, from the name or path of either.
+def load_target(
+    name_or_path: str, overrides: Sequence[str] = (), scene_number: int | None = None
+) -> Prepared:
+    """A recipe with its scene, from the name or path of either; `scene_number` says which draw of a scene.
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
     longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
     .toml at its end, the recipe. Raises `InputError` for what is missing or not valid.
     """
-    if _is_scene(name_or_path):
-        if overrides:
-            raise InputError(
-                f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe"
-            )
-        recipe, near = Recipe(scene=name_or_path), None
-    else:
-        _check_name(name_or_path)
-        recipe, near = load_recipe(name_or_path, overrides)
+    recipe, near = target_recipe(name_or_path, overrides)
+    if scene_number is not None:
+        recipe = recipe.model_copy(update={"scene_number": scene_number})
     target = prepare(recipe, near)
     if near is None and any(isinstance(thing.material.finish, Glass) for thing in target.scene.objects):
-        longer = recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
+        longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
         return replace(target, recipe=longer)
     return target
 
 
-def _is_scene(name_or_path: str) -> bool:
-    path = Path(name_or_path)
-    if path.is_file():
-        values = read_toml(path)
-        return "scene" not in values and bool({"lights", "objects"} & set(values))
-    if path.is_dir():
-        return True
-    try:
-        find_scene(name_or_path)
-    except InputError:
-        return False
-    return True
+def target_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path | None]:
+    """The recipe that a name or path means, and its folder; of a scene one that says nothing else, and None.
+
+    Raises `InputError` for what is missing or not valid.
+    """
+    if not is_scene(name_or_path):
+        _check_name(name_or_path)
+        return load_recipe(name_or_path, overrides)
+    if overrides:
+        raise InputError(f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe")
+    return Recipe(scene=name_or_path), None
 
 
 def _check_name(name_or_path: str) -> None:
     path = Path(name_or_path)
     names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
     if not path.is_file() and not (path.parent == Path() and path.name.removesuffix(".toml") in names):
-        hint = suggestion(path.stem, {*names, *scene_names()})
+        hint = suggestion(path.stem, {*names, *scene_names(), *generators()})
         raise InputError(f"there is no scene or recipe {name_or_path!r}{hint}")

@@ -10,5 +10,4 @@ rendered_views    Radiance images of every view on disk: products of a dataset, 
 resources         What a recipe takes of the machine, estimated before any work: memory of each step,
                   bytes of each product.
 reuse             What datasets that are made one after another have in common, made once.
-series            A recipe at many seeds: one dataset each, alike in everything but chance.
 """

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import locked
+from pcii.base.errors import BusyError, InputError
+from pcii.base.safe_files import is_locked, locked
 from pcii.io.dataset_layout import FORMAT_VERSION, MANIFEST, MARKER, REMEDY, read_manifest
 from pcii.io.sealed_json import check_file, hash_file
 from simgen.base.asset_names import asset
@@ -37,10 +37,11 @@ def content_of_scene(prepared: Prepared) -> dict[str, Any]:
     }
 
 
-def finished(out: Path, identity: str) -> dict[str, Any] | None:
+def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
     """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
 
-    `InputError` for a file, or for a folder that holds anything else.
+    Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
+    folder that holds anything else.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: this is a file; name a folder for the dataset")
@@ -48,36 +49,45 @@ def finished(out: Path, identity: str) -> dict[str, Any] | None:
         return None
     if not (out / MANIFEST).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
-    return whole(out, identity)
+    return whole(out, identity, content=content)
 
 
-def whole(out: Path, identity: str) -> dict[str, Any]:
+def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
     manifest = read_manifest(out)
     if manifest.get("identity") != identity:
         raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
     for name, entry in manifest["files"].items():
-        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=True)
+        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
     return manifest
+
+
+def check_free(out: Path) -> None:
+    """Raise `BusyError` if another process is making the dataset."""
+    if is_locked(out / MARKER):
+        raise _busy(out)
 
 
 @contextmanager
 def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark."""
     out.mkdir(parents=True, exist_ok=True)
-    marker = out / MARKER
     try:
-        with locked(marker, wait=False) as file:
+        with locked(out / MARKER, wait=False) as file:
             text = file.read()
             if text:
-                _check_begun(marker, text, identity, engine)
+                _check_begun(out / MARKER, text, identity, engine)
             else:
                 file.write(json.dumps({"identity": identity, "backend": engine}).encode())
                 file.flush()
                 os.fsync(file.fileno())
-            yield marker
+            yield out / MARKER
     except BlockingIOError:
-        raise InputError(f"{out}: another run is writing this dataset") from None
+        raise _busy(out) from None
+
+
+def _busy(out: Path) -> BusyError:
+    return BusyError(f"{out}: another run is writing this dataset")
 
 
 def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:

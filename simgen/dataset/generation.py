@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.progress import Report, silent
-from pcii.base.safe_files import sweep_temporaries
+from pcii.base.safe_files import named_in_errors, sweep_temporaries
 from pcii.io.dataset_layout import (
     COUNTS,
     MANIFEST,
@@ -22,7 +22,7 @@ from pcii.io.dataset_layout import (
     write_manifest,
 )
 from pcii.io.sealed_json import list_files
-from simgen.dataset.dataset_folder import claimed, finished, identity_of, whole
+from simgen.dataset.dataset_folder import check_free, claimed, finished, identity_of, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
@@ -52,26 +52,30 @@ class _Clock:
         self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
 
 
-def generate(
-    recipe: Recipe, near: Path, out: Path, report: Report = silent, reuse: Reuse | None = None
-) -> dict[str, Any]:
+def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> dict[str, Any]:
     """Make the dataset of `recipe` in the folder `out`; return its manifest.
 
     `near` is the recipe's folder, beside which scenes are looked up. An unfinished dataset of the
     same recipe is resumed, a finished one is checked and left alone; a folder that holds anything
-    else is refused with `InputError`. What the dataset has in common with those made before with the same
-    `reuse` is not made again.
+    else is refused with `InputError`.
     """
     prepared = prepare(recipe, near)
-    identity = identity_of(prepared)
-    manifest = finished(out, identity)
-    if manifest is not None:
-        return manifest
+    return finished(out, identity_of(prepared)) or make(prepared, out, report, Reuse())
+
+
+def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[str, Any]:
+    """Make a dataset that is not finished yet; its manifest. See `generate` for what is refused.
+
+    What it has in common with those made before with the same `reuse` is not made again. Raises
+    `BusyError` if another process is at it.
+    """
+    check_free(out)
+    recipe, identity = prepared.recipe, identity_of(prepared)
     needs = needs_of(recipe)
     check_resources(needs, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)
     clock, made, capture = _Clock(), None, capture_of(recipe)
-    common = in_common(reuse or Reuse(), prepared, engine)
+    common = in_common(reuse, prepared, engine)
     with clock.stage("load"):  # before the folder is made: a bad scene shows here
         render_scene = common.scene(prepared.render_scene)
     if recipe.products.counts:  # likewise: too much light
@@ -79,10 +83,10 @@ def generate(
             samples = least_samples(recipe)
             made = common.plan(partial(plan, capture, render_scene, engine["kind"], samples))
             check_resources(needs, made, out)
-    with claimed(out, identity, engine) as marker:
+    with named_in_errors(out), claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
-            return whole(out, identity)
+            return whole(out, identity, content=True)
         sweep_temporaries(out)
         photons = _work(prepared, capture, render_scene, made, common, out, clock, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)

@@ -12,13 +12,19 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import sensitivities
-from simgen.spec.recipe import Recipe
+from simgen.spec.recipe import Analysis, Recipe
 from simgen.spec.scene import Scene, load_scene
+
+AROUND_PLANES_MM = 60.0
+"""Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """What a dataset is made from. `curves` (C, N) are None in RGB mode (see `spectra`)."""
+    """What a dataset is made from; the recipe with depths to look at, if the scene names them.
+
+    `curves` (C, N) are None in RGB mode (see `spectra`).
+    """
 
     recipe: Recipe
     scene: Scene
@@ -33,8 +39,18 @@ class Prepared:
 
 def prepare(recipe: Recipe, near: Path | None) -> Prepared:
     """Look up what a recipe of the folder `near` names; `InputError` if it is missing or wrong."""
-    scene, folder = load_scene(recipe.scene, near)
-    return Prepared(recipe, scene, folder, sensitivities(recipe.sensor, near or Path()))
+    scene, folder = load_scene(recipe.scene, near, recipe.scene_number)
+    resolved = recipe.model_copy(update={"analysis": _analysis_of(recipe.analysis, scene.planes_mm)})
+    return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, near or Path()))
+
+
+def _analysis_of(analysis: Analysis, planes_mm: tuple[float, ...]) -> Analysis:
+    """Where to look: at the scene's planes, if the recipe names none."""
+    if analysis.z_mm or not planes_mm:
+        return analysis
+    near, far = min(planes_mm), max(planes_mm)
+    around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
+    return Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
 
 
 def capture_of(recipe: Recipe) -> Capture:

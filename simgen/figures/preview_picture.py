@@ -39,16 +39,17 @@ def write_preview(
     samples_per_pixel: int,
     *,
     overrides: Sequence[str] = (),
+    scene_number: int | None = None,
     dots_per_inch: int = DOTS_PER_INCH,
 ) -> None:
-    """Write the preview of a scene or of a recipe's, a PNG or JPEG.
+    """Write the preview of a scene or of a recipe's, a PNG or JPEG; `scene_number` says which draw of it.
 
     Raises `InputError` for a bad scene or recipe, and for a picture that cannot be written there.
     """
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
     check_picture_path(out)
-    target = load_target(name_or_path, overrides)
+    target = load_target(name_or_path, overrides, scene_number)
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)

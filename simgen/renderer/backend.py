@@ -118,7 +118,7 @@ def advice() -> str | None:
 def load(*, spectral: bool = False) -> Any:
     """The `mitsuba` module with the chosen variant set, that for spectra if asked for.
 
-    A scene lives as long as its variant is set: a process makes one dataset, in one variant.
+    A scene lives as long as its variant is set: who changes the variant lets go of its scenes first.
     """
     mi, variant = _mitsuba(), choose().variant_for(spectral)
     if mi.variant() != variant:
@@ -133,6 +133,11 @@ def load_drjit() -> Any:
     import drjit as dr
 
     return dr
+
+
+def use_threads(count: int) -> None:
+    """Let the compiled backend of this process run on so many threads."""
+    load_drjit().set_thread_count(count)
 
 
 @cache

@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
-from simgen.renderer.backend import shape_numbers
+from simgen.renderer.backend import load_drjit, shape_numbers
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape, pose_of
@@ -68,12 +68,31 @@ def build(
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
     try:
-        # Without optimisation: it merges shapes, and merged shapes lose their names.
-        loaded = mi.load_dict(plugins, optimize=False)
+        # Without optimisation: it merges shapes, and merged shapes lose their names. One after the other:
+        # things are numbered as they come, and kernels that know them by other numbers are compiled anew.
+        loaded = mi.load_dict(plugins, parallel=False, optimize=False)
     except RuntimeError as fault:
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
+    _numbers_as_data(mi, loaded)
     filters = None if curves is None else filters_for(curves, main_spectrum(scene.lights))
     return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain)
+
+
+def _numbers_as_data(mi: Any, loaded: Any) -> None:
+    """Pass poses, colours and the like to kernels as data, not as constants that are compiled into them.
+
+    Scenes of the same kinds of things then share their kernels. Scalar mode compiles none.
+    """
+    if mi.variant().startswith("scalar"):
+        return
+    dr, parameters = load_drjit(), mi.traverse(loaded)
+    for name in parameters.keys():  # noqa: SIM118 (it is no dict)
+        value = parameters[name]
+        is_one = dr.is_jit_v(value) and not dr.is_tensor_v(value) and dr.width(value) == 1
+        if is_one or name.endswith("to_world"):  # a transform, which is no array
+            dr.make_opaque(value)
+            parameters[name] = value
+    parameters.update()
 
 
 def _object_of_shape(loaded: Any) -> np.ndarray:

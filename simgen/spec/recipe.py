@@ -185,6 +185,8 @@ class Recipe(Strict):
     """What reports and pictures call it; the scene's title unless given."""
     scene: Annotated[str, Field(min_length=1)]
     """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""
+    scene_number: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] | None = None
+    """Which draw of a scene that is a distribution; none for a scene that is not."""
     seed: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] = 0
     """All that is random follows from it: the same seed, the same bytes."""
     grid: Grid = Grid()
@@ -246,26 +248,38 @@ def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recip
     recipe's title, which is of its own scene, is dropped unless another is given too.
     Raises `InputError` for a recipe that is missing or wrong.
     """
-    path = _find_recipe(name_or_path)
+    values, source, near = read_recipe(name_or_path, overrides)
+    return validate(Recipe, values, source), near
+
+
+def read_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[dict[str, Any], str, Path]:
+    """What a recipe and its overrides say, before it is checked; what to call both; and the folder."""
+    path = recipe_file(name_or_path)
+    if path is None:
+        names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
+        raise InputError(f"recipe: there is no {name_or_path!r}{suggestion(Path(name_or_path).stem, names)}")
     values = read_toml(path)
     scene = values.get("scene")
-    for text in overrides:
-        _override(values, text)
+    override(values, overrides)
     if values.get("scene") != scene and not any(text.startswith("title=") for text in overrides):
         values.pop("title", None)
     source = str(path) if not overrides else f"{path} with --set {' '.join(overrides)}"
-    return validate(Recipe, values, source), path.parent
+    return values, source, path.parent
 
 
-def _find_recipe(name_or_path: str) -> Path:
+def recipe_file(name_or_path: str) -> Path | None:
+    """The file of a recipe by path or shipped name, None if there is none."""
     path = Path(name_or_path)
     if path.is_file():
         return path
     shipped = find(recipe_roots, f"{name_or_path.removesuffix('.toml')}.toml")
-    if shipped is not None and path.parent == Path():
-        return shipped
-    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-    raise InputError(f"recipe: there is no {name_or_path!r}{suggestion(path.stem, names)}")
+    return shipped if path.parent == Path() else None
+
+
+def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
+    """Put values given as `key=value` into what a recipe says; raises `InputError` for any other text."""
+    for text in overrides:
+        _override(values, text)
 
 
 def _override(values: dict[str, Any], text: str) -> None:

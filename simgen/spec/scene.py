@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, field_validator
 
@@ -28,13 +28,17 @@ from simgen.base.strict_models import (
     suggestion,
     validate,
 )
+from simgen.spec.distributions import draw, is_distribution
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
+from simgen.spec.recipe import SEED_LIMIT
+from simgen.spec.scene_generators import generated, generators
 from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
 NAME = "^[A-Za-z][A-Za-z0-9_-]*$"
 MOST_LIGHTS = 100
+MOST_PLANES = 1000
 
 
 class SceneObject(Strict):
@@ -88,6 +92,8 @@ class Scene(Strict):
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
     """A wall behind the objects, which is no object itself."""
+    planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES, fail_fast=True)] = ()
+    """Depths at which something is in focus; what a recipe without `analysis.z_mm` looks at."""
 
     @field_validator("lights")
     @classmethod
@@ -106,17 +112,52 @@ class Scene(Strict):
         return objects
 
 
-def load_scene(name_or_path: str, near: Path | None = None) -> tuple[Scene, Path]:
+def load_scene(name_or_path: str, near: Path | None = None, number: int | None = None) -> tuple[Scene, Path]:
     """A scene by name or path, and its folder.
 
-    A name is looked up beside the recipe (`near`), in the working directory's `scenes/`, then among
-    the scenes that ship. Raises `InputError` for a scene that is missing or wrong.
+    A name is looked up beside the recipe (`near`), in the working directory's `scenes/`, among the scenes
+    that ship, then among generators. Of a scene that is drawn `number` says which draw. Raises `InputError`
+    for a scene that is missing or wrong, and for a number where there is nothing to draw or none where
+    there is.
     """
-    file = find_scene(name_or_path, near)
-    scene = validate(Scene, read_toml(file), str(file))
+    values, folder, source = _plain_values(name_or_path, near, number)
+    scene = validate(Scene, values, source)
     for where, name in scene_files(scene):
-        asset(file.parent, name, f"{file}: {where}")
-    return scene, file.parent
+        asset(folder, name, f"{source}: {where}")
+    return scene, folder
+
+
+def is_drawn(name_or_path: str, near: Path | None = None) -> bool:
+    """Whether a name or path means a distribution of scenes, by file or by Python, and not one scene."""
+    file = find_scene(name_or_path, near)
+    return file is None or is_distribution(read_toml(file))
+
+
+def _plain_values(
+    name_or_path: str, near: Path | None, number: int | None
+) -> tuple[dict[str, Any], Path, str]:
+    """The values of one scene as TOML holds them, its folder, and what errors call it."""
+    file = find_scene(name_or_path, near)
+    source = name_or_path if file is None else str(file)
+    values = {} if file is None else read_toml(file)
+    if file is not None and not is_distribution(values):
+        if number is not None:
+            raise InputError(
+                f"scene_number: {source} is one scene, of which there are no draws; leave it out"
+            )
+        return values, file.parent, source
+    if number is None:
+        raise InputError(
+            f"scene_number: {source} is a distribution of scenes; say which draw, such as scene_number = 0 "
+            "in a recipe or --scene 0"
+        )
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < SEED_LIMIT:
+        raise InputError(f"scene_number: expected a whole number from 0 to 2^63 - 1, got {number!r}")
+    if file is None:
+        values, folder = generated(name_or_path, number)
+    else:
+        values, folder = draw(values, number, source), file.parent
+    return values, folder, f"{source}, draw {number}"
 
 
 def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
@@ -127,8 +168,11 @@ def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
     yield from named_files(scene.model_copy(update={"objects": ()}))
 
 
-def find_scene(name_or_path: str, near: Path | None = None) -> Path:
-    """The scene.toml that a name or path means; `InputError` with a suggestion if there is none."""
+def find_scene(name_or_path: str, near: Path | None = None) -> Path | None:
+    """The scene.toml that a name or path means, None for the name of a generator.
+
+    Raises `InputError` with a suggestion if there is neither.
+    """
     given = Path(name_or_path)
     beside = [] if near is None else [near / given, near / given / "scene.toml"]
     try:
@@ -140,10 +184,28 @@ def find_scene(name_or_path: str, near: Path | None = None) -> Path:
         shipped = None
     if shipped is not None:
         return shipped
+    known = generators()
+    if name_or_path in known:
+        return None
     shown = shorten(repr(name_or_path), LONGEST_PART)
-    raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, scene_names())}")
+    raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, [*scene_names(), *known])}")
+
+
+def is_scene(name_or_path: str) -> bool:
+    """Whether a name or path means a scene: a folder, a file with lights or objects, or a known name."""
+    path = Path(name_or_path)
+    if path.is_file():
+        values = read_toml(path)
+        return "scene" not in values and bool({"lights", "objects"} & set(values))
+    if path.is_dir():
+        return True
+    try:
+        find_scene(name_or_path)
+    except InputError:
+        return False
+    return True
 
 
 def scene_names() -> list[str]:
-    """Names of the scenes that ship or stand in the working directory."""
+    """Names of the scenes that ship or stand in the working directory, generators left out."""
     return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})

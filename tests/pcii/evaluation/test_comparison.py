@@ -16,6 +16,7 @@ from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
 from pcii.base import command_line
+from pcii.base.crew import Crew
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.evaluation.comparison import evaluate, find_datasets
@@ -64,7 +65,6 @@ def rows_of(out: Path) -> list[dict[str, Any]]:
 
 def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) -> None:
     evaluation = evaluate([series], tmp_path / "out", methods=FAKES)
-    assert evaluation["missing"] == 0
     (group,) = evaluation["groups"]
     assert (group["title"], group["scene"], group["datasets"]) == ("by hand", "by hand", 3)
     assert json.loads((tmp_path / "out" / "evaluation.json").read_text()) == evaluation
@@ -280,17 +280,11 @@ def without_seconds(evaluation: dict[str, Any]) -> dict[str, Any]:
     return copy
 
 
-def test_parts_share_the_work(series: Path, tmp_path: Path, calls: list[str]) -> None:
-    out = tmp_path / "out"
-    first = evaluate([series], out, methods=["by count"], part=(1, 2))
-    assert {row["seed"] for row in rows_of(out)} == {3, 5}
-    assert first["missing"] == 2
-    assert "2 rows are still to be measured" in (out / "evaluation.md").read_text()
-    second = evaluate([series], out, methods=["by count"], part=(2, 2))
-    assert len(rows_of(out)) == 6
-    assert without_seconds(second) == without_seconds(
-        evaluate([series], tmp_path / "one", methods=["by count"])
-    )
+def test_workers_share_the_work(series: Path, tmp_path: Path) -> None:
+    methods, one, two = ["variance"], tmp_path / "one", tmp_path / "two"
+    alone = evaluate([series], one, methods=methods)
+    assert without_seconds(evaluate([series], two, methods=methods, crew=Crew(2))) == without_seconds(alone)
+    assert len(rows_of(two)) == len(rows_of(one)) == 6
 
 
 def test_many_writers_leave_whole_lines(tmp_path: Path) -> None:
@@ -342,9 +336,6 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
         evaluate([series], out, methods=["guess"])
     with pytest.raises(InputError, match="no photons of budget 7"):
         evaluate([series], out, methods=FAKES, budgets=[7])
-    for part in ((0, 2), (3, 2), (1, 0)):
-        with pytest.raises(InputError, match="part: expected"):
-            evaluate([series], out, part=part)
     with pytest.raises(InputError, match="no such dataset folder"):
         evaluate([tmp_path / "nowhere"], out)
     (tmp_path / "empty").mkdir()
@@ -381,8 +372,8 @@ def test_the_command_and_its_page(
     other = write_dataset(tmp_path / "other", 3, {OWN: 5}, title="another")
     assert command_line.run(cli.app, [*command[:2], str(other), *command[2:], "--budget", str(OWN)]) == 0
     assert len(rows_of(out)) == 14
-    assert command_line.run(cli.app, [*command, "--part", "1:2"]) == 2
-    assert "expected i/n such as 1/2" in capsys.readouterr().err
+    assert command_line.run(cli.app, [*command, "--workers", "0"]) == 2
+    assert "workers: expected a whole number from 1" in capsys.readouterr().err
 
 
 def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str]) -> None:

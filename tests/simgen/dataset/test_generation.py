@@ -1,7 +1,6 @@
 """Datasets: the same bytes again, resuming, and refusing what is not ours."""
 
 import fcntl
-import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from digests import digest
 from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
@@ -32,15 +32,6 @@ TINY = TINY_RECIPE | {
 
 def recipe(**changes: object) -> Recipe:
     return Recipe.model_validate(TINY | changes)
-
-
-def digest(folder: Path) -> dict[str, str]:
-    """Hash of every file but the manifest, which holds the times that things took."""
-    return {
-        file.relative_to(folder).as_posix(): hashlib.sha256(file.read_bytes()).hexdigest()
-        for file in sorted(folder.rglob("*"))
-        if file.is_file() and file.name != MANIFEST
-    }
 
 
 @pytest.fixture(scope="module")

@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
-from test_generation import digest
+from digests import digest
 
+from pcii.base.progress import silent
 from simgen.dataset import generation as module
-from simgen.dataset.generation import generate
-from simgen.dataset.prepared import Prepared
+from simgen.dataset.generation import generate, make
+from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.reuse import Reuse
 from simgen.spec.recipe import load_recipe
 
@@ -28,15 +29,11 @@ budget = 100
 ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
 OTHERS = {
     "another seed": ["seed=4"],
-    "another budget": ["photons.budget=300"],
     "another scene": ["scene=two_objects"],
     "another grid": ["grid.pitch_mm=[9.0,18.0]"],
-    "errors of cameras": [ERRORS],
     "errors of cameras from another seed": [ERRORS, "seed=4"],
     "other planes": ["analysis.z_mm=[500.0]"],
-    "other truth": ["products.visibility=true"],
     "monochrome": ["sensor.cfa=none"],
-    "longer paths": ["render.max_depth=5"],
     "an exposure": ["photons.scope=exposure", "exposure.time_s=0.001", "exposure.f_number=4.0"],
 }
 
@@ -52,7 +49,7 @@ def test_datasets_are_the_same_whatever_was_made_before(recipe_file: str, tmp_pa
     reuse = Reuse()
     for name, overrides in {"first": list[str](), **OTHERS, "the first again": []}.items():
         recipe, near = load_recipe(recipe_file, overrides)
-        generate(recipe, near, tmp_path / "reused" / name, reuse=reuse)
+        make(prepare(recipe, near), tmp_path / "reused" / name, silent, reuse)
         generate(recipe, near, tmp_path / "alone" / name)
         assert digest(tmp_path / "reused" / name) == digest(tmp_path / "alone" / name), name
 
@@ -84,10 +81,10 @@ def test_only_what_depends_on_a_change_is_made_again(
 
         monkeypatch.setattr(owner, name, watched)
     reuse = Reuse()
-    generate(*load_recipe(recipe_file), tmp_path / "first", reuse=reuse)
+    make(prepare(*load_recipe(recipe_file)), tmp_path / "first", silent, reuse)
     assert sorted(made) == ["explore", "plan", "render_scene", "write_truth"]
     made.clear()
-    generate(*load_recipe(recipe_file, overrides), tmp_path / "second", reuse=reuse)
+    make(prepare(*load_recipe(recipe_file, overrides)), tmp_path / "second", silent, reuse)
     assert set(made) == again
 
 
@@ -105,6 +102,6 @@ def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -
         (scene / "card.obj").write_text(f"{corners}\nf 1 2 3\nf 1 3 4\n")
         recipe, near = load_recipe(recipe_file, [f"scene={scene}"])
         out = tmp_path / f"of {size}"
-        generate(recipe, near, out, reuse=reuse)
+        make(prepare(recipe, near), out, silent, reuse)
         digests.add(str(digest(out)))
     assert len(digests) == 2

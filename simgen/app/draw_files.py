@@ -1,0 +1,30 @@
+"""One draw of a distribution of scenes, written as a scene of its own."""
+
+import shutil
+from pathlib import Path
+
+import tomli_w
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import new_folder_safely
+from simgen.base.asset_names import asset
+from simgen.spec.scene import load_scene, scene_files
+
+
+def write_drawn_scene(name_or_path: str, number: int, out: Path) -> Path:
+    """Write the scene.toml of a draw, and the files that it names beside it; the path of scene.toml.
+
+    Raises `InputError` for what is no distribution, or a folder that holds anything.
+    """
+    scene, folder = load_scene(name_or_path, number=number)
+    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
+        raise InputError(f"{out}: name a new or empty folder for the scene")
+    values = scene.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder_safely(out) as temporary:
+        for where, name in scene_files(scene):
+            copy = temporary / name
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(asset(folder, name, where), copy)
+        (temporary / "scene.toml").write_text(tomli_w.dumps(values, multiline_strings=True), encoding="utf-8")
+    return out / "scene.toml"

@@ -1,0 +1,105 @@
+"""The folder of a collection that is being made: whose it is, and the index of what is finished."""
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import locked
+from pcii.io.collection_layout import (
+    COLLECTION,
+    INDEX,
+    check_manifest,
+    index_row,
+    is_collection,
+    read_collection,
+    read_index,
+    write_collection,
+    write_index,
+)
+from pcii.io.dataset_layout import MANIFEST, MARKER, read_manifest
+from simgen.spec.sweeps import Sweep
+
+Row = Mapping[str, Any]
+
+
+def begin(sweep: Sweep, out: Path) -> None:
+    """Make the folder of a sweep's collection, or see that it is one of the same recipe.
+
+    Other values of the swept fields may be there already. `InputError` for a file, a dataset, the
+    collection of another recipe, or a folder that holds something else.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: this is a file; name a folder for the collection")
+    if (out / MANIFEST).exists() or (out / MARKER).exists():
+        raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
+    document = {
+        "fields": [axis.field for axis in sweep.axes],
+        "recipe": sweep.base,
+        "recipe_sha256": hashlib.sha256(json.dumps(sweep.base, sort_keys=True).encode()).hexdigest(),
+        "software": {"photon-integral-imaging": version("photon-integral-imaging")},
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    others = [
+        entry.name for entry in out.iterdir() if not entry.name.startswith((COLLECTION, f".{COLLECTION}."))
+    ]
+    if others and not is_collection(out):
+        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    with locked(out / COLLECTION, wait=True) as file:
+        if not file.read():
+            write_collection(out, document)
+    known = read_collection(out)
+    if (known.get("fields"), known.get("recipe_sha256")) != (document["fields"], document["recipe_sha256"]):
+        raise InputError(
+            f"{out}: holds the collection of another recipe or of other swept fields; name a new folder"
+        )
+
+
+def row_of(sweep: Sweep, number: int, out: Path, manifest: Mapping[str, Any]) -> Row:
+    """The index's row of a finished dataset."""
+    name = sweep.folder(number)
+    return index_row(name, sweep.values(number), manifest, out / name / MANIFEST)
+
+
+def write_whole_index(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> None:
+    """Write the index of all finished datasets in the folder: these of the sweep by number, and others.
+
+    Others are those that the index listed before, and those that other processes have finished.
+    """
+    with locked(out / COLLECTION, wait=True):
+        for left in (*out.glob(f".{INDEX}.*.tmp"), *out.glob(f".{COLLECTION}.*.tmp")):
+            left.unlink()  # of a process that was killed
+        write_index(out, _finished_rows(sweep, out, rows))
+
+
+def _finished_rows(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> list[Row]:
+    listed = {row["path"]: row for row in _known(out)}
+    present = {entry.name for entry in os.scandir(out) if entry.is_dir()}
+    found: dict[str, Row] = {}
+    for number in range(len(sweep)):
+        name = sweep.folder(number)
+        row = rows.get(number) or listed.get(name)
+        if row is None and name in present and (out / name / MANIFEST).is_file():
+            row = row_of(sweep, number, out, read_manifest(out / name))
+        if row is not None:
+            found[name] = row
+    others = {name: row for name, row in listed.items() if name not in found and name in present}
+    return [*found.values(), *others.values()]
+
+
+def _known(out: Path) -> list[dict[str, Any]]:
+    """Rows of the index as it is, but for those whose datasets are gone or others by now."""
+    if not (out / INDEX).is_file():
+        return []
+    rows = []
+    for row in read_index(out):
+        try:
+            check_manifest(out, row)
+        except InputError:
+            continue
+        rows.append(row)
+    return rows

@@ -1,0 +1,42 @@
+"""The job of making the datasets of a sweep, piece by piece; several processes at once share it.
+
+A process makes what is neither finished nor being made by another one: the lock on a dataset ends with the
+process that holds it.
+"""
+
+from pathlib import Path
+
+from pcii.base.progress import silent
+from simgen.collection.collection_folder import Row, row_of
+from simgen.dataset.dataset_folder import finished, identity_of
+from simgen.dataset.generation import make
+from simgen.dataset.prepared import prepare
+from simgen.dataset.reuse import Reuse
+from simgen.renderer import backend
+from simgen.spec.sweeps import Sweep
+
+
+class DatasetJob:
+    """Makes datasets of `sweep` in the folder `out`; keeps what one has in common with the next."""
+
+    def __init__(self, sweep: Sweep, out: Path) -> None:
+        self.sweep, self.out, self.reuse = sweep, out, Reuse()
+
+    def __call__(self, piece: int) -> Row:
+        """Make one dataset, unless it is finished; its row of the index.
+
+        Raises `BusyError` if another process is at it, `InputError` if it cannot be made.
+        """
+        prepared = prepare(self.sweep.recipe(piece), self.sweep.near)
+        folder = self.out / self.sweep.folder(piece)
+        # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
+        manifest = finished(folder, identity_of(prepared), content=False)
+        return row_of(self.sweep, piece, self.out, manifest or make(prepared, folder, silent, self.reuse))
+
+    def name(self, piece: int) -> str:
+        """The dataset's folder."""
+        return str(self.out / self.sweep.folder(piece))
+
+    def use_threads(self, count: int) -> None:
+        """Let the renderer run on so many threads."""
+        backend.use_threads(count)

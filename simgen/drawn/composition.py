@@ -1,0 +1,115 @@
+"""What drawn scenes are composed of: depths, objects that stand there, lamps.
+
+Every function takes the `Random` of the scene; the order of its calls is part of what a number means.
+Lengths are rounded to 0.1 mm.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from random import Random
+from typing import Any
+
+REFERENCE_MM = 560.0
+"""Sizes and places are drawn for this depth and scaled, so that things are as large in the picture."""
+PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
+LEAST_APART_MM = 80
+DARK_BACKDROP = {"z_mm": 3000.0, "reflectance": "black 2"}
+
+Table = dict[str, Any]
+"""A TOML table."""
+
+
+def drawn_scene(
+    random: Random,
+    title: str,
+    objects: list[Table],
+    planes_mm: Sequence[int],
+    backdrop: Table | None = DARK_BACKDROP,
+) -> Table:
+    """The scene of these objects, its lamps drawn last."""
+    scene = {"title": title, "planes_mm": list(planes_mm), "objects": objects, "lights": _lamps(random)}
+    return scene if backdrop is None else scene | {"backdrop": backdrop}
+
+
+def planes_apart(random: Random, count: int) -> list[int]:
+    """So many depths, in mm, well apart."""
+    while True:
+        planes: list[int] = sorted(random.sample(PLANES_MM, count))
+        if all(far - near >= LEAST_APART_MM for near, far in pairwise(planes)):
+            return planes
+
+
+def two_planes(random: Random) -> tuple[int, int]:
+    """Two depths, from 90 to 140 mm apart, the nearer first."""
+    near = random.randrange(470, 531)
+    return near, near + random.randrange(90, 141)
+
+
+def solid(
+    random: Random, name: str, place_mm: tuple[float, float, float], radius_mm: float, material: Table
+) -> Table:
+    """A turned sphere, cylinder or box, about as large as a sphere of this radius."""
+    turned = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
+    r = radius_mm
+    shapes = [sphere(r), cylinder_of(0.7 * r, 2.1 * r), box_of(1.5 * r, 1.7 * r, 1.3 * r)]
+    return placed(name, place_mm, turned, random.choice(shapes), material)
+
+
+def placed(
+    name: str,
+    place_mm: tuple[float, float, float],
+    turned_deg: tuple[float, float, float],
+    shape: Table,
+    material: Table,
+) -> Table:
+    """An object."""
+    return {
+        "name": name,
+        "position_mm": [round(value, 1) for value in place_mm],
+        "rotation_deg": [round(value, 1) for value in turned_deg],
+        "shape": shape,
+        "material": material,
+    }
+
+
+def sphere(radius_mm: float) -> Table:
+    """A sphere."""
+    return {"type": "sphere", "radius_mm": round(radius_mm, 1)}
+
+
+def cylinder_of(radius_mm: float, length_mm: float) -> Table:
+    """A cylinder."""
+    return {"type": "cylinder", "radius_mm": round(radius_mm, 1), "length_mm": round(length_mm, 1)}
+
+
+def box_of(width_mm: float, height_mm: float, depth_mm: float) -> Table:
+    """A box."""
+    return {
+        "type": "box",
+        "width_mm": round(width_mm, 1),
+        "height_mm": round(height_mm, 1),
+        "depth_mm": round(depth_mm, 1),
+    }
+
+
+def card(width_mm: float, height_mm: float) -> Table:
+    """A card."""
+    return {"type": "card", "width_mm": round(width_mm, 1), "height_mm": round(height_mm, 1)}
+
+
+def _lamps(random: Random) -> list[Table]:
+    return [
+        {
+            "type": "area",
+            "position_mm": [
+                round(random.uniform(-300, 300), 0),
+                -430.0,
+                round(random.uniform(150, 400), 0),
+            ],
+            "target_mm": [0.0, 0.0, 600.0],
+            "width_mm": 400.0,
+            "height_mm": 300.0,
+            "luminance_cd_m2": 2000.0,
+        },
+        {"type": "uniform", "luminance_cd_m2": round(random.uniform(60, 150), 0)},
+    ]

@@ -1,0 +1,95 @@
+"""Kinds of drawn scenes with two or three solids before a dark backdrop."""
+
+from collections.abc import Callable
+from functools import partial
+from random import Random
+
+from simgen.drawn.composition import (
+    REFERENCE_MM,
+    Table,
+    box_of,
+    cylinder_of,
+    drawn_scene,
+    placed,
+    planes_apart,
+    solid,
+    sphere,
+    two_planes,
+)
+from simgen.drawn.surfaces import chessboard, glossy, pattern, plain
+
+
+def drawn_plain(number: int) -> Table:
+    """Two or three solids of one colour each, one before the border of another."""
+    return _side_by_side("plain", number, plain)
+
+
+def drawn_textured(number: int) -> Table:
+    """Two or three solids with patterns, one before the border of another."""
+    return _side_by_side("textured", number, pattern)
+
+
+def drawn_checks(number: int) -> Table:
+    """Two or three solids of coarse checks, one before the middle of the other."""
+    # Close together, so that borders run through the middle of what is behind.
+    return _side_by_side(
+        "checks",
+        number,
+        partial(chessboard, fewest=2, most=5),
+        first_mm=(-30, -45),
+        apart_mm=(30, 60),
+        radius_mm=(40, 60),
+        high_mm=30,
+    )
+
+
+def drawn_shiny(number: int) -> Table:
+    """Two or three solids of plastic or metal, glossy or dull, each by itself."""
+    return _side_by_side(
+        "shiny", number, glossy, first_mm=(-60, -105), apart_mm=(95, 115), radius_mm=(30, 48), high_mm=60
+    )
+
+
+def drawn_crossing(number: int) -> Table:
+    """Something plain across the middle of something else of nearly the same colour."""
+    random = Random(f"crossing {number}")
+    near, far = planes = two_planes(random)
+    mean = [random.uniform(0.3, 0.7) for _ in range(3)]
+    alike = [[round(part + random.uniform(-0.04, 0.04), 2) for part in mean] for _ in planes]
+    behind, across = ({"reflectance": own} for own in alike)
+    x, y = random.uniform(-20, 20), random.uniform(-20, 20)
+    radius, scale = random.uniform(50, 65), far / REFERENCE_MM
+    place = x * scale, y * scale, far + 0.6 * radius * scale
+    objects = [solid(random, "behind", place, radius * scale, behind)]
+    scale = near / REFERENCE_MM
+    r, long = random.uniform(11, 17) * scale, random.uniform(170, 230) * scale
+    # Each with how far its middle is behind what is seen of it.
+    shape, depth = random.choice(
+        [(cylinder_of(r, long), 0.6 * r), (box_of(2 * r, long, 8), 4.0), (sphere(2.4 * r), 1.4 * r)]
+    )
+    turned = random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(0, 180)
+    place = (x + random.uniform(-25, 25)) * scale, (y + random.uniform(-25, 25)) * scale, near + depth
+    objects.append(placed("across", place, turned, shape, across))
+    return drawn_scene(random, f"Drawn: crossing {number}", objects, planes)
+
+
+def _side_by_side(
+    kind: str,
+    number: int,
+    material: Callable[[Random], Table],
+    *,
+    first_mm: tuple[float, float] = (-60, -80),
+    apart_mm: tuple[float, float] = (50, 85),
+    radius_mm: tuple[float, float] = (36, 58),
+    high_mm: float = 25,
+) -> Table:
+    """From left to right; the first of two or of three is at `first_mm`, up or down by at most `high_mm`."""
+    random = Random(f"{kind} {number}")
+    planes = planes_apart(random, random.choice([2, 2, 3]))
+    objects, x = [], first_mm[len(planes) - 2]
+    for position, z in enumerate(random.sample(planes, len(planes))):
+        scale, radius = z / REFERENCE_MM, random.uniform(*radius_mm)
+        place = x * scale, random.uniform(-high_mm, high_mm) * scale, z + 0.6 * radius * scale
+        objects.append(solid(random, f"solid-{position}", place, radius * scale, material(random)))
+        x += random.uniform(*apart_mm)
+    return drawn_scene(random, f"Drawn: {kind} {number}", objects, planes)

@@ -1,0 +1,207 @@
+"""Recipes whose fields have several values: a dataset for each combination of them.
+
+A field that takes one value may have a list, any field `{ each = [...] }`, and a whole number
+`{ range = [first, end] }` or `{ range = [first, end, step] }`, without the end as in Python.
+"""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel
+
+from pcii.base.errors import InputError
+from simgen.base.strict_models import validate
+from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
+from simgen.spec.scene import is_scene
+
+MOST_DATASETS = 1_000_000
+SHORT_NAMES = {"scene_number": "draw"}
+"""What folders call fields whose own names would mislead there."""
+_ORDER = {"scene": -2, "scene_number": -1, "seed": 1}
+PLAIN = r"[A-Za-z0-9][A-Za-z0-9.+-]{0,63}"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A swept field, dotted, and its values; what the names of folders call it."""
+
+    field: str
+    values: Sequence[Any]
+    label: str
+
+    def name_of(self, value: Any) -> str:
+        """The value in the names of folders: as it is written if that is plain, else a hash of it."""
+        parts = value if isinstance(value, list | tuple) else [value]
+        text = "x".join(f"{part:.15g}" if type(part) is float else str(part) for part in parts)
+        if not re.fullmatch(PLAIN, text):
+            text = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]
+        return f"{self.label}_{text}"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A recipe as it is written, the fields that have several values, and where it is from.
+
+    Fields that decide the scene come first and the seed last, so that datasets made one after the other have
+    much in common.
+    """
+
+    written: Mapping[str, Any]
+    axes: tuple[Axis, ...]
+    source: str
+    near: Path
+
+    def __len__(self) -> int:
+        return math.prod(len(axis.values) for axis in self.axes)
+
+    def values(self, number: int) -> dict[str, Any]:
+        """Value of each swept field of a dataset, the last field varying fastest."""
+        found = {}
+        for axis in reversed(self.axes):
+            number, place = divmod(number, len(axis.values))
+            found[axis.field] = axis.values[place]
+        return {axis.field: found[axis.field] for axis in self.axes}
+
+    def folder(self, number: int) -> str:
+        """Name of a dataset's folder: its values, the same whatever other values there are."""
+        values = self.values(number)
+        return "_".join(axis.name_of(values[axis.field]) for axis in self.axes)
+
+    def recipe(self, number: int) -> Recipe:
+        """The recipe of a dataset; raises `InputError` if its values make none."""
+        return self._recipe_with(self.values(number))
+
+    def _recipe_with(self, values: Mapping[str, Any]) -> Recipe:
+        said = ", ".join(f"{field} = {json.dumps(value)}" for field, value in values.items())
+        return validate(Recipe, self._with(values), f"{self.source}{f' at {said}' * bool(said)}")
+
+    def _with(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        plain = deepcopy(dict(self.written))
+        for field, value in values.items():
+            *tables, last = field.split(".")
+            target = plain
+            for table in tables:
+                target = target[table]
+            target[last] = value
+        return plain
+
+    @cached_property
+    def base(self) -> dict[str, Any]:
+        """What all datasets have in common: the recipe without the swept values."""
+        return self._with({axis.field: None for axis in self.axes})
+
+    def check(self) -> None:
+        """Raise `InputError` if a value of a swept field makes no recipe beside the others' first values."""
+        first = self.values(0)
+        self._recipe_with(first)
+        for axis in self.axes:
+            whole = type(axis.values[0]) is int and len(axis.values) > 2  # of these the ends decide
+            for value in (min(axis.values), max(axis.values)) if whole else axis.values[1:]:
+                self._recipe_with(first | {axis.field: value})
+
+
+def load_sweep(
+    name_or_path: str,
+    overrides: Sequence[str] = (),
+    *,
+    seeds: int | None = None,
+    scenes: int | None = None,
+) -> Sweep:
+    """A recipe whose fields may have several values, by path or shipped name and `overrides` as for one.
+
+    The name of a scene alone means a recipe that says nothing else, with the paper's cameras and photons.
+    `seeds` and `scenes` are so many seeds and draws of the scene, from the recipe's own on. Raises
+    `InputError` for a recipe that is missing or wrong, for a field without values, with the same value twice,
+    or swept twice, and for more than `MOST_DATASETS`.
+    """
+    written, source, near = _read(name_or_path, overrides)
+    for option, field, count in (("scenes", "scene_number", scenes), ("seeds", "seed", seeds)):
+        if count is not None:
+            first = written.get(field, 0)
+            if not isinstance(first, int) or isinstance(first, bool):
+                raise InputError(f"{option}: the recipe gives {field} several values already; leave one out")
+            if count < 1:
+                raise InputError(f"{option}: expected a whole number from 1, got {count}")
+            written[field] = {"range": [first, first + count]}
+    found = dict(sorted(_swept(written, Recipe, ""), key=lambda item: _ORDER.get(item[0], 0)))
+    labels = _labels(list(found))
+    axes = tuple(Axis(field, _values(field, value, source), labels[field]) for field, value in found.items())
+    for axis in axes:
+        if len({axis.name_of(value) for value in axis.values}) < len(axis.values):
+            raise InputError(f"{source}: {axis.field}: gives a value twice; each makes one dataset")
+    sweep = Sweep(written, axes, source, near)
+    if len(sweep) > MOST_DATASETS:
+        raise InputError(f"{source}: {len(sweep)} datasets; at most {MOST_DATASETS} can be made at once")
+    sweep.check()
+    return sweep
+
+
+def _read(name_or_path: str, overrides: Sequence[str]) -> tuple[dict[str, Any], str, Path]:
+    file = recipe_file(name_or_path)
+    if (file is None or file == Path(name_or_path)) and is_scene(name_or_path):
+        values: dict[str, Any] = {"scene": name_or_path}
+        override(values, overrides)
+        return values, f"a recipe of the scene {name_or_path}", Path()
+    return read_recipe(name_or_path, overrides)
+
+
+def _swept(values: Mapping[str, Any], model: type[BaseModel], prefix: str) -> Iterator[tuple[str, Any]]:
+    """Fields that have several values, dotted, with what is written there."""
+    for name, value in values.items():
+        if name not in model.model_fields:
+            continue  # an unknown key, which is told of when the recipe is checked
+        inner, takes_list = _kind(model.model_fields[name].annotation)
+        is_marked = isinstance(value, dict) and set(value) in ({"each"}, {"range"})
+        if is_marked or (isinstance(value, list) and not takes_list):
+            yield f"{prefix}{name}", value
+        elif isinstance(value, dict) and inner is not None:
+            yield from _swept(value, inner, f"{prefix}{name}.")
+
+
+def _kind(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
+    """The model that a field holds, if it holds one, and whether it takes a list."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _kind(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        kinds = [_kind(part) for part in get_args(annotation)]
+        return next((model for model, _ in kinds if model is not None), None), any(many for _, many in kinds)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation, False
+    return None, origin in (tuple, list) or annotation in (tuple, list)
+
+
+def _values(field: str, written: Any, source: str) -> Sequence[Any]:
+    values = written if isinstance(written, list) else written.get("each")
+    if isinstance(written, dict) and "range" in written:
+        ends = written["range"]
+        if not isinstance(ends, list) or len(ends) not in (2, 3) or not all(type(end) is int for end in ends):
+            raise InputError(
+                f"{source}: {field}: range: expected [first, end] or [first, end, step], whole numbers"
+            )
+        if len(ends) == 3 and ends[2] == 0:
+            raise InputError(f"{source}: {field}: range: a step of 0 never ends")
+        values = range(*ends)
+        if len(values) > MOST_DATASETS:
+            raise InputError(f"{source}: {field}: range: {len(values)} values; at most {MOST_DATASETS}")
+    if not isinstance(values, list | range) or not values:
+        raise InputError(f"{source}: {field}: expected at least one value to sweep over")
+    return values
+
+
+def _labels(fields: Sequence[str]) -> dict[str, str]:
+    """What names of folders call swept fields: the last part of the name, or all where that is not unique."""
+    short = {field: SHORT_NAMES.get(field, field.rsplit(".", 1)[-1]) for field in fields}
+    taken = list(short.values())
+    return {
+        field: name if taken.count(name) == 1 else field.replace(".", "-") for field, name in short.items()
+    }

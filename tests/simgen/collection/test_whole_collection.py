@@ -1,0 +1,198 @@
+"""Collections: each dataset is what it would be alone, whoever makes it; resumed, shared, extended."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from digests import digest
+
+from pcii.base import command_line
+from pcii.base.crew import Crew
+from pcii.base.errors import InputError
+from pcii.io.collection import open_collection
+from pcii.io.collection_layout import COLLECTION, INDEX
+from pcii.io.dataset import open_dataset
+from pcii.io.verification import verify
+from simgen.app import commands as cli
+from simgen.collection import dataset_job
+from simgen.collection.whole_collection import generate_collection
+from simgen.dataset.generation import generate
+from simgen.spec.recipe import load_recipe
+from simgen.spec.sweeps import Sweep, load_sweep
+
+pytestmark = pytest.mark.renders
+TOML = """
+scene = "plain_pair"
+seed = 7
+[grid]
+rows = 2
+cols = 3
+pitch_mm = [18.0, 18.0]
+pixel_mm = 0.5632
+height = 64
+width = 60
+[photons]
+budget = [100, 200]
+"""
+
+
+@pytest.fixture(scope="module")
+def recipe_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recipe") / "tiny.toml"
+    path.write_text(TOML)
+    return path
+
+
+@pytest.fixture(scope="module")
+def collection(recipe_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("collection") / "six"
+    assert command_line.run(cli.app, ["generate", str(recipe_file), "-o", str(out), "--seeds", "3"]) == 0
+    return out
+
+
+def sweep_of(recipe_file: Path, seeds: int = 3, *overrides: str) -> Sweep:
+    return load_sweep(str(recipe_file), overrides, seeds=seeds)
+
+
+def test_the_index_says_what_the_manifests_say(collection: Path) -> None:
+    opened = open_collection(collection)
+    assert [row["path"] for row in opened.rows] == [
+        f"budget_{budget}_seed_{seed}" for budget in (100, 200) for seed in (7, 8, 9)
+    ]
+    assert sorted(entry.name for entry in collection.iterdir()) == sorted(
+        [COLLECTION, INDEX, *(row["path"] for row in opened.rows)]
+    )
+    for row, dataset in zip(opened.rows, opened, strict=True):
+        recipe = dataset.manifest["recipe"]
+        assert row["values"] == {"photons.budget": recipe["photons"]["budget"], "seed": recipe["seed"]}
+        assert row["photons"] == dataset.counts.total
+    assert verify(collection) > 6
+
+
+@pytest.mark.parametrize(("seed", "budget"), [(7, 100), (9, 200)])
+def test_each_dataset_is_what_its_recipe_alone_gives(
+    recipe_file: Path, collection: Path, tmp_path: Path, seed: int, budget: int
+) -> None:
+    recipe, near = load_recipe(str(recipe_file), [f"seed={seed}", f"photons.budget={budget}"])
+    manifest = generate(recipe, near, tmp_path / "alone")
+    made = collection / f"budget_{budget}_seed_{seed}"
+    assert digest(tmp_path / "alone") == digest(made)
+    assert open_dataset(made).manifest["identity"] == manifest["identity"]
+
+
+def test_what_is_finished_is_left_alone_and_what_is_missing_is_made(
+    recipe_file: Path, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "copy"
+    shutil.copytree(collection, out)
+    made, original = [], dataset_job.make
+    monkeypatch.setattr(dataset_job, "make", lambda *given: made.append(given[1].name) or original(*given))
+    assert generate_collection(sweep_of(recipe_file), out) == []
+    assert made == []
+    assert (out / INDEX).read_bytes() == (collection / INDEX).read_bytes()
+    shutil.rmtree(out / "budget_100_seed_8")
+    assert generate_collection(sweep_of(recipe_file, 4), out) == []
+    assert made == ["budget_100_seed_8", "budget_100_seed_10", "budget_200_seed_10"]
+    assert digest(out / "budget_100_seed_8") == digest(collection / "budget_100_seed_8")
+    assert len(open_collection(out)) == 8
+    # Fewer values leave the others in the folder, and in the index.
+    assert generate_collection(sweep_of(recipe_file, 1), out) == []
+    assert len(open_collection(out)) == 8
+
+
+def test_a_dataset_that_cannot_be_made_holds_up_no_other(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    (out / "budget_100_seed_8").mkdir(parents=True)
+    (out / "budget_100_seed_8" / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="holds something else"):
+        generate_collection(sweep_of(recipe_file), out)
+    shutil.rmtree(out / "budget_100_seed_8")
+    command = ["generate", str(recipe_file), "-o", str(out), "--set", "photons.budget=100", "--seeds", "3"]
+    assert command_line.run(cli.app, command) == 0
+    shutil.rmtree(out / "seed_8")
+    (out / "seed_8").mkdir()
+    (out / "seed_8" / "notes.txt").write_text("mine")
+    for workers in ("1", "2"):
+        assert command_line.run(cli.app, [*command, "--workers", workers]) == 1
+        told = capsys.readouterr()
+        assert "2 of 3 datasets are finished" in told.out
+        assert "seed_8: holds something else" in told.err
+    assert [row["seed"] for row in open_collection(out).rows] == [7, 9]
+
+
+def test_another_recipe_a_dataset_and_a_file_are_refused(
+    recipe_file: Path, collection: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(InputError, match="collection of another recipe"):
+        generate_collection(sweep_of(recipe_file, 3, "grid.cols=2"), collection)
+    with pytest.raises(InputError, match="of other swept fields"):
+        generate_collection(load_sweep(str(recipe_file)), collection)
+    with pytest.raises(InputError, match="holds a single dataset"):
+        generate_collection(sweep_of(recipe_file), collection / "budget_100_seed_7")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="this is a file"):
+        generate_collection(sweep_of(recipe_file), tmp_path / "file")
+    recipe, near = load_recipe(str(recipe_file), ["photons.budget=5"])
+    with pytest.raises(InputError, match="holds something else"):
+        generate(recipe, near, collection)
+
+
+def test_workers_make_the_same_bytes_and_the_same_index_but_for_times(
+    recipe_file: Path, collection: Path, tmp_path: Path
+) -> None:
+    assert generate_collection(sweep_of(recipe_file), tmp_path / "two", Crew(workers=2)) == []
+    assert digest_of_all(tmp_path / "two") == digest_of_all(collection)
+
+
+def digest_of_all(collection: Path) -> dict[str, dict[str, str]]:
+    rows = open_collection(collection).rows
+    return {row["path"]: digest(collection / row["path"]) for row in rows}
+
+
+def start(recipe_file: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-c", "from simgen.app.commands import main; raise SystemExit(main())"]
+    given = ["generate", str(recipe_file), "-o", str(out), "--seeds", "3", *more]
+    return subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+
+def test_two_processes_share_the_work_of_a_collection(
+    recipe_file: Path, collection: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "shared"
+    for process in [start(recipe_file, out) for _ in range(2)]:
+        _, told = process.communicate(timeout=120)
+        assert process.returncode == 0, told.decode()
+    assert digest_of_all(out) == digest_of_all(collection)
+    assert verify(out) == verify(collection)
+
+
+def test_a_killed_worker_is_replaced(recipe_file: Path, collection: Path, tmp_path: Path) -> None:
+    out, killed = tmp_path / "killed", set[int]()
+    process = start(recipe_file, out, "--workers", "2")
+    until = time.monotonic() + 100
+    while len(killed) < 1 and process.poll() is None and time.monotonic() < until:
+        if list(out.glob("*/.unfinished.json")):
+            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+            for child in children:
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    os.kill(int(child), signal.SIGKILL)
+                    killed.add(int(child))
+                    break
+        time.sleep(0.01)
+    _, told = process.communicate(timeout=120)
+    assert killed
+    assert process.returncode == 0, told.decode()
+    assert digest_of_all(out) == digest_of_all(collection)
+
+
+def test_crews_that_make_no_sense_are_refused() -> None:
+    for workers, scheduler, resource in ((0, None, None), (2, "tcp://here", None), (1, None, "GPU")):
+        with pytest.raises(InputError):
+            Crew(workers, scheduler, resource)

@@ -1,0 +1,128 @@
+"""Fields with several values: which datasets a sweep has, their order, names and recipes."""
+
+from pathlib import Path
+
+import pytest
+
+from pcii.base.errors import InputError
+from simgen.spec.recipe import load_recipe
+from simgen.spec.sweeps import load_sweep
+
+TOML = """
+scene = "two_objects"
+seed = 7
+[grid]
+rows = 2
+cols = 3
+[photons]
+budget = [100, 300.0]
+[sensor]
+cfa = "RGGB"
+"""
+
+
+@pytest.fixture
+def recipe_file(tmp_path: Path) -> str:
+    path = tmp_path / "swept.toml"
+    path.write_text(TOML)
+    return str(path)
+
+
+def test_a_list_where_one_value_belongs_is_a_sweep(recipe_file: str) -> None:
+    sweep = load_sweep(recipe_file)
+    assert [(axis.field, axis.values) for axis in sweep.axes] == [("photons.budget", [100, 300.0])]
+    assert [sweep.recipe(number).photons.budget for number in range(2)] == [100.0, 300.0]
+    assert [sweep.folder(number) for number in range(2)] == ["budget_100", "budget_300"]
+
+
+def test_fields_that_take_lists_are_swept_by_each_alone(recipe_file: str) -> None:
+    plain = ["photons.budget=100"]
+    assert load_sweep(recipe_file, [*plain, "grid.pitch_mm=[4.0, 5.0]"]).axes == ()
+    sweep = load_sweep(recipe_file, [*plain, "grid.pitch_mm={each=[[4.0, 5.0], [2.5, 5.0]]}"])
+    assert [sweep.recipe(number).grid.pitch_mm for number in range(2)] == [(4.0, 5.0), (2.5, 5.0)]
+    assert [sweep.folder(number) for number in range(2)] == ["pitch_mm_4x5", "pitch_mm_2.5x5"]
+
+
+def test_the_seed_varies_fastest_and_the_scene_slowest(recipe_file: str) -> None:
+    sweep = load_sweep(recipe_file, ["scene={each=['two_objects', 'plain_pair']}"], seeds=3)
+    assert [axis.field for axis in sweep.axes] == ["scene", "photons.budget", "seed"]
+    assert len(sweep) == 12
+    seeds = [sweep.recipe(number).seed for number in range(12)]
+    assert seeds == 4 * [7, 8, 9]
+    assert [sweep.recipe(number).scene for number in (0, 5, 6, 11)] == 2 * ["two_objects"] + 2 * [
+        "plain_pair"
+    ]
+    assert len({sweep.folder(number) for number in range(12)}) == 12
+
+
+def test_ranges_end_before_their_end(recipe_file: str) -> None:
+    plain = ["photons.budget=100"]
+    assert load_sweep(recipe_file, [*plain, "seed={range=[3, 6]}"]).axes[0].values == range(3, 6)
+    assert load_sweep(recipe_file, [*plain, "seed={range=[3, 8, 2]}"]).axes[0].values == range(3, 8, 2)
+
+
+def test_draws_of_a_scene_and_seeds_are_counted_from_the_recipes_own(recipe_file: str) -> None:
+    sweep = load_sweep(recipe_file, ["photons.budget=100", "scene_number=20"], seeds=2, scenes=2)
+    assert [sweep.folder(number) for number in range(4)] == [
+        "draw_20_seed_7", "draw_20_seed_8", "draw_21_seed_7", "draw_21_seed_8",
+    ]  # fmt: skip
+    assert [sweep.recipe(number).scene_number for number in range(4)] == [20, 20, 21, 21]
+
+
+def test_a_folder_keeps_its_name_when_values_are_added(recipe_file: str) -> None:
+    names = set[str]()
+    for budgets in ("[100]", "[50, 100]", "[50, 100, 1e-3]"):
+        sweep = load_sweep(recipe_file, [f"photons.budget={budgets}"], seeds=2)
+        own = {sweep.folder(number) for number in range(len(sweep))}
+        assert names <= own
+        names = own
+
+
+def test_values_that_make_no_plain_name_are_told_apart_by_a_hash(recipe_file: str) -> None:
+    sweep = load_sweep(recipe_file, ["photons.budget=1", "scene={each=['a/b', 'c d']}"])
+    names = [sweep.folder(number) for number in range(2)]
+    assert all(name.startswith("scene_") and len(name) == len("scene_") + 8 for name in names)
+    assert names[0] != names[1]
+
+
+@pytest.mark.parametrize(
+    ("override", "told"),
+    [
+        ("photons.budget=[]", "photons.budget: expected at least one value"),
+        ("photons.budget={each=3}", "photons.budget: expected at least one value"),
+        ("photons.budget=[100, 100.0]", "photons.budget: gives a value twice"),
+        (
+            "photons.budget=[100, -1]",
+            r"at photons.budget = -1, .*greater than 0|photons.budget.*greater than 0",
+        ),
+        ("seed={range=[1]}", r"seed: range: expected \[first, end\]"),
+        ("seed={range=[1, 2.5]}", r"seed: range: expected \[first, end\]"),
+        ("seed={range=[1, 9, 0]}", "a step of 0 never ends"),
+        ("seed={range=[5, 5]}", "seed: expected at least one value"),
+        ("seed={range=[0, 10000000]}", "seed: range: 10000000 values"),
+        ("seed={range=[0, 600000]}", "1200000 datasets; at most 1000000"),
+        ("seed={range=[9223372036854775806, 9223372036854775809]}", "seed"),
+        ("photons.budgets=[1, 2]", "budgets"),
+    ],
+)
+def test_sweeps_that_make_no_recipes_are_refused(recipe_file: str, override: str, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        load_sweep(recipe_file, [override])
+
+
+def test_seeds_cannot_be_given_twice(recipe_file: str) -> None:
+    with pytest.raises(InputError, match="gives seed several values already"):
+        load_sweep(recipe_file, ["seed=[1, 2]"], seeds=3)
+    with pytest.raises(InputError, match="expected a whole number from 1, got 0"):
+        load_sweep(recipe_file, seeds=0)
+
+
+def test_a_scene_alone_is_a_recipe_that_says_nothing_else() -> None:
+    sweep = load_sweep("drawn_crossing", ["photons.budget=[10, 20]"], scenes=3)
+    assert len(sweep) == 6
+    recipe = sweep.recipe(5)
+    assert (recipe.scene, recipe.scene_number, recipe.photons.budget) == ("drawn_crossing", 2, 20.0)
+    assert recipe.grid == load_recipe("paper")[0].grid
+    assert load_sweep("paper").written["title"]  # a recipe of a name comes before a scene of it
+    with pytest.raises(InputError, match="there is no 'drawn_crosing'"):
+        load_sweep("drawn_crosing", scenes=3)
