@@ -33,8 +33,6 @@ OTHERS = {
     "another grid": ["grid.pitch_mm=[9.0,18.0]"],
     "errors of cameras from another seed": [ERRORS, "seed=4"],
     "other planes": ["analysis.z_mm=[500.0]"],
-    "monochrome": ["sensor.cfa=none"],
-    "an exposure": ["photons.scope=exposure", "exposure.time_s=0.001", "exposure.f_number=4.0"],
 }
 
 
