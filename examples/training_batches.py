@@ -13,6 +13,7 @@ import numpy as np
 
 import pcii
 import simgen
+from pcii.metrics.true_masks import pixel_masks
 
 
 def examples(
@@ -25,10 +26,8 @@ def examples(
         assert truth is not None
         z_mm = float(rng.choice(planes))
         section = pcii.reconstruct(dataset.counts, z_mm=[z_mm])
-        grid = dataset.grid
-        shift_px = grid.focal_mm * max(grid.pitch_mm) / grid.pixel_mm * (1 / truth.z_mm - 1 / z_mm)
-        blur_px = np.abs(shift_px) * (max(grid.rows, grid.cols) - 1) / 2
-        yield np.moveaxis(section.counts[0], -1, 0).astype(np.float32), blur_px <= 1
+        in_focus = pixel_masks(dataset.grid, truth, np.array([z_mm]))[0]
+        yield np.moveaxis(section.counts[0], -1, 0).astype(np.float32), in_focus
 
 
 def batches(collection: pcii.Collection, size: int, seed: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

@@ -13,3 +13,30 @@ TINY_RECIPE: dict[str, Any] = {
         "width": 60,
     },
 }
+
+GRID_2_X_3 = """
+[grid]
+rows = 2
+cols = 3
+pitch_mm = [18.0, 18.0]
+pixel_mm = 0.5632
+height = 64
+width = 60
+"""
+"""The same cameras, as TOML."""
+GRID_2_X_2 = """
+[grid]
+rows = 2
+cols = 2
+pitch_mm = [18.0, 18.0]
+pixel_mm = 1.0
+height = 32
+width = 36
+"""
+
+
+def with_radiance(seeds: int) -> str:
+    """A recipe of so many seeds, as TOML, with photons and radiance."""
+    head = f'scene = "plain_pair"\nseed = {{ range = [0, {seeds}] }}\n'
+    rendered = '[render]\nsamples_per_pixel = 2\n[products]\nradiance = "mosaic"\n'
+    return f"{head}{GRID_2_X_3}[photons]\nbudget = 200\n{rendered}"

@@ -4,10 +4,11 @@ import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 
-from pcii.base.errors import BusyError, InputError
-from pcii.base.jobs import AGAIN_S, Done, Job
+from pcii.base.errors import InputError
+from pcii.base.jobs import AGAIN_S, Done, Job, attempt
 
 MOST_WORKERS = 1024
+"""More are taken for a slip: no machine has so many cores."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,11 @@ def _run_here(job: Job, pieces: Sequence[int]) -> Generator[Done]:
     while waiting:
         busy = []
         for piece in waiting:
-            try:
-                yield Done(piece, job(piece))
-            except BusyError:
+            done = attempt(job, piece)
+            if done is None:
                 busy.append(piece)
-            except InputError as fault:
-                yield Done(piece, None, str(fault))
+            else:
+                yield done
         if len(busy) == len(waiting):
             time.sleep(AGAIN_S)
         waiting = busy

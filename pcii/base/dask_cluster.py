@@ -12,15 +12,13 @@ from contextlib import contextmanager
 from typing import Any
 from uuid import uuid4
 
-from pcii.base.errors import BusyError, InputError
-from pcii.base.jobs import AGAIN_S, Done, Job
+from pcii.base.errors import InputError
+from pcii.base.jobs import AGAIN_S, MOST_DEATHS, Done, Job, attempt
 
 MOST_TASKS = 2000
 """Tasks that the scheduler knows of at a time: each takes it some kB and a millisecond."""
 ANSWER_S = 5.0
 """So long a scheduler may take to answer."""
-MOST_DEATHS = 2
-"""After so many workers have died of a task it is given up."""
 
 _one_at_a_time = threading.Lock()
 
@@ -93,10 +91,7 @@ def _task(installed: str, piece: int) -> Done | None:
     plugin: Any = get_worker().plugins[installed]
     job: Job = plugin.job
     with _one_at_a_time:  # threads of a worker would share one renderer
-        try:
-            return Done(piece, job(piece))
-        except BusyError:
+        done = attempt(job, piece)
+        if done is None:
             time.sleep(AGAIN_S)
-            return None
-        except InputError as fault:
-            return Done(piece, None, str(fault))
+        return done

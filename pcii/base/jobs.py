@@ -6,6 +6,10 @@ The pieces of a job can be done in any order, by anybody, and again: what is don
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from pcii.base.errors import BusyError, InputError
+
+MOST_DEATHS = 2
+"""After so many processes have died of a piece it is given up: one death may have another cause."""
 AGAIN_S = 0.25
 """How often to look whether other processes have finished what they were at."""
 
@@ -36,3 +40,13 @@ class Done:
     piece: int
     result: Any
     fault: str = ""
+
+
+def attempt(job: Job, piece: int) -> Done | None:
+    """Do a piece; with what is wrong with it if that concerns it alone, None if another process is at it."""
+    try:
+        return Done(piece, job(piece))
+    except BusyError:
+        return None
+    except InputError as fault:
+        return Done(piece, None, str(fault))

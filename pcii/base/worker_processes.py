@@ -12,11 +12,7 @@ from itertools import pairwise
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 
-from pcii.base.errors import BusyError, InputError
-from pcii.base.jobs import AGAIN_S, Done, Job
-
-MOST_DEATHS = 2
-"""After so many processes have died of a piece it is given up."""
+from pcii.base.jobs import AGAIN_S, MOST_DEATHS, Done, Job, attempt
 
 
 @dataclass
@@ -48,14 +44,15 @@ def run_in_processes(job: Job, pieces: Sequence[int], count: int) -> Generator[D
                 reply, piece = _reply(worker), worker.piece
                 assert piece is not None
                 worker.piece = None
-                if isinstance(reply, BusyError):
-                    worker.ahead.append(piece)
-                elif isinstance(reply, BaseException):
-                    raise reply
-                elif reply is not None:
+                if isinstance(reply, Done):
                     missing -= 1
                     yield reply
+                elif reply is None:
+                    worker.ahead.append(piece)
+                elif not isinstance(reply, _DiedError):
+                    raise reply
                 else:
+                    worker.process.join()
                     workers[workers.index(worker)] = _start(job, worker.ahead, count)
                     deaths[piece] += 1
                     if deaths[piece] < MOST_DEATHS:
@@ -98,13 +95,16 @@ def _hand_out(worker: _Worker, workers: Sequence[_Worker]) -> None:
             worker.pipe.send(worker.piece)
 
 
-def _reply(worker: _Worker) -> Done | BaseException | None:
-    """What a worker says of its piece; None if it died."""
+class _DiedError(Exception):
+    """A worker's process has ended."""
+
+
+def _reply(worker: _Worker) -> Done | Exception | None:
+    """What a worker says of its piece: None if another process is at it, `_DiedError` if its own ended."""
     try:
         return worker.pipe.recv()
     except (EOFError, ConnectionResetError):
-        worker.process.join()
-        return None
+        return _DiedError()
 
 
 def _work(pipe: Connection, job: Job, threads: int) -> None:
@@ -117,12 +117,9 @@ def _work(pipe: Connection, job: Job, threads: int) -> None:
         except EOFError:
             return
         try:
-            reply = Done(piece, job(piece))
-        except BusyError as fault:
-            time.sleep(AGAIN_S)
-            reply = fault
-        except InputError as fault:
-            reply = Done(piece, None, str(fault))
+            reply = attempt(job, piece)
         except Exception as fault:
             reply = fault
+        if reply is None:
+            time.sleep(AGAIN_S)
         pipe.send(reply)

@@ -68,7 +68,7 @@ class Collection(Brief, Sequence[Dataset]):
         return replace(self, rows=tuple(rows))
 
     def split(self, name: Split) -> "Collection":
-        """The datasets of one part of a training set: "train", "validation" or "test"."""
+        """The datasets of the training, validation or test split."""
         return self.where(split=name)
 
     def table(self) -> dict[str, list[Any]]:

@@ -1,6 +1,7 @@
 """Removal methods by name: which points of each section are in focus."""
 
 from pcii.base.errors import InputError
+from pcii.base.extensions import registered
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts, check_depth_counts
 from pcii.removal import plugins
@@ -48,17 +49,17 @@ def removal_methods() -> tuple[str, ...]:
     >>> removal_methods()[:2]
     ('three-step', 'likelihood')
     """
-    return (*METHODS, *plugins.registered(METHODS))
+    return (*METHODS, *registered(plugins.GROUP, METHODS))
 
 
 def find_method(name: str) -> plugins.Method:
     """The removal method of this name; `InputError` listing the known names if there is none."""
     if not isinstance(name, str) or name not in METHODS:
-        registered = plugins.registered(METHODS)
-        if name not in registered:
-            names = ", ".join((*METHODS, *registered))
+        others = registered(plugins.GROUP, METHODS)
+        if name not in others:
+            names = ", ".join((*METHODS, *others))
             raise InputError(f"method: no removal named {name!r}; use {names}")
-        return plugins.load(registered[name])
+        return plugins.load(others[name])
     return METHODS[name]
 
 

@@ -10,11 +10,11 @@ In the pyproject.toml of such a package:
 Entry points are read, and the package imported, only when a method is requested that is not built in.
 """
 
-import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pcii.base.errors import InputError
+from pcii.base.extensions import package_of
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -26,33 +26,13 @@ GROUP = "pcii.methods"
 Method = Callable[[PhotonCounts, Sections], Segmented]
 
 
-def registered(taken: Collection[str]) -> dict[str, "EntryPoint"]:
-    """Methods of installed packages by name, sorted.
-
-    Raises `InputError` for a name that is `taken`, that two packages use, or that cannot be a file name.
-    """
-    from importlib.metadata import entry_points
-
-    found: dict[str, EntryPoint] = {}
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
-        label = f"{GROUP}: {point.value} of {_package(point)}"
-        if point.name in taken:
-            raise InputError(f"{label} takes the name of the built-in {point.name!r}; it needs another name")
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", point.name):
-            raise InputError(f"{label} is named {point.name!r}; use letters, digits, '-', '_' and '.'")
-        if point.name in found and found[point.name].value != point.value:
-            raise InputError(f"{label} and {found[point.name].value} are both named {point.name!r}")
-        found[point.name] = point
-    return found
-
-
 def load(point: "EntryPoint") -> Method:
     """The method of an entry point, with its result checked at every call.
 
     Raises `InputError` if it cannot be imported or called, and the method if its result is not a `Segmented`
     of the given sections.
     """
-    label = f"method: {point.name!r} of {_package(point)}"
+    label = f"method: {point.name!r} of {package_of(point)}"
     try:
         remove = point.load()
     except Exception as fault:  # importing another package's module may raise anything
@@ -82,7 +62,3 @@ def _unmet_requirement(result: Segmented, name: str, counts: PhotonCounts, secti
     if kept is not None and kept.shape[1] != events:
         return f"photon_in_focus for the {events} events of the counts, not for {kept.shape[1]}"
     return None
-
-
-def _package(point: "EntryPoint") -> str:
-    return f"the package {point.dist.name}" if point.dist else "a package"

@@ -12,7 +12,7 @@ from simgen.spec.scene import load_scene, scene_files
 
 
 def write_drawn_scene(name_or_path: str, number: int, out: Path) -> Path:
-    """Write the scene.toml of a draw, and the files that it names beside it; the path of scene.toml.
+    """Write one draw of a distribution as a scene folder: scene.toml, whose path is returned, and its assets.
 
     Raises `InputError` for what is no distribution, or a folder that holds anything.
     """

@@ -161,7 +161,7 @@ def _ink(text: str, size: float) -> Any:
 
 def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
     generator = np.random.default_rng(texture.seed)
-    amplitude = _amplitude(texture.exponent, canvas)
+    amplitude = _amplitude_spectrum(texture.exponent, canvas)
     shared = _spectral_noise(generator, amplitude, canvas)
     channels = []
     for mean in srgb_to_linear(np.array(texture.colour)).tolist():
@@ -174,7 +174,7 @@ def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
     return np.stack(channels, axis=-1)
 
 
-def _amplitude(exponent: float, canvas: _Canvas) -> np.ndarray:
+def _amplitude_spectrum(exponent: float, canvas: _Canvas) -> np.ndarray:
     """Of each frequency of `np.fft.rfft2`: frequency^-exponent, and 0 for the mean."""
     columns, rows = canvas.columns, canvas.rows
     across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])

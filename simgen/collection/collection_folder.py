@@ -1,7 +1,5 @@
 """The folder of a collection that is being made: whose it is, and the index of what is finished."""
 
-import hashlib
-import json
 import os
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -40,7 +38,6 @@ def begin(sweep: Sweep, out: Path) -> None:
     document = {
         "fields": [axis.field for axis in sweep.axes],
         "recipe": sweep.base,
-        "recipe_sha256": hashlib.sha256(json.dumps(sweep.base, sort_keys=True).encode()).hexdigest(),
         "software": {"photon-integral-imaging": version("photon-integral-imaging")},
     }
     out.mkdir(parents=True, exist_ok=True)
@@ -53,7 +50,7 @@ def begin(sweep: Sweep, out: Path) -> None:
         if not file.read():
             write_collection(out, document)
     known = read_collection(out)
-    if (known.get("fields"), known.get("recipe_sha256")) != (document["fields"], document["recipe_sha256"]):
+    if any(known.get(name) != document[name] for name in ("fields", "recipe")):
         raise InputError(
             f"{out}: holds the collection of another recipe or of other swept fields; name a new folder"
         )

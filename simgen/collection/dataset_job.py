@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pcii.base.progress import silent
 from simgen.collection.collection_folder import Row, row_of
-from simgen.dataset.dataset_folder import finished, identity_of
+from simgen.dataset.dataset_folder import finished
 from simgen.dataset.generation import make
 from simgen.dataset.prepared import prepare
 from simgen.dataset.reuse import Reuse
@@ -30,7 +30,7 @@ class DatasetJob:
         prepared = prepare(self.sweep.recipe(piece), self.sweep.near)
         folder = self.out / self.sweep.folder(piece)
         # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
-        manifest = finished(folder, identity_of(prepared), content=False)
+        manifest = finished(folder, prepared.identity, content=False)
         return row_of(self.sweep, piece, self.out, manifest or make(prepared, folder, silent, self.reuse))
 
     def name(self, piece: int) -> str:

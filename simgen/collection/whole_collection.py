@@ -19,7 +19,7 @@ def generate_collection(sweep: Sweep, out: Path, crew: Crew = ALONE, report: Rep
     interrupted. Raises `InputError` for a folder that holds anything else, and what is no fault of a
     single dataset, such as a full disk.
     """
-    backend.choose()  # before anything is handed out: what cannot run here is told once
+    backend.choose()  # before work is distributed: a missing backend is reported once
     out = out.resolve()
     with named_in_errors(out):
         begin(sweep, out)

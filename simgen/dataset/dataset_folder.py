@@ -1,6 +1,5 @@
 """Whose folder it is: what identifies a dataset, finished ones, and unfinished ones that one run works on."""
 
-import hashlib
 import json
 import os
 from collections.abc import Iterator
@@ -10,31 +9,8 @@ from typing import Any
 
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import is_locked, locked
-from pcii.io.dataset_layout import FORMAT_VERSION, MANIFEST, MARKER, REMEDY, read_manifest
-from pcii.io.sealed_json import check_file, hash_file
-from simgen.base.asset_names import asset
-from simgen.dataset.prepared import Prepared
-from simgen.spec.scene import scene_files
-
-
-def identity_of(prepared: Prepared) -> str:
-    """Hash of all that decides the dataset's content, but for the machine."""
-    content = content_of_scene(prepared) | {
-        "recipe": prepared.recipe.model_dump(mode="json"),
-        "format_version": FORMAT_VERSION,
-    }
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-
-
-def content_of_scene(prepared: Prepared) -> dict[str, Any]:
-    """All that decides what the sensor sees of a scene: its values, hashes of its files, sensitivities."""
-    scene, folder, curves = prepared.scene, prepared.folder, prepared.curves
-    assets = {str(name): asset(folder, name, where) for where, name in scene_files(scene)}
-    return {
-        "scene": scene.model_dump(mode="json"),
-        "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
-        "sensitivities": None if curves is None else curves.tolist(),
-    }
+from pcii.io.dataset_layout import MANIFEST, MARKER, REMEDY, read_manifest
+from pcii.io.sealed_json import check_file
 
 
 def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:

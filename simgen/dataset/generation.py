@@ -22,7 +22,7 @@ from pcii.io.dataset_layout import (
     write_manifest,
 )
 from pcii.io.sealed_json import list_files
-from simgen.dataset.dataset_folder import check_free, claimed, finished, identity_of, whole
+from simgen.dataset.dataset_folder import check_free, claimed, finished, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
@@ -60,7 +60,7 @@ def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> 
     else is refused with `InputError`.
     """
     prepared = prepare(recipe, near)
-    return finished(out, identity_of(prepared)) or make(prepared, out, report, Reuse())
+    return finished(out, prepared.identity) or make(prepared, out, report, Reuse())
 
 
 def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     `BusyError` if another process is at it.
     """
     check_free(out)
-    recipe, identity = prepared.recipe, identity_of(prepared)
+    recipe, identity = prepared.recipe, prepared.identity
     needs = needs_of(recipe)
     check_resources(needs, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)

@@ -1,10 +1,17 @@
 """A recipe with all that it names, and the parts of it that each stage of the work takes."""
 
+import hashlib
+import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from pcii.io.dataset_layout import FORMAT_VERSION
+from pcii.io.sealed_json import hash_file
+from simgen.base.asset_names import asset
 from simgen.cameras.calibration import rig_of
 from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Capture
@@ -13,7 +20,7 @@ from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Analysis, Recipe
-from simgen.spec.scene import Scene, load_scene
+from simgen.spec.scene import Scene, load_scene, scene_files
 
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""
@@ -30,6 +37,25 @@ class Prepared:
     scene: Scene
     folder: Path
     curves: np.ndarray | None
+
+    @cached_property
+    def scene_content(self) -> dict[str, Any]:
+        """All that decides what the sensor sees of the scene: its values, hashes of its files, curves."""
+        assets = {str(name): asset(self.folder, name, where) for where, name in scene_files(self.scene)}
+        return {
+            "scene": self.scene.model_dump(mode="json"),
+            "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
+            "sensitivities": None if self.curves is None else self.curves.tolist(),
+        }
+
+    @cached_property
+    def identity(self) -> str:
+        """Hash of all that decides the dataset's content, but for the machine."""
+        content = self.scene_content | {
+            "recipe": self.recipe.model_dump(mode="json"),
+            "format_version": FORMAT_VERSION,
+        }
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""

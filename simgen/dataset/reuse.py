@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pcii.base.safe_files import new_folder_safely
-from simgen.dataset.dataset_folder import content_of_scene
 from simgen.dataset.prepared import Prepared, least_samples
 from simgen.photons.counting_plan import Plan
 from simgen.photons.exploration import Exploration
@@ -87,7 +86,7 @@ def in_common(reuse: Reuse, prepared: Prepared, engine: dict[str, Any]) -> InCom
     """What a dataset may have in common with those before it; `engine` describes the backend."""
     recipe = prepared.recipe
     values = recipe.model_dump(mode="json")
-    scene = _key(content_of_scene(prepared), recipe.render.max_depth, engine["variant"])
+    scene = _key(prepared.scene_content, recipe.render.max_depth, engine["variant"])
     # Errors of cameras are drawn from the seed.
     cameras = _key(scene, values["grid"], None if recipe.grid.errors is None else recipe.seed)
     light = "sensor", "photons", "exposure"

@@ -9,13 +9,13 @@ In the pyproject.toml of such a package:
 whenever it is asked. Files that the scene names are looked for beside the module of the function.
 """
 
-import re
 import sys
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
+from pcii.base.extensions import package_of, registered
 from simgen.drawn import GENERATORS
 
 GROUP = "simgen.scenes"
@@ -28,7 +28,7 @@ def generators() -> dict[str, str]:
     not imported.
     """
     found = {name: (function.__doc__ or "").splitlines()[0] for name, function in GENERATORS.items()}
-    return found | {name: f"Made by {_package(point)}." for name, point in _registered().items()}
+    return found | {name: f"Made by {package_of(point)}." for name, point in _registered().items()}
 
 
 def generated(name: str, number: int) -> tuple[dict[str, Any], Path]:
@@ -40,7 +40,7 @@ def generated(name: str, number: int) -> tuple[dict[str, Any], Path]:
         function, module = GENERATORS[name], GENERATORS[name].__module__
         return function(number), _folder_of(module)
     point = _registered()[name]
-    label = f"scene: {name!r} of {_package(point)}"
+    label = f"scene: {name!r} of {package_of(point)}"
     try:
         values = point.load()(number)
     except Exception as fault:  # another package's function may raise anything
@@ -52,25 +52,9 @@ def generated(name: str, number: int) -> tuple[dict[str, Any], Path]:
 
 def _registered() -> dict[str, EntryPoint]:
     """Generators of other packages by name."""
-    found: dict[str, EntryPoint] = {}
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
-        label = f"{GROUP}: {point.value} of {_package(point)}"
-        own = GENERATORS.get(point.name)
-        if own is not None and point.value == f"{own.__module__}:{own.__name__}":
-            continue
-        if own is not None:
-            raise InputError(f"{label} takes the name of the built-in {point.name!r}; it needs another name")
-        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", point.name):
-            raise InputError(f"{label} is named {point.name!r}; use letters, digits, '-', '_' and '.'")
-        if point.name in found and found[point.name].value != point.value:
-            raise InputError(f"{label} and {found[point.name].value} are both named {point.name!r}")
-        found[point.name] = point
-    return found
+    own = {name: f"{function.__module__}:{function.__name__}" for name, function in GENERATORS.items()}
+    return registered(GROUP, GENERATORS, own)
 
 
 def _folder_of(module: str) -> Path:
     return Path(sys.modules[module].__file__ or "").parent
-
-
-def _package(point: EntryPoint) -> str:
-    return f"the package {point.dist.name}" if point.dist else "a package"

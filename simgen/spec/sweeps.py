@@ -104,8 +104,9 @@ class Sweep:
         first = self.values(0)
         self._recipe_with(first)
         for axis in self.axes:
-            whole = type(axis.values[0]) is int and len(axis.values) > 2  # of these the ends decide
-            for value in (min(axis.values), max(axis.values)) if whole else axis.values[1:]:
+            # Of a range the ends decide: what whole numbers may be is bounded from below and above.
+            ends = isinstance(axis.values, range)
+            for value in (axis.values[0], axis.values[-1]) if ends else axis.values:
                 self._recipe_with(first | {axis.field: value})
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from tiny import with_radiance
 
 from pcii.base.errors import InputError
 from pcii.io.collection import open_collection
@@ -19,23 +20,7 @@ from simgen.spec.sweeps import Sweep, load_sweep
 pytestmark = [pytest.mark.renders, pytest.mark.slow]
 TIMES = 1000
 SIZES = 20
-TOML = """
-scene = "plain_pair"
-seed = { range = [0, 4] }
-[grid]
-rows = 2
-cols = 3
-pitch_mm = [18.0, 18.0]
-pixel_mm = 0.5632
-height = 64
-width = 60
-[photons]
-budget = 200
-[render]
-samples_per_pixel = 2
-[products]
-radiance = "mosaic"
-"""
+TOML = with_radiance(4)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from tiny import GRID_2_X_2
 
 from pcii.base.crew import Crew
 from pcii.base.errors import InputError
@@ -18,18 +19,7 @@ from simgen.spec.sweeps import load_sweep
 
 distributed = pytest.importorskip("distributed")
 pytestmark = pytest.mark.renders
-TOML = """
-scene = "plain_pair"
-[grid]
-rows = 2
-cols = 2
-pitch_mm = [18.0, 18.0]
-pixel_mm = 1.0
-height = 32
-width = 36
-[photons]
-budget = 100
-"""
+TOML = f'scene = "plain_pair"\n{GRID_2_X_2}[photons]\nbudget = 100\n'
 
 
 @pytest.fixture

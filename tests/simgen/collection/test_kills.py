@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from tiny import with_radiance
 
 from pcii.io.collection import open_collection
 from pcii.io.dataset_layout import MANIFEST, MARKER
@@ -17,23 +18,7 @@ from pcii.io.verification import verify
 
 pytestmark = [pytest.mark.renders, pytest.mark.slow]
 KILLS = 200
-TOML = """
-scene = "plain_pair"
-seed = { range = [0, 12] }
-[grid]
-rows = 2
-cols = 3
-pitch_mm = [18.0, 18.0]
-pixel_mm = 0.5632
-height = 64
-width = 60
-[photons]
-budget = 200
-[render]
-samples_per_pixel = 2
-[products]
-radiance = "mosaic"
-"""
+TOML = with_radiance(12)
 
 
 def start(recipe: Path, out: Path, workers: int) -> subprocess.Popen[bytes]:

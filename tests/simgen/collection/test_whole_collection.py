@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from tiny import GRID_2_X_3
 
 from pcii.base import command_line
 from pcii.base.crew import Crew
@@ -26,19 +27,7 @@ from simgen.spec.recipe import load_recipe
 from simgen.spec.sweeps import Sweep, load_sweep
 
 pytestmark = pytest.mark.renders
-TOML = """
-scene = "plain_pair"
-seed = 7
-[grid]
-rows = 2
-cols = 3
-pitch_mm = [18.0, 18.0]
-pixel_mm = 0.5632
-height = 64
-width = 60
-[photons]
-budget = [100, 200]
-"""
+TOML = f'scene = "plain_pair"\nseed = 7\n{GRID_2_X_3}[photons]\nbudget = [100, 200]\n'
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from tiny import GRID_2_X_2
 
 from pcii.base.progress import silent
 from simgen.dataset import generation as module
@@ -13,19 +14,7 @@ from simgen.dataset.reuse import Reuse
 from simgen.spec.recipe import load_recipe
 
 pytestmark = pytest.mark.renders
-TOML = """
-scene = "plain_pair"
-seed = 3
-[grid]
-rows = 2
-cols = 2
-pitch_mm = [18.0, 18.0]
-pixel_mm = 1.0
-height = 32
-width = 36
-[photons]
-budget = 100
-"""
+TOML = f'scene = "plain_pair"\nseed = 3\n{GRID_2_X_2}[photons]\nbudget = 100\n'
 ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
 OTHERS = {
     "another seed": ["seed=4"],

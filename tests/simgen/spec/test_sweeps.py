@@ -95,6 +95,8 @@ def test_values_that_make_no_plain_name_are_told_apart_by_a_hash(recipe_file: st
             "photons.budget=[100, -1]",
             r"at photons.budget = -1, .*greater than 0|photons.budget.*greater than 0",
         ),
+        ('photons.budget=[100, "many", 300]', "photons.budget"),
+        ("grid.rows=[2, 2.5, 4]", "grid.rows"),
         ("seed={range=[1]}", r"seed: range: expected \[first, end\]"),
         ("seed={range=[1, 2.5]}", r"seed: range: expected \[first, end\]"),
         ("seed={range=[1, 9, 0]}", "a step of 0 never ends"),
