@@ -1,7 +1,5 @@
 """Many datasets of one recipe: sweeps over its fields and draws of its scene, made by one process or many.
 
-x
-
 collection_folder  The folder of a collection that is being made: whose it is, and the index of what is
                    finished.
 dataset_job        The job of making the datasets of a sweep, piece by piece; several processes at once
