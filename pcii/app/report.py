@@ -70,7 +70,7 @@ def _made(manifest: Mapping[str, Any], name: str, timings_s: Mapping[str, float]
     if photons.get("method") == "thinning":
         value = (
             f"drawn one by one: {photons['paths']:,} light paths for {photons['total']:,} photons, where "
-            f"rendering every pixel would have taken {photons['dense_paths_instead']:,}"
+            f"rendering every pixel would have taken at least {photons['dense_paths_instead']:,}"
         )
         rows.append(("photons", value))
     elif photons.get("method") == "dense":

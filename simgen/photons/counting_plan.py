@@ -48,11 +48,11 @@ class Plan:
 
     thins: bool
     samples: int
-    """Samples per pixel of the dense views, if the counts are drawn from such."""
+    """Samples per pixel of the dense views that the counts are drawn from, or would need at least."""
     photons_per_view: float
-    noise: float
+    noise: float = 0.0
     """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
-    normaliser_error: float
+    normaliser_error: float = 0.0
     """Standard error of the light that a dense view's budget is divided by, as a share of it."""
     depths_mm: tuple[float, ...] = ()
     """Some of the depths that the corner cameras see, if photons are thinned."""
@@ -62,31 +62,40 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
     """Thin, or render densely, whichever takes less time for counts without rendering noise.
 
     Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
-    each needs, which are more the more light there is. Where it cannot take enough, photons are thinned
-    as long as there is memory for them. The seed has no part in it (see `PROBE_SEED`). `kind` is that of the
-    backend; views that are rendered in any case have `least_samples` per pixel. Raises `InputError` for
-    nested budgets of too many photons.
+    each needs, which are more the more light there is. A probe of the light tells how many, unless a budget
+    is so small that one sample for each pixel takes longer than all its photons. Where dense rendering
+    cannot take enough, photons are thinned as long as there is memory for them. The seed has no part in it
+    (see `PROBE_SEED`). `kind` is that of the backend; views that are rendered in any case have
+    `least_samples` per pixel. Raises `InputError` for nested budgets of too many photons.
     """
     grid = capture.grid
     pixels = grid.height * grid.width
+    photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
+    if kind == "scalar":
+        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+
+    def is_cheaper(photons_per_view: float, samples: int) -> bool:
+        return photon_cost * photons_per_view <= (sample_cost * samples + PIXEL_COST) * pixels
+
+    def are_few(photons_per_view: float) -> bool:
+        return photons_per_view * grid.view_count <= MOST_SINGLE_PHOTONS
+
+    per_view = _budget_per_view(capture)
+    if per_view is not None and is_cheaper(per_view, least_samples) and are_few(per_view):
+        return Plan(True, least_samples, per_view, depths_mm=first_hit_depths_mm(render_scene, grid))
     probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
     per_view, gain = _photons(capture, probed)
     scope_pixels = _scope_pixels(capture)
     samples = probed.samples_for(gain, scope_pixels)
     samples = min(max(samples, least_samples), (MOST_PATHS - 1) // pixels)
-    photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
-    if kind == "scalar":
-        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
     noise = probed.photon_noise(gain, samples)
-    cheaper = photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
-    few = per_view * grid.view_count <= MOST_SINGLE_PHOTONS
-    if capture.photons.nested and not few:
+    if capture.photons.nested and not are_few(per_view):
         raise InputError(
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
     # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
-    thins = few and probed.mean > 0 and (cheaper or noise > NOISE_SHARE)
+    thins = are_few(per_view) and probed.mean > 0 and (is_cheaper(per_view, samples) or noise > NOISE_SHARE)
     return Plan(
         thins=thins,
         samples=samples,
@@ -97,17 +106,23 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
     )
 
 
+def _budget_per_view(capture: Capture) -> float | None:
+    """Photons of a view that a budget asks for; None for an exposure."""
+    scopes = {"view": 1.0, "channel": float(channel_count(capture.cfa)), "scene": 1 / capture.grid.view_count}
+    share = scopes.get(capture.photons.scope)
+    return None if share is None else capture.photons.budget * share
+
+
 def _photons(capture: Capture, probed: Probe) -> tuple[float, float]:
     """Photons that a view is expected to have, and those of a pixel and a unit of radiance.
 
     For a budget the second is estimated from what the virtual centre sees, for an exposure the first.
     """
-    grid, gain = capture.grid, capture.photons_per_radiance
-    pixels = grid.height * grid.width
-    if gain is not None:
+    gain, per_view = capture.photons_per_radiance, _budget_per_view(capture)
+    pixels = capture.grid.height * capture.grid.width
+    if per_view is None:
+        assert gain is not None
         return gain * probed.mean * pixels, gain
-    scopes = {"view": 1.0, "channel": float(channel_count(capture.cfa)), "scene": 1 / grid.view_count}
-    per_view = capture.photons.budget * scopes[capture.photons.scope]
     return per_view, per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
 
 

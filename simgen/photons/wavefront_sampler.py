@@ -51,7 +51,7 @@ class WavefrontSampler:
         mi, dr = setup.render_scene.mi, load_drjit()
         sampler = _sampler(mi, seed, group.size)
         candidates = self.arrays.draw(sampler, unsigned(mi, group), _views(setup, sampler, view), self.light)
-        first = self._hit_first(candidates)
+        first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
         where = candidates.entry * setup.channels + candidates.colour
         bound, radiance_ratio_bound = (
             dr.gather(mi.Float, self.arrays.bound, where),
@@ -62,10 +62,9 @@ class WavefrontSampler:
             bound,
             dr.maximum(radiance_ratio_bound * guess, dr.gather(mi.Float, self.arrays.dim, candidates.colour)),
         )
-        promising = candidates.inside & (sampler.next_1d() * bound < most)
+        promising = candidates.inside & (threshold * bound < most)
         promising &= mi.UInt32(self.arrays.owner_of(candidates, first.z_mm)) == candidates.entry
-        chance = sampler.next_1d()
-        dr.eval(promising, vars(candidates), vars(first), most, chance)
+        dr.eval(promising, most, chance)
         rest = dr.compress(promising)
         if len(rest) == 0:
             return nothing(setup.channels)
@@ -73,7 +72,7 @@ class WavefrontSampler:
         light = self._follow(candidates, first, seed)
         ratio = self._in_own_colour(light, candidates) / dr.gather(mi.Float, most, rest)
         multiplicity = mi.UInt32(ratio + dr.gather(mi.Float, chance, rest))
-        dr.eval(multiplicity, ratio, light)
+        dr.eval(multiplicity, ratio)
         kept, over = dr.compress(multiplicity > 0), dr.compress(ratio > 1)
         photon, hit = _take(candidates, kept), _take(first, kept)
         candidate, multiplicity = dr.gather(mi.UInt32, rest, kept), dr.gather(mi.UInt32, multiplicity, kept)
@@ -101,14 +100,12 @@ class WavefrontSampler:
         mi, dr = setup.render_scene.mi, load_drjit()
         view, i, j = even_film_points(setup.grid, rays, np.random.default_rng(seed))
         candidates = self.arrays.at(_sampler(mi, seed, view.size), view, i, j, self.light)
-        dr.eval(vars(candidates))
         some = dr.arange(mi.UInt32, min(follow, view.size))
         guess, light = [0.0] * setup.channels, [0.0] * setup.channels
         z_mm = None
         for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):
             recoloured = replace(candidates, colour=colour)
             first = self._hit_first(recoloured)
-            dr.eval(vars(first))
             followed = _take(recoloured, some)
             found = self._follow(followed, _take(first, some), seed + turn)
             part = self.light.per_colour(first.guess, colour, candidates.wavelength_sample)
@@ -119,9 +116,16 @@ class WavefrontSampler:
             z_mm = first.z_mm
         return _samples(candidates, z_mm, guess, light)
 
+    # Pilots and candidates are traced by the same two kernels, which know nothing of where rays come from and
+    # what becomes of them: kernels that do would be compiled for each, and those of a scene are large.
+
     def _hit_first(self, candidates: Candidates) -> FirstHits:
+        dr = load_drjit()
+        dr.make_opaque(vars(candidates))
         ambient = self.light.spread(self.ambient, candidates.colour, candidates.wavelength_sample)
-        return hit_first(self.setup.render_scene, self._rays(candidates), candidates.inside, ambient)
+        first = hit_first(self.setup.render_scene, self._rays(candidates), candidates.inside, ambient)
+        dr.eval(vars(first))
+        return first
 
     def _rays(self, candidates: Candidates) -> Any:
         at = candidates.k, candidates.l, candidates.row_px, candidates.col_px, candidates.lens_point
@@ -130,11 +134,14 @@ class WavefrontSampler:
 
     def _follow(self, candidates: Candidates, first: FirstHits, seed: int) -> Any:
         """Radiance along one path from each first hit, as rays carry it."""
+        render_scene, dr = self.setup.render_scene, load_drjit()
+        dr.make_opaque(vars(candidates), vars(first))
         # Not the candidates' numbers, which decided which of them are followed.
-        sampler = _sampler(self.setup.render_scene.mi, seed ^ PATH_SEED_MASK, len(candidates.k))
-        return radiance_along(
-            self.setup.render_scene, self._rays(candidates), first.record, sampler, self.setup.max_depth
-        )
+        sampler = _sampler(render_scene.mi, seed ^ PATH_SEED_MASK, len(candidates.k))
+        rays = self._rays(candidates)
+        light = radiance_along(render_scene, rays, first.record, sampler, self.setup.max_depth)
+        dr.eval(light)
+        return light
 
     def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
         """What each candidate's pixel gets of radiance that rays carry."""

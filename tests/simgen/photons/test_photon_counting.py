@@ -342,6 +342,22 @@ def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: d
 
 
 @pytest.mark.renders
+def test_light_is_not_probed_where_it_cannot_change_the_plan(
+    two_objects: RenderScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: Any) -> None:
+        raise AssertionError("probed")
+
+    monkeypatch.setattr(module, "probe", refuse)
+    # One sample for each of 4096 pixels takes as long as 218 photons.
+    assert planned(recipe(grid=PROBED, photons={"budget": 215}), two_objects, "llvm").thins
+    exposure = recipe(grid=PROBED, photons={"scope": "exposure"}, exposure={})
+    for needs_probe in (recipe(grid=PROBED, photons={"budget": 221}), exposure):
+        with pytest.raises(AssertionError, match="probed"):
+            planned(needs_probe, two_objects, "llvm")
+
+
+@pytest.mark.renders
 def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objects: RenderScene) -> None:
     # Some hundred photons per pixel, whose rates are not known to 1 % of their own noise.
     bright = recipe(grid=PROBED, photons={"budget": 3e5})
@@ -351,11 +367,13 @@ def test_what_dense_rendering_cannot_do_exactly_is_thinned_at_any_cost(two_objec
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize(("scope", "pixels"), [("view", 4096), ("channel", 1024), ("scene", 6 * 4096)])
+@pytest.mark.parametrize(
+    ("scope", "budget", "pixels"), [("view", 250, 4096), ("channel", 84, 1024), ("scene", 1500, 6 * 4096)]
+)
 def test_a_budget_is_divided_by_light_that_is_known_well(
-    two_objects: RenderScene, scope: str, pixels: int
+    two_objects: RenderScene, scope: str, budget: float, pixels: int
 ) -> None:
-    dim = recipe(grid=PROBED, photons={"budget": 0.1, "scope": scope})
+    dim = recipe(grid=PROBED, photons={"budget": budget, "scope": scope})
     seen = probe(two_objects, dim.grid.camera_grid(), "GRBG", PROBE_SEED)
     made = planned(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
@@ -413,7 +431,7 @@ def test_darkness_is_planned_too() -> None:
     wall = {"title": "dark", "lights": [light], "backdrop": {"z_mm": 500.0}}
     dark = build(backend.load(), Scene.model_validate(wall), Path(), 3)
     for kind in ("llvm", "scalar"):
-        made = planned(recipe(grid=PROBED), dark, kind)
+        made = planned(recipe(grid=PROBED, photons={"budget": 1000}), dark, kind)
         assert (made.thins, made.samples, made.noise, made.normaliser_error) == (False, 1, 0, 0)
     # What the virtual centre sees says nothing about how large a budget is.
     with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
