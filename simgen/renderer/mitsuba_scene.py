@@ -45,6 +45,8 @@ def build(
     `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
     `InputError` for a mesh or texture that cannot be used.
     """
+    if not mi.variant().startswith("scalar"):
+        load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
     assets = read_assets(scene, folder)
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
     plugins: dict[str, Any] = {
