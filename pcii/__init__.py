@@ -15,6 +15,7 @@ from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.comparison import evaluate
+from pcii.exporting.export_formats import export_dataset
 from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.metrics.scoring import score
@@ -39,6 +40,7 @@ __all__ = [
     "demosaic",
     "estimate_depth",
     "evaluate",
+    "export_dataset",
     "open_collection",
     "open_dataset",
     "reconstruct",

@@ -18,6 +18,7 @@ ROOMS = {
         "io",
         "imaging",
         "sections",
+        "exporting",
         "evidence",
         "depth",
         "removal.three_step",
@@ -45,9 +46,9 @@ ROOMS = {
         "app",
     ],
 }
-# What simgen may share with pcii: types, masks, the file format and how commands behave. Not its geometry
+# What simgen may share with pcii: types, masks, file formats and how commands behave. Not its geometry
 # or anything built on it, so that simulation and reconstruction cannot share a sign mistake.
-SHARED_ROOMS = {"base", "core", "io"}
+SHARED_ROOMS = {"base", "core", "io", "exporting"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

@@ -307,3 +307,18 @@ def test_preview_writes_a_picture(tmp_path: Path) -> None:
     out = tmp_path / "look.png"
     assert command_line.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
     assert np.asarray(Image.open(out)).std() > 10
+
+
+def test_export_writes_the_photons_of_a_budget(
+    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    command = ["export", str(nested_dataset), "--format", "events", "-o", str(tmp_path / "out")]
+    assert command_line.run(simgen_cli.app, [*command, "--budget", "30"]) == 0
+    assert "1 files" in capsys.readouterr().out
+    with np.load(tmp_path / "out" / "events.npz") as arrays:
+        total = int(arrays["n"].sum())
+        assert arrays["photon_z_mm"].shape == (total,)
+    # 6 views of 30 photons and 64 x 60 pixels of 0.01 dark counts: 410 counts, give or take 20.
+    assert abs(total - 410) < 100
+    assert "holds something else" in refusal(simgen_cli.app, command, capsys)
+    assert "tiff" in refusal(simgen_cli.app, [*command[:3], "tiff", *command[4:]], capsys)

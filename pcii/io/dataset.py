@@ -91,11 +91,16 @@ class Dataset(Brief):
     def _counts_name(self) -> str:
         return nested_name(COUNTS, self.budget)
 
+    @property
+    def has_counts(self) -> bool:
+        """Whether the dataset has photon counts."""
+        return self.has(self._counts_name)
+
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
-        if not self.has(part):
+        if not self.has_counts:
             raise InputError(f"{self.path}: this dataset has no counts; its recipe left them out")
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         arrays = self._arrays(part, COUNTS_LABELS, names)
@@ -109,9 +114,9 @@ class Dataset(Brief):
     @cached_property
     def truth(self) -> Truth | None:
         """Ground truth of the virtual centre camera, or None if the dataset has none."""
-        if not self.has(f"{TRUTH}/z_mm"):
+        if not self.has_truth_array("z_mm"):
             return None
-        optional = tuple(name for name in OPTIONAL_MAPS if self.has(f"{TRUTH}/{name}"))
+        optional = tuple(name for name in OPTIONAL_MAPS if self.has_truth_array(name))
         arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
         names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
         photons = self._photon_truth()
@@ -119,6 +124,16 @@ class Dataset(Brief):
             return Truth(**arrays, names=names, photons=photons)
         except InputError as fault:
             raise InputError(f"{self.path / TRUTH}: {fault}") from None
+
+    def has_truth_array(self, name: str) -> bool:
+        """Whether the dataset has this array of `truth.zarr`; docs/dataset.md lists them."""
+        return self.has(f"{TRUTH}/{name}")
+
+    def truth_array(self, name: str) -> np.ndarray:
+        """An array of `truth.zarr` by name, such as `view_z_mm`; raises `InputError` if it is not there."""
+        if name not in TRUTH_LABELS or not self.has_truth_array(name):
+            raise InputError(f"{self.path}: there is no {name!r} in its {TRUTH}")
+        return self._arrays(TRUTH, TRUTH_LABELS, (name,))[name]
 
     def _photon_truth(self) -> PhotonTruth | None:
         part = nested_name(PHOTON_TRUTH, self.budget)

@@ -4,7 +4,7 @@ import math
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
@@ -144,6 +144,45 @@ def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))
 
     write_sheet(dataset, out)
     say(f"{out}")
+
+
+@app.command
+def export(
+    dataset: Path,
+    *,
+    format: Literal["hci", "saii", "events", "exr"],
+    out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    budget: float | None = None,
+) -> None:
+    """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.
+
+    hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
+    events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view.
+
+    Examples:
+
+        simgen export out/paper --format events -o out/paper-events
+
+        simgen export out/small --format hci -o out/hci/small
+
+        simgen export out/paper --format saii --budget 300 -o out/paper-300
+
+    Parameters
+    ----------
+    dataset
+        A dataset folder.
+    out
+        Folder for the files: new or empty.
+    budget
+        Export the photons of this smaller, nested budget of the recipe.
+    """
+    from pcii.exporting.export_formats import export_dataset
+    from pcii.io.dataset import open_dataset
+
+    data = open_dataset(dataset)
+    folder = export_dataset(data if budget is None else data.at_budget(budget), format, out)
+    files = [file for file in folder.rglob("*") if file.is_file()]
+    say(f"{folder}: {len(files)} files, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")
 
 
 @app.command

@@ -1,0 +1,15 @@
+"""Datasets in the file formats of other people's tools.
+
+event_archive        Photon events, camera grid and truth in one NumPy archive.
+export_formats       The formats that a dataset can be written in, by name, and the folder that is
+                     written.
+exr_parts            One OpenEXR file: a part for each view with its radiance and photons, and one with
+                     the truth.
+hci_layout           The layout of the 4D Light Field Benchmark of Konstanz and Heidelberg (Honauer et
+                     al., ACCV 2016).
+pixel_files          Files of pixels that other tools read: PNG of 8 and 16 bits, PFM.
+sub_aperture_images  Sub-aperture images: a PNG for each view, named by row and column of its camera, and
+                     the cameras as JSON.
+view_names           Names of views in files: camera (k, l) with as many digits as the grid needs, so that
+                     they sort.
+"""

@@ -1,0 +1,32 @@
+"""Files of pixels that other tools read: PNG of 8 and 16 bits, PFM."""
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+
+def write_png(path: Path, image: np.ndarray) -> None:
+    """Write an image (H, W) or (H, W, 3), uint8 or uint16, as PNG.
+
+    Pillow, which draws the other pictures, has no colour images of 16 bits.
+    """
+    import png
+
+    height, width = image.shape[:2]
+    rows = np.ascontiguousarray(image, dtype=image.dtype.newbyteorder(">")).reshape(height, -1)
+    bits, grey = 8 * image.dtype.itemsize, image.ndim == 2
+    writer = png.Writer(width, height, greyscale=grey, bitdepth=bits)  # pyright: ignore[reportArgumentType]
+    buffer = io.BytesIO()
+    writer.write_packed(buffer, rows.view(np.uint8))
+    path.write_bytes(buffer.getvalue())
+
+
+def write_pfm(path: Path, values: np.ndarray) -> None:
+    """Write a map (H, W) as float32 PFM: rows from the bottom to the top, the scale -1 for little endian.
+
+    Debevec's Portable FloatMap, as described at https://netpbm.sourceforge.net/doc/pfm.html.
+    """
+    height, width = values.shape
+    header = f"Pf\n{width} {height}\n-1\n".encode()
+    path.write_bytes(header + values[::-1].astype("<f4").tobytes())
