@@ -29,37 +29,18 @@ from pcii.base.safe_files import (
     temporary_folder,
     write_json_safely,
 )
+from pcii.core.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.section_stack import Sections
 from pcii.io.dataset import Dataset
-from pcii.io.dataset_layout import MAP_AXES, lists_part
+from pcii.io.dataset_layout import lists_part
 from pcii.io.results_list import RESULTS, read_results, write_results
 from pcii.io.sealed_json import list_files
-from pcii.io.zarr_groups import Label, read_array, write_arrays
+from pcii.io.zarr_groups import read_array, write_arrays
 from pcii.sections.reconstruction import reconstruct
 
 REMEDY = "make it again"
 LOCK = ".results.lock"
-
-PLANE_AXES = ("plane", *MAP_AXES)
-_Z_MM = Label(("plane",), "planar depth of each section", "mm")
-SECTIONS_LABELS = {
-    "z_mm": _Z_MM,
-    "counts": Label((*PLANE_AXES, "channel"), "sum of the samples that meet at each voxel", "photons"),
-    "coverage": Label((*PLANE_AXES, "channel"), "how many samples that was", "samples"),
-}
-SEGMENTED_LABELS = {
-    "z_mm": _Z_MM,
-    "in_focus": Label(PLANE_AXES, "whether the voxel is in focus"),
-    "photon_in_focus": Label(
-        ("plane", "event"),
-        "whether the photons of each event, in (k, l, i, j) order, come from what is in focus",
-    ),
-}
-DEPTH_LABELS = {
-    "z_mm": Label(MAP_AXES, "planar depth at the virtual centre; NaN where there is no answer", "mm"),
-    "confidence": Label(MAP_AXES, "from 0 (no answer) to 1"),
-}
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes, sRGB.
 
+array_labels   What every array is: the names of its axes, its meaning and its unit, in files and in
+               xarray alike.
 arrays         Checks of arrays that all types share.
 bayer          Bayer colour filter arrays: which colour each pixel records.
 camera_grid    The grid of cameras: positions and intrinsic parameters.
@@ -12,4 +14,6 @@ section_stack  Sections: the scene reconstructed at several depths, with the num
                voxel.
 srgb           Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
+xarray_form    Labelled copies of the types for xarray: named axes, coordinates with units, the grid as
+               attributes.
 """

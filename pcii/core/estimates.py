@@ -2,14 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, span, table, times
+from pcii.core.array_labels import DEPTH_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.section_stack import Sections
+from pcii.core.xarray_form import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,6 +88,10 @@ class DepthMap(Brief):
         answered = self.z_mm[np.isfinite(self.z_mm)]
         share = f"{answered.size / max(1, self.z_mm.size):.2%}"
         return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """`z_mm` and `confidence` over pixels."""
+        return labelled_dataset({"z_mm": self.z_mm, "confidence": self.confidence}, DEPTH_LABELS)
 
 
 @dataclass(frozen=True, repr=False)

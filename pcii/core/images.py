@@ -1,15 +1,20 @@
 """Elemental images: the radiance of every view."""
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, times
+from pcii.core.array_labels import VIEWS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.xarray_form import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class ArrayLike5D(Protocol):
@@ -59,6 +64,11 @@ class Views(Brief):
     def channel_count(self) -> int:
         """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """`radiance` over cameras, pixels and channels; views on disk are all read."""
+        arrays = {"radiance": np.asarray(self.radiance)}
+        return labelled_dataset(arrays, VIEWS_LABELS, grid=self.grid, cfa=self.cfa)
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

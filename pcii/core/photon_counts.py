@@ -3,14 +3,20 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, times
+from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.xarray_form import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40
@@ -176,6 +182,11 @@ class PhotonCounts(Brief):
     def channel_count(self) -> int:
         """Number of colours of sections of these counts: 3, or 1 for monochrome."""
         return channel_count(self.cfa)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The counts as they are kept: events `k`, `l`, `i`, `j`, `n`, or `dense` over cameras and pixels."""
+        arrays = {n: getattr(self.events, n) for n in "klijn"} if self.is_sparse else {"dense": self.dense}
+        return labelled_dataset(arrays, COUNTS_LABELS, grid=self.grid, cfa=self.cfa)
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.

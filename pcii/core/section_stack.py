@@ -1,17 +1,22 @@
 """Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, times
+from pcii.core.array_labels import SECTIONS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
+from pcii.core.xarray_form import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray
 
 Normalisation = Literal["overlap", "views"]
 Shifts = Literal["nearest", "bilinear", "even"]
@@ -84,3 +89,15 @@ class Sections(Brief):
         mean = np.zeros(self.counts.shape, dtype=np.float64)
         np.divide(self.counts, self.coverage, out=mean, where=self.coverage > 0)
         return read_only(mean)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """`counts`, `coverage`, `estimate` and, if known, `variance` over planes, voxels and channels."""
+        arrays = {"counts": self.counts, "coverage": self.coverage, "estimate": self.estimate}
+        if self.variance is not None:
+            arrays["variance"] = self.variance
+        labels = SECTIONS_LABELS
+        if self.counts.dtype.kind not in "iu":  # of radiance, whose unit is not known here
+            labels = {name: replace(label, unit="1") for name, label in labels.items()}
+        return labelled_dataset(
+            arrays, labels, grid=self.grid, cfa=self.cfa, planes_mm=self.z_mm, subpixel=self.subpixel
+        )

@@ -1,13 +1,22 @@
 """Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, span, times
+from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS
 from pcii.core.arrays import read_only
+from pcii.core.xarray_form import labelled_dataset
+
+if TYPE_CHECKING:
+    import xarray
+
+OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
+"""Maps that a dataset may lack."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,6 +78,23 @@ class Truth(Brief):
         photons = None if self.photons is None else self.photons.z_mm.size
         objects = listed(list(self.names.values()))
         return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """The maps that are known, over pixels, and `photon_...` (photon,) for each photon.
+
+        Attributes of `object_id` name the objects, by the CF conventions for flags: `flag_values`, and
+        `flag_meanings` with underscores for spaces.
+        """
+        maps = {name: getattr(self, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
+        arrays = {name: values for name, values in maps.items() if values is not None}
+        if self.photons is not None:
+            columns = {column.name: getattr(self.photons, column.name) for column in fields(self.photons)}
+            arrays |= {f"photon_{name}": values for name, values in columns.items()}
+        dataset = labelled_dataset(arrays, TRUTH_LABELS | PHOTON_ORIGIN_LABELS)
+        names = {0: "none"} | dict(self.names)
+        meanings = " ".join(name.replace(" ", "_") for name in names.values())
+        dataset["object_id"].attrs |= {"flag_values": list(names), "flag_meanings": meanings}
+        return dataset
 
     def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
         """Check an optional map and make it read-only; values may exceed the range by rounding, 1e-6."""

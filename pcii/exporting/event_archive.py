@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.core.truth import Truth
-from pcii.io.dataset import OPTIONAL_MAPS, Dataset
+from pcii.core.truth import OPTIONAL_MAPS, Truth
+from pcii.io.dataset import Dataset
 
 ARCHIVE = "events.npz"
 

@@ -10,20 +10,18 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, times
+from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import PhotonTruth, Truth
+from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 from pcii.io.dataset_layout import (
     COUNTS,
-    COUNTS_LABELS,
     MANIFEST,
     PHOTON_TRUTH,
-    PHOTON_TRUTH_LABELS,
     RADIANCE,
     REMEDY,
     TRUTH,
-    TRUTH_LABELS,
     lists_part,
     nested_name,
     radiance_name,
@@ -31,10 +29,7 @@ from pcii.io.dataset_layout import (
 )
 from pcii.io.sealed_json import check_file
 from pcii.io.stored_radiance import StoredRadiance
-from pcii.io.zarr_groups import Label, read_array
-
-OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
-"""Maps of the truth that a dataset may lack."""
+from pcii.io.zarr_groups import read_array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

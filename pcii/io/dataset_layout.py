@@ -22,7 +22,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.safe_files import sync_folder
 from pcii.io.sealed_json import read_sealed, write_sealed
-from pcii.io.zarr_groups import Label
 
 FORMAT = "photon-integral-imaging dataset"
 FORMAT_VERSION = 2
@@ -34,56 +33,6 @@ TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
 REMEDY = "generate the dataset again"
-
-VIEW_AXES = ("camera_row", "camera_col", "row", "col")
-CAMERA_AXES = VIEW_AXES[:2]
-MAP_AXES = VIEW_AXES[2:]
-
-COUNTS_LABELS = {
-    "k": Label(("event",), "row of the camera, from the top"),
-    "l": Label(("event",), "column of the camera, from the left"),
-    "i": Label(("event",), "row of the pixel, from the top"),
-    "j": Label(("event",), "column of the pixel, from the left"),
-    "n": Label(("event",), "photons that the pixel counted", "photons"),
-    "dense": Label(VIEW_AXES, "photons that each pixel counted", "photons"),
-}
-PHOTON_TRUTH_LABELS = {
-    "object_id": Label(
-        ("photon",),
-        "key of the manifest's objects that the photon's path hit first; 0 for the "
-        "backdrop, -1 for a count without a photon",
-    ),
-    "z_mm": Label(("photon",), "planar depth of the first hit; +inf for none", "mm"),
-}
-_MAPS = {
-    "z_mm": Label(MAP_AXES, "planar depth; +inf where nothing is hit", "mm"),
-    "object_id": Label(
-        MAP_AXES, "key of the manifest's objects; 0 for the backdrop and where nothing is hit"
-    ),
-    "normal": Label(
-        (*MAP_AXES, "axis"),
-        "unit normal of the surface in world axes (X right, Y down, Z forward), towards the camera; "
-        "0 where nothing is hit",
-    ),
-    "coverage": Label(
-        MAP_AXES, "share of the pixel's square that belongs to the object (or to none) that its centre hits"
-    ),
-}
-TRUTH_LABELS = {
-    **_MAPS,
-    **{
-        f"view_{name}": Label((*CAMERA_AXES, *label.dims), f"of every camera: {label.meaning}", label.unit)
-        for name, label in _MAPS.items()
-    },
-    "in_focus": Label(
-        ("plane", *MAP_AXES), "blur half-extent of at most 1 px at each depth of in_focus_z_mm"
-    ),
-    "visible_views": Label(MAP_AXES, "cameras that see the point; 0 where nothing is hit", "cameras"),
-    "camera_position_mm": Label((*CAMERA_AXES, "axis"), "where the cameras really are", "mm"),
-    "camera_rotation": Label(
-        (*CAMERA_AXES, "axis", "direction"), "its columns are the cameras' right, down and forward directions"
-    ),
-}
 
 
 def radiance_name(k: int, l: int) -> str:

@@ -8,7 +8,6 @@ read a missing chunk as zeros, and unpack 65 kB into as many bytes as its header
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.safe_files import new_folder_safely
+from pcii.core.array_labels import Label
 from pcii.io.sealed_json import check_file, parse_json, read_small
 
 CHUNK_ELEMENTS = 1 << 20
@@ -26,15 +26,6 @@ LARGEST_METADATA_BYTES = 1 << 16
 METADATA = "zarr.json"
 DTYPES = ("bool", "uint8", "uint16", "uint32", "int16", "int32", "int64", "float32", "float64")
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
-
-
-@dataclass(frozen=True)
-class Label:
-    """Description stored with an array: the names of its axes, its meaning, its unit ("1" for none)."""
-
-    dims: tuple[str, ...]
-    meaning: str
-    unit: str = "1"
 
 
 def write_arrays_safely(
@@ -86,7 +77,7 @@ def new_array(group: Any, name: str, shape: tuple[int, ...], dtype: Any, label: 
         chunks=chunk_shape(shape),
         compressors=[ZstdCodec(level=3), Crc32cCodec()],
         dimension_names=label.dims,
-        attributes={"unit": label.unit, "meaning": label.meaning},
+        attributes={"unit": label.unit, "meaning": label.meaning, **label.conventional},
         config={"write_empty_chunks": True},
     )
 

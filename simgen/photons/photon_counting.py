@@ -9,8 +9,9 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS
 from pcii.core.photon_counts import PhotonCounts
-from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, PHOTON_TRUTH, PHOTON_TRUTH_LABELS, nested_name
+from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.zarr_groups import write_arrays_safely
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from pcii.base.progress import Report
-from pcii.io.dataset_layout import TRUTH, TRUTH_LABELS
+from pcii.core.array_labels import TRUTH_LABELS
+from pcii.io.dataset_layout import TRUTH
 from pcii.io.zarr_groups import new_array, new_group_safely
 from simgen.cameras.rig import Rig, centre_camera
 from simgen.renderer.mitsuba_scene import RenderScene

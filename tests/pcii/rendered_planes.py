@@ -6,16 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from pcii.core.array_labels import TRUTH_LABELS
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
-from pcii.io.dataset_layout import (
-    RADIANCE,
-    TRUTH,
-    TRUTH_LABELS,
-    radiance_name,
-    write_exr_safely,
-    write_manifest,
-)
+from pcii.io.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
 

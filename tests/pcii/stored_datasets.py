@@ -9,14 +9,12 @@ import pytest
 from twins import unit_grid
 
 from pcii.base.errors import InputError
+from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 from pcii.io.dataset_layout import (
     COUNTS,
-    COUNTS_LABELS,
     PHOTON_TRUTH,
-    PHOTON_TRUTH_LABELS,
     RADIANCE,
     TRUTH,
-    TRUTH_LABELS,
     radiance_name,
     write_exr_safely,
     write_manifest,

@@ -6,10 +6,11 @@ from pathlib import Path
 import numpy as np
 from twins import unit_grid
 
+from pcii.core.array_labels import COUNTS_LABELS, TRUTH_LABELS
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
-from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, TRUTH, TRUTH_LABELS, nested_name, write_manifest
+from pcii.io.dataset_layout import COUNTS, TRUTH, nested_name, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
 

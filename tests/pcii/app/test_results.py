@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from stored_datasets import flip_a_bit, largest_file, one_sentence
 from twins import unit_grid
 
@@ -189,3 +190,22 @@ def test_a_lock_that_a_kill_left_is_no_obstacle(saved: Results) -> None:
     with saved.writing():
         saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.1)))
     assert verify(saved.path) > 0
+
+
+def test_xarray_opens_results_with_named_axes_and_units(tmp_path):
+    dataset = dataset_of(tmp_path, 0.3)
+    focus = masks_of(dataset, np.ones((2, dataset.counts.events.n.size), bool))
+    with Results(tmp_path / "out", dataset).writing() as results:
+        folders = [
+            results.save_sections(focus.sections),
+            results.save_segmented(focus),
+            results.save_depth(DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7)))),
+        ]
+    for folder in folders:
+        opened = xarray.open_zarr(folder, consolidated=False)
+        assert all({"units", "long_name"} <= set(array.attrs) for array in opened.values())
+        assert {"row", "col"} <= set(opened.sizes)
+    sections = xarray.open_zarr(folders[0], consolidated=False)
+    assert (sections.z_mm.dims, sections.z_mm.attrs["units"]) == (("plane",), "mm")
+    np.testing.assert_array_equal(sections.counts, focus.sections.counts)
+    assert int((sections.counts == 0).sum()) > 0  # zeros stay zeros, and are not taken for missing values

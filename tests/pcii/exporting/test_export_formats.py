@@ -15,9 +15,10 @@ from stored_datasets import DENSE, GRID, IDS, Z_MM, make_dataset, one_sentence
 from twins import unit_grid
 
 import pcii
+from pcii.core.array_labels import COUNTS_LABELS
 from pcii.exporting.export_formats import WRITERS, export_dataset
 from pcii.exporting.pixel_files import write_png
-from pcii.io.dataset_layout import COUNTS, COUNTS_LABELS, RADIANCE, TRUTH, write_manifest
+from pcii.io.dataset_layout import COUNTS, RADIANCE, TRUTH, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
 

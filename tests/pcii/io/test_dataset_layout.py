@@ -16,11 +16,11 @@ from stored_datasets import (
 )
 
 from pcii.base.safe_files import write_bytes_safely
+from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import (
     COUNTS,
-    COUNTS_LABELS,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
@@ -73,7 +73,7 @@ def test_what_a_dataset_does_not_have_is_none_or_refused(tmp_path):
 def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, sparse, axes):
     opened = xarray.open_zarr(make_dataset(tmp_path / "d", sparse=sparse) / part, consolidated=False)
     assert set(opened.sizes) == axes
-    assert all(set(array.attrs) == {"unit", "meaning"} for array in opened.values())
+    assert all(set(array.attrs) == {"unit", "meaning", "units", "long_name"} for array in opened.values())
 
 
 # Damage

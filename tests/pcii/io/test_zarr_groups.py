@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from stored_datasets import one_sentence
 
+from pcii.core.array_labels import Label
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import (
     CHUNK_ELEMENTS,
     METADATA,
-    Label,
     chunk_shape,
     read_array,
     unpacked_bytes,
@@ -50,7 +50,18 @@ def test_an_array_says_what_it_is(tmp_path):
     write_arrays_safely(tmp_path / "a.zarr", {"y": np.arange(3)}, {"y": Y})
     stored = zarr.open_array(tmp_path / "a.zarr" / "y", mode="r")
     assert stored.metadata.dimension_names == ("step",)  # type: ignore[union-attr]
-    assert dict(stored.attrs) == {"unit": "mm", "meaning": "three numbers"}
+    conventional = {"units": "mm", "long_name": "three numbers"}
+    assert dict(stored.attrs) == {"unit": "mm", "meaning": "three numbers"} | conventional
+
+
+def test_arrays_without_the_names_of_the_conventions_are_read(tmp_path):
+    write_arrays_safely(tmp_path / "a.zarr", {"y": np.arange(3)}, {"y": Y})
+    path = tmp_path / "a.zarr" / "y" / METADATA
+    metadata = json.loads(path.read_text())
+    metadata["attributes"] = {"unit": "mm", "meaning": "three numbers"}
+    path.write_text(json.dumps(metadata))
+    found = read_array(tmp_path, "a.zarr/y", list_files(tmp_path, ["a.zarr"]), Y, {}, "again")
+    np.testing.assert_array_equal(found, [0, 1, 2])
 
 
 @given(st.lists(st.integers(0, 3000), max_size=5).map(tuple))

@@ -105,7 +105,7 @@ def test_bad_requests_are_refused() -> None:
 def test_xarray_opens_the_truth_with_named_axes_and_units(whole: Path) -> None:
     truth = xarray.open_zarr(whole / TRUTH, consolidated=False)
     assert set(truth.sizes) == {"row", "col", "axis", "plane", "camera_row", "camera_col"}
-    assert all(set(array.attrs) == {"unit", "meaning"} for array in truth.values())
+    assert all(set(array.attrs) == {"unit", "meaning", "units", "long_name"} for array in truth.values())
     assert truth.z_mm.attrs["unit"] == "mm"
     np.testing.assert_array_equal(truth.z_mm.values, open_dataset(whole).truth.z_mm)  # type: ignore[union-attr]
     assert truth.view_z_mm.isel(camera_row=0, camera_col=1).sizes == {"row": 64, "col": 60}
