@@ -14,6 +14,6 @@ section_stack  Sections: the scene reconstructed at several depths, with the num
                voxel.
 srgb           Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
-xarray_form    Labelled copies of the types for xarray: named axes, coordinates with units, the grid as
+xarray_form    The types as datasets of xarray: named axes, coordinates with units, the camera grid as
                attributes.
 """

@@ -26,6 +26,9 @@ from pcii.io.sealed_json import read_sealed, write_sealed
 FORMAT = "photon-integral-imaging dataset"
 FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
+CARD, CROISSANT = "README.md", "croissant.json"
+"""What people and search engines read of a dataset or collection. No manifest lists them, since they may be
+written again, with other terms of use; the second ends in a checksum of itself and has that of the first."""
 MARKER = ".unfinished.json"
 """Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.io.collection_layout import (
     COLLECTION,
@@ -14,11 +15,12 @@ from pcii.io.collection_layout import (
     read_collection,
     read_index,
 )
-from pcii.io.dataset_layout import MANIFEST, REMEDY, read_manifest
+from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, REMEDY, read_manifest
 from pcii.io.results_list import RESULTS, read_results
-from pcii.io.sealed_json import check_file, strays
+from pcii.io.sealed_json import check_file, read_sealed, strays
 
 Item = TypeVar("Item")
+CARD_REMEDY = "the same `simgen generate` command writes it again"
 MOST_NAMED = 5
 """Most unlisted files that an error names."""
 
@@ -41,9 +43,10 @@ def _verify_collection(path: Path, report: Report) -> int:
     files = _all_of(
         rows, lambda row: 1 + _verify_folder(check_manifest(path, row), silent), "datasets", report
     )
-    listed = {COLLECTION, INDEX, *(row["path"] for row in rows)}
+    card = _verify_card(path, {})
+    listed = {COLLECTION, INDEX, *card, *(row["path"] for row in rows)}
     _refuse(path, sorted(entry.name for entry in path.iterdir() if entry.name not in listed), INDEX)
-    return 2 + files
+    return 2 + len(card) + files
 
 
 def _verify_folder(path: Path, report: Report) -> int:
@@ -56,8 +59,35 @@ def _verify_folder(path: Path, report: Report) -> int:
         return 1
 
     number = _all_of(list(files.items()), check, "files", report)
-    _refuse(path, strays(path, [name, *files]), name)
-    return number
+    card = _verify_card(path, files)
+    _refuse(path, strays(path, [name, *files, *card]), name)
+    return number + len(card)
+
+
+def _verify_card(path: Path, files: Mapping[str, Any]) -> list[str]:
+    """Names of the files of the card, none if there is none.
+
+    Raises `InputError` if one was changed, or if it is the card of other `files` than the manifest lists.
+    """
+    if not (path / CROISSANT).is_file():
+        return []
+    document = read_sealed(path / CROISSANT, CARD_REMEDY)
+    described: dict[str, Any] = {}
+    try:
+        for part in document["distribution"]:
+            if "contentUrl" in part:
+                size = int(part["contentSize"].removesuffix(" B"))
+                described[part["contentUrl"]] = {"bytes": size, "sha256": part["sha256"]}
+        if CARD not in described:
+            raise ValueError(f"it does not name {CARD}")
+    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise InputError(f"{path / CROISSANT}: damaged ({visible(str(fault))}); {CARD_REMEDY}") from None
+    own = {name: entry for name, entry in described.items() if name in (CARD, COLLECTION)}
+    if {name: entry for name, entry in described.items() if name not in own} != dict(files):
+        raise InputError(f"{path / CROISSANT}: describes other files than the manifest lists; {CARD_REMEDY}")
+    for name, entry in own.items():
+        check_file(path, name, entry, CARD_REMEDY, content=True)
+    return [CARD, CROISSANT]
 
 
 def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, report: Report) -> int:

@@ -93,18 +93,23 @@ def generate(
     scenes
         Make datasets of so many draws of a scene that is a distribution, from the recipe's scene_number on.
     """
+    from pcii.exporting.card_files import write_card
     from simgen.collection.whole_collection import generate_collection
     from simgen.dataset.generation import generate as make
     from simgen.renderer import backend
     from simgen.spec.sweeps import load_sweep
 
     sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes)
+    terms = sweep.recipe(0).publication.terms()
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:
         if not sweep.axes:
-            say(_made(out, make(sweep.recipe(0), sweep.near, out, report)))
+            manifest = make(sweep.recipe(0), sweep.near, out, report)
+            write_card(out, terms)
+            say(_made(out, manifest))
             return 0
         faults = generate_collection(sweep, out, crew, report)
+        write_card(out, terms)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
     for fault in faults[:MOST_TOLD]:
         print(f"not made: {fault}", file=sys.stderr)

@@ -8,6 +8,7 @@ from typing import Any
 from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.exporting.card_files import write_card
 from pcii.io.collection import Collection, open_collection
 from simgen.collection import whole_collection as collections
 from simgen.dataset import generation
@@ -69,7 +70,9 @@ def generate(recipe: RecipeFile, out: str | Path, report: Report = silent) -> di
     Raises `pcii.InputError` for a folder that holds something else, and for a recipe that this machine cannot
     hold.
     """
-    return generation.generate(recipe.recipe, recipe.folder, Path(out), report)
+    manifest = generation.generate(recipe.recipe, recipe.folder, Path(out), report)
+    write_card(Path(out), recipe.recipe.publication.terms())
+    return manifest
 
 
 def generate_collection(
@@ -96,6 +99,7 @@ def generate_collection(
     if not sweep.axes:
         raise InputError(f"{sweep.source}: no field has several values; use simgen.generate for one dataset")
     faults = collections.generate_collection(sweep, Path(out), crew, report)
+    write_card(Path(out), sweep.recipe(0).publication.terms())
     if faults:
         raise InputError(
             f"{len(faults)} of {len(sweep)} datasets were not made, the first because {faults[0]}"

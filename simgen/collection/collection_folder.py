@@ -37,7 +37,7 @@ def begin(sweep: Sweep, out: Path) -> None:
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
     document = {
         "fields": [axis.field for axis in sweep.axes],
-        "recipe": sweep.base,
+        "recipe": {name: value for name, value in sweep.base.items() if name != "publication"},
         "software": {"photon-integral-imaging": version("photon-integral-imaging")},
     }
     out.mkdir(parents=True, exist_ok=True)

@@ -24,7 +24,7 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
         "radiance_unit": SPECTRAL_UNIT if recipe.is_spectral else RGB_UNIT,
         "objects": {str(number): name for number, name in render_scene.names.items()},
         "analysis": recipe.analysis.model_dump(mode="json"),
-        "recipe": recipe.model_dump(mode="json"),
+        "recipe": prepared.recipe_of_data,
         "scene": scene.model_dump(mode="json"),
         "versions": {name: version(name) for name in ("photon-integral-imaging", "numpy", "zarr")},
     }

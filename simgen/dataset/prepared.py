@@ -49,10 +49,15 @@ class Prepared:
         }
 
     @cached_property
+    def recipe_of_data(self) -> dict[str, Any]:
+        """All of the recipe that the data depend on, as plain values: terms of publication are left out."""
+        return self.recipe.model_dump(mode="json", exclude={"publication"})
+
+    @cached_property
     def identity(self) -> str:
         """Hash of all that decides the dataset's content, but for the machine."""
         content = self.scene_content | {
-            "recipe": self.recipe.model_dump(mode="json"),
+            "recipe": self.recipe_of_data,
             "format_version": FORMAT_VERSION,
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -13,6 +13,7 @@ drawn_values         Values of a TOML file that are drawn: the numbers, choices 
 lights               Lamps and what shines from all around: where they stand, how bright and of what
                      colour they are.
 materials            What surfaces do with light: a colour, by a reflectance or a texture, and a finish.
+publication          Terms of publication, as a recipe states them.
 recipe               Recipes: one TOML file a dataset, resolved and validated before anything is rendered.
 scene                Scenes: the world in a TOML file, in millimetres; no camera in it.
 scene_generators     Scenes that Python functions draw: those that ship, and those that other packages

@@ -25,6 +25,7 @@ from simgen.base.strict_models import (
     validate,
 )
 from simgen.spec.camera_grid import Grid
+from simgen.spec.publication import Publication
 from simgen.spectral.camera_curves import camera_names
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
@@ -197,6 +198,7 @@ class Recipe(Strict):
     render: Render = Render()
     products: Products = Products()
     analysis: Analysis = Analysis()
+    publication: Publication = Publication()
 
     @model_validator(mode="after")
     def _one_pass_renders_a_view(self) -> Self:

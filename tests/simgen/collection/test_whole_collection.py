@@ -18,6 +18,7 @@ from pcii.base.errors import InputError
 from pcii.io.collection import open_collection
 from pcii.io.collection_layout import COLLECTION, INDEX
 from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import CARD, CROISSANT
 from pcii.io.verification import verify
 from simgen.app import commands as cli
 from simgen.collection import dataset_job
@@ -54,7 +55,7 @@ def test_the_index_says_what_the_manifests_say(collection: Path) -> None:
         f"budget_{budget}_seed_{seed}" for budget in (100, 200) for seed in (7, 8, 9)
     ]
     assert sorted(entry.name for entry in collection.iterdir()) == sorted(
-        [COLLECTION, INDEX, *(row["path"] for row in opened.rows)]
+        [COLLECTION, INDEX, CARD, CROISSANT, *(row["path"] for row in opened.rows)]
     )
     for row, dataset in zip(opened.rows, opened, strict=True):
         recipe = dataset.manifest["recipe"]
