@@ -14,13 +14,14 @@ import configparser
 import io
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
 from pcii.core.camera_grid import CameraGrid
 from pcii.exporting.pixel_files import write_pfm, write_png
 from pcii.exporting.view_names import number_width
@@ -86,7 +87,7 @@ def _pictures(dataset: Dataset) -> tuple[Callable[[int, int], np.ndarray], str]:
     """The picture of a camera, uint8 (H, W, 3), and what its numbers are."""
     grid, views = dataset.grid, dataset.views
     if views is not None:
-        cfa, unit = views.cfa, dataset.manifest.get("radiance_unit", "radiance")
+        cfa, unit = views.cfa, visible(str(dataset.manifest.get("radiance_unit", "radiance")))
 
         def colours(k: int, l: int) -> np.ndarray:
             image = views.view(k, l)
@@ -148,8 +149,7 @@ def _parameters(
     disparity_px: Callable[[np.ndarray | float], np.ndarray],
 ) -> str:
     """The text of parameters.cfg: sections and keys as the benchmark's tools read and write them."""
-    grid, recipe = dataset.grid, dataset.manifest.get("recipe", {})
-    lens = recipe.get("grid", {}).get("lens")
+    grid = dataset.grid
     lowest, highest = _range_px(dataset, disparity_px)
     values = {
         "intrinsics": {
@@ -157,7 +157,7 @@ def _parameters(
             "image_resolution_x_px": grid.width,
             "image_resolution_y_px": grid.height,
             "sensor_size_mm": grid.pixel_mm * max(grid.width, grid.height),
-            "fstop": grid.focal_mm / lens["aperture_mm"] if lens else math.inf,
+            "fstop": _f_number(dataset),
         },
         "extrinsics": {
             "num_cams_x": grid.cols,
@@ -177,10 +177,10 @@ def _parameters(
             "scene": re.sub(r"[^A-Za-z0-9._-]", "_", dataset.name),
             "category": "additional",
             "date": "",
-            "version": dataset.manifest.get("versions", {}).get("photon-integral-imaging", ""),
+            "version": "",
             "authors": "",
             "contact": "",
-            "cycles_seed": recipe.get("seed", 0),
+            "cycles_seed": dataset.manifest.get("recipe", {}).get("seed") or 0,
             "disp_min": lowest,
             "disp_max": highest,
             "frustum_disp_min": lowest,
@@ -193,6 +193,16 @@ def _parameters(
     text = io.StringIO()
     parser.write(text)
     return text.getvalue()
+
+
+def _f_number(dataset: Dataset) -> float:
+    """Of the recipe's lens; infinity for pinholes."""
+    grid = dataset.manifest.get("recipe", {}).get("grid")
+    lens = grid.get("lens") if isinstance(grid, Mapping) else None
+    aperture_mm = lens.get("aperture_mm") if isinstance(lens, Mapping) else None
+    if not isinstance(aperture_mm, int | float) or aperture_mm <= 0:
+        return math.inf
+    return dataset.grid.focal_mm / aperture_mm
 
 
 def _range_px(
@@ -212,7 +222,7 @@ def _range_px(
 def _readme(dataset: Dataset, pixels_are: str, maps_are: str) -> str:
     grid = dataset.grid
     parts = [
-        f"{dataset.name}: integral images in the layout of the HCI 4D light field benchmark.",
+        f"{visible(dataset.name)}: integral images in the layout of the HCI 4D light field benchmark.",
         f"Images. Pixels are {pixels_are}. input_Cam000.png is the camera at the top left, the next one is "
         f"to its right; the grid has {grid.rows} rows and {grid.cols} columns, and some readers expect as "
         "many rows as columns.",
@@ -223,6 +233,6 @@ def _readme(dataset: Dataset, pixels_are: str, maps_are: str) -> str:
         "not shifted. `offset` is the shift in px per camera that makes views converge at "
         "focus_distance_m. center_cam is the middle of the grid, in the world of the dataset: X right, Y "
         "down, Z forward. An fstop of inf is a pinhole. disp_min and disp_max are nan where nothing is "
-        "known of the depths. Date, authors and contact are left empty.",
+        "known of the depths. Date, version, authors and contact are left empty.",
     ]
     return "\n\n".join(fill(part, 100) for part in parts) + "\n"

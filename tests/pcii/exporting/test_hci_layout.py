@@ -182,3 +182,14 @@ def test_a_row_of_cameras_may_have_any_pitch_down(tmp_path):
     )
     assert (found.rows, found.cols, found.baseline_mm, found.offset_px) == (1, 3, 9.0, 2.0)
     assert np.median(found.pfm("gt_disp_lowres.pfm")[:10]) == pytest.approx(2.5)
+
+
+def test_a_lens_has_an_f_number(tmp_path):
+    grid = grid_of(1, 1, height=8, width=8)
+    for name, lens, expected in (
+        ("lens", {"aperture_mm": 5.0, "focus_mm": 600.0}, 5.0),
+        ("none", None, math.inf),
+        ("odd", "no lens", math.inf),
+    ):
+        data = write_planes(tmp_path / name, grid, recipe={"grid": {"lens": lens}})
+        assert Published(export_dataset(data, "hci", tmp_path / f"{name}-hci")).fstop == expected
