@@ -18,6 +18,7 @@ from pcii.evaluation.comparison import evaluate
 from pcii.exporting.export_formats import export_dataset
 from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_writer import save_dataset
 from pcii.metrics.scoring import score
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
@@ -46,6 +47,7 @@ __all__ = [
     "reconstruct",
     "reconstruct_each",
     "removal_methods",
+    "save_dataset",
     "score",
     "segment",
 ]

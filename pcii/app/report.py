@@ -63,6 +63,7 @@ def _made(manifest: Mapping[str, Any], name: str, timings_s: Mapping[str, float]
     recipe, backend, photons = (manifest.get(key) or {} for key in ("recipe", "backend", "photons"))
     identity = manifest.get("identity")
     rows = [("dataset", f"{name}, identity {identity[:16]}" if identity else name)]
+    rows += [(name, manifest[name]) for name in ("origin", "licence", "citation") if manifest.get(name)]
     if backend:
         samples = recipe["render"]["samples_per_pixel"]
         engine = f"Mitsuba {backend['mitsuba']}, {backend['variant']}"

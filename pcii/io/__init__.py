@@ -5,6 +5,8 @@ collection_layout  The folder of a collection of datasets: what they have in com
                    them.
 dataset            Datasets: counts, truth and radiance of a dataset folder, checked when they are read.
 dataset_layout     The dataset folder on disk: its files, their arrays and its manifest.
+dataset_writer     Datasets written from images and truth in memory: whole folders that `open_dataset`
+                   opens.
 manifest_schema    Pydantic models of the manifests; members that they do not name are allowed and
                    ignored.
 results_list       The file results.json: the dataset of the results in a folder, and their files with

@@ -96,7 +96,10 @@ class Dataset(Brief):
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
         if not self.has_counts:
-            raise InputError(f"{self.path}: this dataset has no counts; its recipe left them out")
+            raise InputError(
+                f"{self.path}: this dataset has no photon counts; import the images with --photons N, "
+                "or generate it with products.counts = true"
+            )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         arrays = self._arrays(part, COUNTS_LABELS, names)
         try:

@@ -12,7 +12,7 @@ The manifest is written last and lists what belongs to the dataset: a dataset wi
 unfinished, a file whose hash differs is damaged, and what is not listed is not read.
 """
 
-import os
+import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import sync_folder
+from pcii.base.safe_files import write_bytes_safely
 from pcii.io.sealed_json import read_sealed, write_sealed
 
 FORMAT = "photon-integral-imaging dataset"
@@ -102,18 +102,10 @@ def write_exr_safely(path: Path, image: np.ndarray) -> None:
     names = ("Y",) if image.shape[2] == 1 else ("R", "G", "B")
     planes = {name: np.ascontiguousarray(image[..., c], np.float32) for c, name in enumerate(names)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        with OpenEXR.File(header, planes) as file:
-            file.write(str(temporary))
-        with temporary.open("rb") as written:
-            os.fsync(written.fileno())
-        temporary.replace(path)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
-    sync_folder(path.parent)
+    content = io.BytesIO()  # the library takes no path whose name is not valid text
+    with OpenEXR.File(header, planes) as file:
+        file.write(content)
+    write_bytes_safely(path, content.getvalue())
 
 
 def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
@@ -127,7 +119,7 @@ def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
     try:
         if shape is not None and _exr_shape(path) != tuple(shape):
             raise InputError(f"{path}: expected an image {tuple(shape)}, got {_exr_shape(path)}")
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
             channels = file.channels()
             names = ("Y",) if "Y" in channels else ("R", "G", "B")
             return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
@@ -141,7 +133,7 @@ def _exr_shape(path: Path) -> tuple[int, int, int]:
     """Shape (H, W, C) according to the header of an EXR file."""
     import OpenEXR
 
-    with OpenEXR.File(str(path), header_only=True) as file:
+    with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
         header = file.header()
         (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
         is_mosaic = any(channel.name == "Y" for channel in header["channels"])

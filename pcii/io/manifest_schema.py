@@ -130,6 +130,9 @@ class DatasetManifest(_Model):
     """The manifest of a dataset."""
 
     title: Text | None = None
+    licence: Text | None = None
+    citation: Text | None = None
+    origin: Text | None = None
     identity: str | None = None
     grid: Grid
     cfa: str | None

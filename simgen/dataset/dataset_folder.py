@@ -9,8 +9,8 @@ from typing import Any
 
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import is_locked, locked
-from pcii.io.dataset_layout import MANIFEST, MARKER, REMEDY, read_manifest
-from pcii.io.sealed_json import check_file
+from pcii.io.dataset_layout import MARKER
+from pcii.io.dataset_writer import held_dataset
 
 
 def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
@@ -19,23 +19,7 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
     folder that holds anything else.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the dataset")
-    if not out.is_dir() or not any(out.iterdir()) or (out / MARKER).is_file():
-        return None
-    if not (out / MANIFEST).is_file():
-        raise InputError(f"{out}: holds something else; name a new or empty folder")
-    return whole(out, identity, content=content)
-
-
-def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
-    """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
-    manifest = read_manifest(out)
-    if manifest.get("identity") != identity:
-        raise InputError(f"{out}: holds the dataset of another recipe or scene; name a new or empty folder")
-    for name, entry in manifest["files"].items():
-        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
-    return manifest
+    return None if (out / MARKER).is_file() else held_dataset(out, identity, content=content)
 
 
 def check_free(out: Path) -> None:

@@ -21,8 +21,9 @@ from pcii.io.dataset_layout import (
     read_manifest,
     write_manifest,
 )
+from pcii.io.dataset_writer import held_dataset
 from pcii.io.sealed_json import list_files
-from simgen.dataset.dataset_folder import check_free, claimed, finished, whole
+from simgen.dataset.dataset_folder import check_free, claimed, finished
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
@@ -86,7 +87,8 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     with named_in_errors(out), claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
-            return whole(out, identity, content=True)
+            held_dataset(out, identity)
+            return read_manifest(out)
         sweep_temporaries(out)
         photons = _work(prepared, capture, render_scene, made, common, out, clock, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)

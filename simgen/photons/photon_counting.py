@@ -9,10 +9,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
-from pcii.io.zarr_groups import write_arrays_safely
+from pcii.io.dataset_writer import write_counts as save_counts
+from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan
@@ -107,10 +107,10 @@ def write_counts(
             kept = saturate(kept, grid, sensor.counter_bits, capture.seed)
         kept = kept.by_pixel(grid)
         events = PhotonCounts.from_events(kept.k, kept.l, kept.i, kept.j, kept.n, grid, cfa=cfa)
-        _write_events(out / nested_name(COUNTS, budget), events)
+        save_counts(out / nested_name(COUNTS, budget), events)
         if with_origins and kept.object_id is not None and kept.z_mm is not None:
-            origins = {"object_id": kept.object_id.repeat(kept.n), "z_mm": kept.z_mm.repeat(kept.n)}
-            write_arrays_safely(out / nested_name(PHOTON_TRUTH, budget), origins, PHOTON_TRUTH_LABELS)
+            origins = kept.object_id.repeat(kept.n), kept.z_mm.repeat(kept.n)
+            write_photon_truth(out / nested_name(PHOTON_TRUTH, budget), *origins)
         totals_here = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
             found |= totals_here
@@ -132,9 +132,3 @@ def _one_by_one(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
     rank = np.empty(total, dtype=np.int64)
     rank[order] = places(scope[order])
     return replace(rows, scope=scope, rank=rank)
-
-
-def _write_events(path: Path, counts: PhotonCounts) -> None:
-    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
-    small = {name: getattr(counts.events, name).astype(index) for name in "klij"}
-    write_arrays_safely(path, {**small, "n": counts.events.n}, COUNTS_LABELS)

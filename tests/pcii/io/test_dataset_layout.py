@@ -58,7 +58,7 @@ def test_what_a_dataset_does_not_have_is_none_or_refused(tmp_path):
     dataset = open_dataset(root)
     assert dataset.truth is None
     assert dataset.views is None
-    assert "no counts" in one_sentence(lambda: dataset.counts, root)
+    assert "no photon counts" in one_sentence(lambda: dataset.counts, root)
 
 
 @pytest.mark.parametrize(

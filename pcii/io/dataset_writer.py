@@ -1,0 +1,252 @@
+"""Datasets written from images and truth in memory: whole folders that `open_dataset` opens."""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import named_in_errors, replace_folder, temporary_folder
+from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
+from pcii.core.arrays import check_z_mm
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_layout import (
+    COUNTS,
+    MANIFEST,
+    MARKER,
+    PHOTON_TRUTH,
+    RADIANCE,
+    REMEDY,
+    TRUTH,
+    radiance_name,
+    read_manifest,
+    write_exr_safely,
+    write_manifest,
+)
+from pcii.io.sealed_json import check_file, list_files
+from pcii.io.zarr_groups import DTYPES, write_arrays_safely
+
+DENSE_SHARE = 1 / 16
+"""Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
+LARGEST_ID = 10**9 - 1
+
+
+def save_dataset(
+    path: str | Path,
+    images: PhotonCounts | Views | Sequence[PhotonCounts | Views],
+    truth: Truth | None = None,
+    *,
+    z_mm: object = None,
+    z_range_mm: tuple[float, float] | None = None,
+    title: str | None = None,
+    licence: str | None = None,
+    citation: str | None = None,
+    origin: str | None = None,
+) -> Dataset:
+    """Write a dataset folder of photon counts, of radiance, or of both, and return it opened.
+
+    `images` is `PhotonCounts`, `Views`, or a pair of them of the same cameras and Bayer pattern; full-colour
+    views go with mosaic counts. `truth` is of the virtual centre; its `photons`, if known, are in the order
+    of the counts' events. `z_mm` and `z_range_mm` (near, far) are depths to look at, suggested to `pcii run`
+    and others. `title`, `licence`, `citation` and `origin` (where the images come from) are shown in reports.
+
+    The folder is complete or is not there. Its identity is a hash of the content of its files, the grid and
+    the objects' names; a folder that holds this very dataset keeps its files, and takes over new suggested
+    depths and texts. Raises `InputError` for a folder that holds anything else, before anything is written,
+    and for parts that do not belong together.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> from pcii.core.camera_grid import CameraGrid
+    >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
+    >>> counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    >>> with TemporaryDirectory() as folder:
+    ...     save_dataset(Path(folder) / "mine", counts, z_mm=500, title="Two views").counts.total
+    48
+    """
+    counts, views = _told_apart(images)
+    analysis = _analysis(z_mm, z_range_mm)
+    texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
+    for name, text in texts.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{name}: expected text, got {type(text).__name__}")
+    if truth is not None:
+        _check_truth(truth, counts or views)
+    out = Path(path).absolute()
+    with named_in_errors(out):
+        held_dataset(out, None, content=False)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        with temporary_folder(out) as new:
+            if counts is not None:
+                write_counts(new / COUNTS, counts)
+            if views is not None:
+                _write_radiance(new, views)
+            if truth is not None:
+                _write_truth(new, truth, counts)
+            manifest = _content(new, counts, views, truth)
+            write_manifest(new, texts | manifest | {"analysis": analysis, "versions": _versions()})
+            held = held_dataset(out, manifest["identity"])
+            if held is None:
+                replace_folder(new, out)
+            elif held != read_manifest(new):
+                write_manifest(out, read_manifest(new))
+    return open_dataset(path)
+
+
+def write_counts(folder: Path, counts: PhotonCounts) -> None:
+    """Write photon counts as a group of arrays: as events, or dense where many pixels have photons."""
+    if not counts.is_sparse and counts.occupied_share > DENSE_SHARE:
+        dense = counts.dense
+        dtype = np.min_scalar_type(dense.max(initial=0))
+        small = dense.astype(dtype if dtype.name in DTYPES else np.int64)
+        write_arrays_safely(folder, {"dense": small}, COUNTS_LABELS)
+        return
+    index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
+    pixels = {name: getattr(counts.events, name).astype(index) for name in "klij"}
+    write_arrays_safely(folder, {**pixels, "n": counts.events.n}, COUNTS_LABELS)
+
+
+def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) -> None:
+    """Write the origins (N,) of all photons, in the order of the events of their counts."""
+    write_arrays_safely(folder, {"object_id": object_id, "z_mm": z_mm}, PHOTON_TRUTH_LABELS)
+
+
+def held_dataset(out: Path, identity: str | None, *, content: bool = True) -> dict[str, Any] | None:
+    """The manifest of the finished dataset in the folder `out`; None if there is no folder, or an empty one.
+
+    Its files are compared by their hashes, without `content` by their sizes. Raises `InputError` for a file,
+    a folder that holds anything else, a dataset of another `identity` (if that is given), or a damaged one.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: this is a file; name a folder for the dataset")
+    if not out.is_dir() or not any(out.iterdir()):
+        return None
+    if not (out / MANIFEST).is_file() and not (out / MARKER).is_file():
+        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    manifest = read_manifest(out)
+    if identity is not None and manifest.get("identity") != identity:
+        found = "the dataset of other images, or of another recipe or scene"
+        raise InputError(f"{out}: holds {found}; name a new or empty folder")
+    for name, entry in manifest["files"].items():
+        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
+    return manifest
+
+
+def _told_apart(images: object) -> tuple[PhotonCounts | None, Views | None]:
+    """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
+    given = images if isinstance(images, tuple | list) else [images]
+    counts = [one for one in given if isinstance(one, PhotonCounts)]
+    views = [one for one in given if isinstance(one, Views)]
+    if len(counts) + len(views) != len(given) or not given or len(counts) > 1 or len(views) > 1:
+        kinds = ", ".join(type(one).__name__ for one in given) or "nothing"
+        raise InputError(f"images: expected PhotonCounts, Views, or one of each, got {kinds}")
+    if not counts:
+        return None, views[0]
+    if not views:
+        return counts[0], None
+    (seen,), (light,) = counts, views
+    if seen.grid != light.grid:
+        raise InputError("images: the photon counts and the views are of different camera grids")
+    if light.radiance.shape[4] == 1 and light.cfa != seen.cfa:
+        raise InputError(
+            f"images: the views are of the Bayer pattern {light.cfa}, the counts of {seen.cfa}; "
+            "give both the same cfa"
+        )
+    return seen, light
+
+
+def _analysis(z_mm: object, z_range_mm: object) -> dict[str, Any]:
+    """Suggested depths as the manifest has them; `InputError` for depths that cannot be."""
+    found: dict[str, Any] = {}
+    if z_mm is not None:
+        found["z_mm"] = check_z_mm(z_mm).tolist()
+    if z_range_mm is not None:
+        try:
+            near, far = check_z_mm(z_range_mm)
+        except (InputError, ValueError):
+            near, far = 1, 0
+        if not near < far:
+            raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
+        found["z_range_mm"] = [float(near), float(far)]
+    return found
+
+
+def _check_truth(truth: object, images: Any) -> None:
+    """Raise `InputError` unless the truth is of the images' size and can be stored."""
+    if not isinstance(truth, Truth):
+        raise InputError(f"truth: expected Truth, got {type(truth).__name__}")
+    size = images.grid.height, images.grid.width
+    if truth.z_mm.shape != size:
+        raise InputError(f"truth: expected maps of {size}, as the images, got {truth.z_mm.shape}")
+    if truth.z_mm.dtype.kind not in "fiu" or truth.object_id.dtype.kind not in "iu":
+        raise InputError("truth: expected depths that are real and object ids that are whole numbers")
+    for key, name in truth.names.items():
+        whole = isinstance(key, int | np.integer) and not isinstance(key, bool) and abs(key) <= LARGEST_ID
+        if not whole or not isinstance(name, str):
+            raise InputError(f"truth: names: expected text by object id up to {LARGEST_ID}, got {key!r}")
+
+
+def _write_radiance(root: Path, views: Views) -> None:
+    for k, l in np.ndindex(views.grid.rows, views.grid.cols):
+        with np.errstate(over="ignore"):
+            image = views.view(k, l).astype(np.float32)
+        if not np.isfinite(image).all():
+            raise InputError(f"radiance: view ({k}, {l}) is too bright for float32")
+        write_exr_safely(root / radiance_name(k, l), image)
+
+
+def _write_truth(root: Path, truth: Truth, counts: PhotonCounts | None) -> None:
+    maps = {"z_mm": _as_stored(truth.z_mm), "object_id": truth.object_id.astype(np.int32)}
+    for name in OPTIONAL_MAPS:
+        if getattr(truth, name) is not None:
+            maps[name] = getattr(truth, name)
+    write_arrays_safely(root / TRUTH, maps, TRUTH_LABELS)
+    if truth.photons is not None:
+        _check_origins(truth.photons, counts)
+        ids = np.asarray(truth.photons.object_id).astype(np.int32)
+        write_photon_truth(root / PHOTON_TRUTH, ids, _as_stored(truth.photons.z_mm))
+
+
+def _as_stored(z_mm: np.ndarray) -> np.ndarray:
+    return z_mm if z_mm.dtype == np.float32 else z_mm.astype(np.float64)
+
+
+def _check_origins(photons: PhotonTruth, counts: PhotonCounts | None) -> None:
+    """Raise `InputError` unless the origins are those of the counts, photon by photon."""
+    if counts is None:
+        raise InputError("truth: photons: there are no photon counts that they belong to")
+    events = counts.events
+    for name in "klij":
+        if not np.array_equal(getattr(photons, name), getattr(events, name).repeat(events.n)):
+            raise InputError("truth: photons: not those of the counts, in the order of their events")
+
+
+def _content(
+    root: Path, counts: PhotonCounts | None, views: Views | None, truth: Truth | None
+) -> dict[str, Any]:
+    """What the manifest says of the data, and the identity: a hash of all of that."""
+    images = counts or views
+    assert images is not None
+    content: dict[str, Any] = {
+        "grid": asdict(images.grid),
+        "cfa": images.cfa,
+        "radiance_channels": None if views is None else views.radiance.shape[4],
+        "objects": {} if truth is None else {str(key): name for key, name in truth.names.items()},
+        "files": list_files(root, [COUNTS, TRUTH, PHOTON_TRUTH, RADIANCE]),
+    }
+    return {"identity": _hash(content), **content}
+
+
+def _hash(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _versions() -> dict[str, str]:
+    return {name: version(name) for name in ("photon-integral-imaging", "numpy", "zarr")}
