@@ -13,6 +13,7 @@ import numpy as np
 
 from benchmarks.drawn import KINDS, TUNING, write_recipe
 from benchmarks.timing import timed
+from pcii.core.photon_limit import photon_rates, scope_energies, sense
 from simgen.base import random_streams as seeds
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
@@ -21,7 +22,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import draw_counts, photon_rates, scope_energies, sense, sensitivities
+from simgen.sensor.mosaic import draw_counts, sensitivities
 from simgen.spec.recipe import Recipe, load_recipe
 from simgen.spec.scene import load_scene
 
@@ -57,7 +58,7 @@ def dense(recipe: Recipe, samples_per_pixel: int) -> tuple[float, float]:
             start = time.perf_counter()
             raw = sense(image, recipe.cfa)
             energies = scope_energies(raw, recipe.cfa, "view")
-            rates = photon_rates(raw, recipe.cfa, recipe.photons, energies)
+            rates = photon_rates(raw, recipe.cfa, recipe.photons.budget, "view", energies)
             draw_counts(rates, recipe.cfa, seeds.generator(seed, view=view, stage="photons"), None)
             drawing += time.perf_counter() - start
 

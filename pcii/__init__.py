@@ -11,11 +11,20 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_limit import limit_photons
 from pcii.core.section_stack import Sections
+from pcii.core.srgb import srgb_to_linear
 from pcii.core.truth import Truth
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.exporting.export_formats import export_dataset
+from pcii.importing.array_files import import_arrays
+from pcii.importing.camera_order import Optics, ViewOrder
+from pcii.importing.count_frames import import_counts
+from pcii.importing.grid_check import check_grid
+from pcii.importing.hci_scenes import import_hci
+from pcii.importing.image_folders import import_images
+from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_writer import save_dataset
@@ -31,17 +40,27 @@ __all__ = [
     "Dataset",
     "DepthMap",
     "InputError",
+    "LensArray",
+    "Optics",
     "PhotonCounts",
     "Score",
     "Sections",
     "Segmented",
     "ThreeStep",
     "Truth",
+    "ViewOrder",
     "Views",
+    "check_grid",
     "demosaic",
     "estimate_depth",
     "evaluate",
     "export_dataset",
+    "import_arrays",
+    "import_counts",
+    "import_hci",
+    "import_images",
+    "import_lens_array",
+    "limit_photons",
     "open_collection",
     "open_dataset",
     "reconstruct",
@@ -50,4 +69,5 @@ __all__ = [
     "save_dataset",
     "score",
     "segment",
+    "srgb_to_linear",
 ]

@@ -21,6 +21,7 @@ ROOMS = {
         "exporting",
         "evidence",
         "depth",
+        "importing",
         "removal.three_step",
         "removal.likelihood",
         "removal",

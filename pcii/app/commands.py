@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from cyclopts import App, Parameter
 
+from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
 from pcii.base import command_line
 from pcii.base.command_line import say
@@ -18,6 +19,8 @@ app = App(
     help="Reconstruct photon-counted integral images, remove defocused points, and score the result.",
     version=lambda: version("photon-integral-imaging"),
 )
+
+app.command(import_dataset, name="import")
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]

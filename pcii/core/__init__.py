@@ -10,9 +10,11 @@ focal_planes   Focal planes: the depths of sections, and by how much the views s
 geometry       Geometry of parallel cameras: the image of a point, disparity and depth.
 images         Elemental images: the radiance of every view.
 photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack.
+photon_limit   Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
-srgb           Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens.
+srgb           sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values,
+               luminance.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
 xarray_form    The types as datasets of xarray: named axes, coordinates with units, the camera grid as
                attributes.

@@ -31,8 +31,10 @@ class Views(Brief):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel
-    holds all C channels. `radiance` may be any object with `shape` and `[k, l]` (an array, or a
-    reader that loads one view at a time). Raises `InputError` for another shape or an unknown pattern.
+    holds all C channels. Numbers are proportional to light: 8-bit and 16-bit whole numbers are refused, since
+    those of pictures are nearly always sRGB (`pcii.srgb_to_linear`, `pcii.import_images`). `radiance` may be
+    any object with `shape` and `[k, l]` (an array, or a reader that loads one view at a time).
+    Raises `InputError` for another shape or an unknown pattern.
 
     >>> grid = CameraGrid(
     ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
@@ -55,6 +57,11 @@ class Views(Brief):
         if isinstance(self.radiance, np.ndarray):
             if self.radiance.dtype.kind not in "fiu":
                 raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
+            if self.radiance.dtype in (np.uint8, np.uint16):
+                raise InputError(
+                    f"radiance: {self.radiance.dtype} of pictures is sRGB, not light; decode it by "
+                    "pcii.srgb_to_linear, or give linear values as float32"
+                )
             object.__setattr__(self, "radiance", read_only(self.radiance))
 
     def _facts(self) -> dict[str, object]:

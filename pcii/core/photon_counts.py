@@ -66,7 +66,7 @@ class PhotonCounts(Brief):
         """
         check_cfa(cfa)
         _check_grid(grid)
-        counts = _whole_counts("counts", counts_KLHW)
+        counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         _check_total("counts", counts)
@@ -102,13 +102,13 @@ class PhotonCounts(Brief):
         for (name, values), limit in zip(
             {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
         ):
-            column = _whole_counts(name, np.atleast_1d(values))
+            column = whole_counts(name, np.atleast_1d(values))
             if column.ndim != 1:
                 raise InputError(f"{name}: expected a one-dimensional list")
             if column.size and column.max() >= limit:
                 raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
             indices[name] = column.astype(np.int32)
-        photons = _whole_counts("n", np.atleast_1d(n)).astype(np.int64)
+        photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*indices.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         _check_total("n", photons)
@@ -216,7 +216,7 @@ def _check_grid(value: object) -> None:
         raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
 
 
-def _whole_counts(name: str, values: np.ndarray) -> np.ndarray:
+def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
     array = np.asarray(values)
     if array.dtype.kind == "f":

@@ -1,6 +1,9 @@
-"""Encoding of linear values as sRGB (IEC 61966-2-1), for pictures on screens."""
+"""sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values, luminance."""
 
 import numpy as np
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+"""Luminance of the primaries."""
 
 
 def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
@@ -11,3 +14,13 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
     """
     x = np.clip(linear, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
+    """Linear values, float, of sRGB: of numbers in [0, 1], or of 8-bit or 16-bit whole numbers.
+
+    >>> srgb_to_linear(np.array([0, 188, 255], dtype=np.uint8)).round(3)
+    array([0.   , 0.503, 1.   ])
+    """
+    x = srgb / np.iinfo(srgb.dtype).max if srgb.dtype.kind == "u" else srgb
+    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)

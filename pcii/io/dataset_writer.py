@@ -168,14 +168,19 @@ def _analysis(z_mm: object, z_range_mm: object) -> dict[str, Any]:
     if z_mm is not None:
         found["z_mm"] = check_z_mm(z_mm).tolist()
     if z_range_mm is not None:
-        try:
-            near, far = check_z_mm(z_range_mm)
-        except (InputError, ValueError):
-            near, far = 1, 0
-        if not near < far:
-            raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
-        found["z_range_mm"] = [float(near), float(far)]
+        found["z_range_mm"] = check_depth_range(z_range_mm)
     return found
+
+
+def check_depth_range(z_range_mm: object) -> list[float]:
+    """The nearest and farthest depth in mm; raises `InputError` for anything else."""
+    try:
+        near, far = check_z_mm(z_range_mm)
+    except (InputError, ValueError):
+        near, far = 1, 0
+    if not near < far:
+        raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
+    return [float(near), float(far)]
 
 
 def _check_truth(truth: object, images: Any) -> None:

@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_limit import sense
 from pcii.core.truth import PhotonTruth, Truth
 from simgen.app.library import SceneFile
 from simgen.base import random_streams
@@ -23,7 +24,6 @@ from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.sensor.detector import detect
-from simgen.sensor.mosaic import sense
 from simgen.spec.recipe import Recipe
 from simgen.truth.first_hits import first_hits_at_centre
 from simgen.truth.pixel_coverage import coverage

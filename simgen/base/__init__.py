@@ -6,7 +6,7 @@ locations       Where scenes and recipes are found: the working directory, the s
                 package.
 random_streams  Random streams, keyed by stage of the work: the same for any number of workers and any
                 order.
-srgb            sRGB (IEC 61966-2-1): what its numbers mean.
+srgb            sRGB primaries (IEC 61966-2-1) from CIE XYZ.
 strict_models   What scene and recipe files share: strict models, TOML, and errors that point at the
                 field.
 """

@@ -12,6 +12,7 @@ import numpy as np
 
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
@@ -22,7 +23,6 @@ from simgen.photons.counting_plan import plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import sense
 from simgen.spec.lights import AreaLight
 from simgen.spec.materials import Glass
 from simgen.spec.scene import Scene

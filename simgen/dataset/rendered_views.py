@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from pcii.base.progress import Report
+from pcii.core.photon_limit import sense
 from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
@@ -14,7 +15,6 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.sensor.detector import full_light_image
 from simgen.sensor.exposure import photons_per_radiance
-from simgen.sensor.mosaic import sense
 from simgen.spec.recipe import Exposure, Sensor
 
 RENDERED = ".rendered"

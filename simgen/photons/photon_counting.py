@@ -10,6 +10,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_limit import photon_rates, scope_energies
 from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.dataset_writer import write_counts as save_counts
 from pcii.io.dataset_writer import write_photon_truth
@@ -21,7 +22,7 @@ from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
 from simgen.sensor.detector import detect, nested_subset, saturate
-from simgen.sensor.mosaic import draw_counts, fixed_totals, photon_rates, scope_energies
+from simgen.sensor.mosaic import draw_counts, fixed_totals
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
 
@@ -69,7 +70,7 @@ def draw_from_views(
                     f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
                 )
         else:
-            rates = photon_rates(raw, cfa, photons, normalisers[number])
+            rates = photon_rates(raw, cfa, photons.budget, photons.scope, normalisers[number])
         rng = seeds.generator(capture.seed, view=number, stage="photons")
         counts = draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import with_larger_pixels
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import sense
 from simgen.truth.first_hits import first_hits_of_view
 
 NOISE_SHARE = 0.01

@@ -1,8 +1,6 @@
-"""From radiance to photon counts: Bayer mosaic, normalisation to a photon budget, photon statistics.
+"""Colours that a sensor's pixels take, and photon counts drawn from expected ones.
 
-Muniraj et al. 2017, Eq. 1: the irradiance is normalised to unit energy and multiplied by the photon
-budget n; each pixel's count is Poisson with that mean. Eq. 1 normalises each colour; over what the
-budget is counted is the recipe's `scope`.
+Expected photons are those of `pcii.core.photon_limit`: the budget shared out over the recipe's `scope`.
 """
 
 from pathlib import Path
@@ -10,23 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import channel_count, colour_index, mosaic
-from simgen.base.srgb import LUMINANCE
+from pcii.core.bayer import colour_index
 from simgen.spec.recipe import Photons, Sensor
 from simgen.spectral.camera_curves import sensitivity
-
-
-def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
-    """What the sensor's pixels see of radiance (H, W, C): (H, W), same units.
-
-    A Bayer pixel keeps its own colour; a monochrome one the luminance of linear sRGB, or the one channel that
-    its camera has.
-    """
-    if cfa is not None:
-        return mosaic(radiance, cfa)
-    if radiance.shape[2] == 1:
-        return radiance[..., 0]
-    return (radiance @ LUMINANCE).astype(radiance.dtype)
 
 
 def sensitivities(sensor: Sensor, near: Path) -> np.ndarray | None:
@@ -46,31 +30,6 @@ def sensitivities(sensor: Sensor, near: Path) -> np.ndarray | None:
             "set sensor.cfa to 'none'"
         )
     return curves
-
-
-def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
-    """Energy of one view's mosaic, over which its scope is normalised: (C,) for channel, else (1,).
-
-    Sums are float64: float32 sums of a million pixels are wrong in the third digit.
-    """
-    if scope != "channel":
-        return np.array([raw.sum(dtype=np.float64)])
-    colours = colour_index(raw.shape[0], raw.shape[1], cfa)
-    return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
-
-
-def photon_rates(raw: np.ndarray, cfa: str | None, photons: Photons, energies: np.ndarray) -> np.ndarray:
-    """Expected photons per pixel, (H, W) float64: the budget shared out in proportion to `raw`.
-
-    `energies` are those of `scope_energies`, for scope "scene" summed over all views. A scope with
-    no light at all gets no photons. Raises `InputError` if radiance is not finite.
-    """
-    if not np.all(np.isfinite(energies)):
-        raise InputError("radiance: the rendered view holds NaN or infinity")
-    share = np.divide(photons.budget, energies, out=np.zeros_like(energies), where=energies > 0)
-    if photons.scope != "channel":
-        return raw * share[0]
-    return raw * share[colour_index(raw.shape[0], raw.shape[1], cfa)]
 
 
 def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:

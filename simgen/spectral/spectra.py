@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.base.srgb import FROM_XYZ, LUMINANCE
+from pcii.core.srgb import LUMINANCE
+from simgen.base.srgb import FROM_XYZ
 from simgen.base.strict_models import suggestion
 
 WAVELENGTH_NM = np.arange(380.0, 781.0)

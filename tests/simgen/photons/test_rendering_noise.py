@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from lit_scenes import two_balls
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_limit import sense
 from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, PROBE_SAMPLES, Probe, probe
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import sense
 from simgen.spec.scene import Scene
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=1.0, height=64, width=64)

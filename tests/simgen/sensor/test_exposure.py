@@ -9,6 +9,7 @@ import pytest
 
 from pcii.base.progress import silent
 from pcii.core.bayer import colour_index
+from pcii.core.photon_limit import sense
 from simgen.dataset.prepared import capture_of
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Plan, plan
@@ -17,7 +18,6 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
 from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
-from simgen.sensor.mosaic import sense
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Exposure, Recipe
 from simgen.spec.scene import Scene

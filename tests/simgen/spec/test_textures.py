@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from pcii.core.srgb import srgb_to_linear
 from simgen.assets.pattern_areas import half_plane, square_wave
 from simgen.assets.texture_pixels import paint
 from simgen.base.asset_names import MeshName
-from simgen.base.srgb import srgb_to_linear
 from simgen.renderer.mitsuba_surfaces import aspect_of
 from simgen.spec.shapes import Card, Mesh, Sphere
 from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture

@@ -1,0 +1,53 @@
+"""Linear radiance from the numbers of picture files: sRGB, a gamma, or linear already."""
+
+from typing import Any, Literal
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.core.srgb import srgb_to_linear
+
+Encoding = Literal["srgb", "linear"] | float
+"""How numbers tell light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""
+GAMMAS = (0.1, 10.0)
+
+
+def check_encoding(encoding: Any) -> None:
+    """Raise `InputError` unless this is an `Encoding`, or None for the usual one."""
+    if encoding is None or encoding in ("srgb", "linear"):
+        return
+    number = isinstance(encoding, int | float) and not isinstance(encoding, bool)
+    if not (number and GAMMAS[0] <= float(encoding) <= GAMMAS[1]):
+        ends = f"{GAMMAS[0]:g} to {GAMMAS[1]:g}"
+        raise InputError(f"encoding: expected srgb, linear, or a gamma from {ends}, got {encoding!r}")
+
+
+def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
+    """Linear radiance, float32, of whole numbers (of 1 at the largest of their type) or of floats.
+
+    Without an encoding whole numbers are sRGB, as in nearly all picture files, and floats are linear.
+    Raises `InputError` for encoded numbers below 0, or that are NaN or infinite.
+
+    >>> to_radiance(np.array([0, 128, 255], np.uint8), None).round(3)
+    array([0.   , 0.216, 1.   ], dtype=float32)
+    >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").round(3)
+    array([0.   , 0.502, 1.   ], dtype=float32)
+    """
+    whole = numbers.dtype.kind == "u"
+    if not whole and not np.isfinite(numbers).all():
+        raise InputError("holds NaN or infinity; radiance is finite")
+    if encoding is None:
+        encoding = "srgb" if whole else "linear"
+    if encoding == "srgb" and whole:  # few values are many pixels
+        table = srgb_to_linear(np.arange(np.iinfo(numbers.dtype).max + 1, dtype=numbers.dtype))
+        return table.astype(np.float32)[numbers]
+    share = numbers / np.float32(np.iinfo(numbers.dtype).max) if whole else numbers
+    if encoding == "linear":
+        with np.errstate(over="ignore"):
+            linear = share.astype(np.float32)
+        if not np.isfinite(linear).all():
+            raise InputError("holds light that is too bright for float32")
+        return linear
+    if not whole and share.size and share.min() < 0:
+        raise InputError("holds numbers below 0, which no encoded light has")
+    return (srgb_to_linear(share) if encoding == "srgb" else share**encoding).astype(np.float32)
