@@ -57,13 +57,14 @@ def run(
         A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     """
     from pcii.app.single_run import run as run_all
-    from pcii.removal.methods import DEFAULT_METHODS
 
     with Stages() as report:
-        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or DEFAULT_METHODS)
+        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or None)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
+    if outcome.depth is None:
+        say("sections only: removal and depth need photon counts; import the images with --photons N")
     say(f"report: {out / 'report.html'}")
 
 
@@ -77,7 +78,7 @@ def reconstruct(
     shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
 ) -> None:
-    """Reconstruct sections from the photon counts, with a picture of each.
+    """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
 
     Example:  pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
 
@@ -100,7 +101,8 @@ def reconstruct(
     from pcii.sections.reconstruction import reconstruct as make
 
     data = _open(dataset, budget)
-    sections = make(data.counts, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
+    images = data.counts if data.has_counts else data.views or data.counts
+    sections = make(images, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
     with Results(out, data).writing() as results:
         say(f"{results.save_sections(sections)}")
         for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):

@@ -67,6 +67,8 @@ def read(asked: Request, report: Report) -> Imported:
         raise InputError("--counts: photon counts are linear; leave out --linear, --srgb and --gamma")
     if asked.pattern is None and asked.lenses is None and (source / PARAMETERS).is_file():
         return _hci(asked, report)
+    if source.is_dir() and asked.lenses is not None:
+        raise InputError(f"{source}: --lens-array is for one picture, and this is a folder")
     if source.is_dir() and asked.pattern is None:
         raise InputError(f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"')
     if not source.is_dir() and asked.pattern is not None:

@@ -27,9 +27,10 @@ class Outcome:
     full_light: Sections | None
     """Sections of the radiance (Eq. 2), if the dataset has it."""
     sections: Sections
-    """Sections of the photon counts (Eq. 3)."""
+    """Sections of the photon counts (Eq. 3), or of the radiance if there are no counts."""
     focus: tuple[Segmented, ...]
-    depth: DepthMap
+    depth: DepthMap | None
+    """None without photon counts, which removal and depth need."""
     score: Score
     timings_s: dict[str, float] = field(default_factory=dict)
 
@@ -38,19 +39,22 @@ def analyse(
     dataset: Dataset,
     z_mm: Sequence[float] | None,
     report: Report = silent,
-    methods: Sequence[str] = DEFAULT_METHODS,
+    methods: Sequence[str] | None = None,
 ) -> Outcome:
     """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
-    `z_mm` defaults to the depths in the dataset's recipe. Raises `InputError` without depths or counts, and
-    for an unknown method.
+    `z_mm` defaults to the depths in the dataset's recipe, `methods` to `DEFAULT_METHODS`. Of a dataset
+    without photon counts only sections of its radiance are made. Raises `InputError` without depths, without
+    both counts and radiance, and for an unknown method or one of which there are no counts.
     """
-    methods = tuple(dict.fromkeys(methods))
     seconds: dict[str, float] = {}
     planes, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
-    counts = dataset.counts
-    check_depth_counts(counts)
-    total = 4 + len(methods)
+    has_counts = dataset.has_counts or dataset.views is None or bool(methods)
+    chosen = tuple(dict.fromkeys(methods or (DEFAULT_METHODS if has_counts else ())))
+    counts = dataset.counts if has_counts else None
+    if counts is not None:
+        check_depth_counts(counts)
+    total = 4 + len(chosen)
     done = 0
 
     def finished(name: str, start: float) -> None:
@@ -64,21 +68,28 @@ def analyse(
     finished("sections at full light", start)
 
     start = time.perf_counter()
-    sections = reconstruct(counts, planes)
+    if counts is None:
+        assert full_light is not None
+        sections = full_light
+    else:
+        sections = reconstruct(counts, planes)
     finished("sections", start)
 
     focus: list[Segmented] = []
-    for method in methods:
+    for method in chosen:
         start = time.perf_counter()
+        assert counts is not None
         focus.append(find_method(method)(counts, sections))
         finished(f"removal, {method}", start)
 
     start = time.perf_counter()
-    depth = estimate_depth(counts, z_range)
+    depth = None if counts is None else estimate_depth(counts, z_range)
     finished("depth", start)
 
     start = time.perf_counter()
-    result = score(focus, depth, dataset.truth, full_light=full_light, dataset=dataset.name)
+    result = score(
+        focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light, dataset=dataset.name
+    )
     finished("score", start)
     return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
 

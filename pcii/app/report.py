@@ -32,14 +32,15 @@ def write_report(path: Path, outcome: Outcome) -> None:
 
 def _content(outcome: Outcome) -> dict[str, Any]:
     dataset = outcome.dataset
-    box = box_around(picture.interesting_part(dataset.truth, list(outcome.focus)))
+    box = box_around(picture.interesting_part(dataset.grid, dataset.truth, outcome.focus))
+    total = dataset.counts.total if dataset.has_counts else None
     manifest = dataset.manifest
     return {
         "title": manifest.get("title") or dataset.name,
         "grid": dataset.grid,
         "cfa": dataset.cfa,
-        "photons_total": dataset.counts.total,
-        "photons_per_view": dataset.counts.total / dataset.grid.view_count,
+        "photons_total": total,
+        "photons_per_view": None if total is None else total / dataset.grid.view_count,
         "crop": f"rows {box[0].start} to {box[0].stop - 1}, columns {box[1].start} to {box[1].stop - 1}",
         "figure6": _figure6(outcome, box),
         "figure7": _figure7(outcome, box),
@@ -136,14 +137,14 @@ def _figure6(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]
         if is_mosaic:
             image = picture.to_srgb8(colour, white)
             panels.append(_panel(image, box, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
-    per_view = dataset.counts.total / dataset.grid.view_count
     panels += _section_panels(outcome.full_light, box, "full light", letters)
-    panels += _section_panels(outcome.sections, box, f"{per_view:.0f} photons per view", letters)
-    counts = dataset.counts.view(k, l)
-    image = picture.to_srgb8(counts.astype(np.float64), max(1.0, picture.white_level(counts, box)))
-    panels.append(
-        _panel(image, box, f"({next(letters)}) view ({k}, {l}) at the photon budget: {counts.sum()} photons")
-    )
+    if dataset.has_counts:
+        per_view = dataset.counts.total / dataset.grid.view_count
+        panels += _section_panels(outcome.sections, box, f"{per_view:.0f} photons per view", letters)
+        counts = dataset.counts.view(k, l)
+        image = picture.to_srgb8(counts.astype(np.float64), max(1.0, picture.white_level(counts, box)))
+        caption = f"({next(letters)}) view ({k}, {l}) at the photon budget: {counts.sum()} photons"
+        panels.append(_panel(image, box, caption))
     if dataset.truth is not None:
         near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
         image = picture.depth_image(_object_depth(dataset.truth), near, far)
@@ -154,7 +155,9 @@ def _figure6(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]
 
 
 def _object_depth(truth: Truth) -> np.ndarray:
-    return np.where(truth.object_id > 0, truth.z_mm, np.inf)
+    """True depth of the objects; of everything, if the truth knows no objects."""
+    has_objects = (truth.object_id > 0).any()
+    return np.where(truth.object_id > 0, truth.z_mm, np.inf) if has_objects else truth.z_mm
 
 
 def _section_panels(
@@ -198,6 +201,8 @@ def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, 
 
 def _depth_panels(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
     truth, depth = outcome.dataset.truth, outcome.depth
+    if depth is None:
+        return []
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
     if truth is not None:

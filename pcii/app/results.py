@@ -14,7 +14,7 @@ ones.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,10 @@ class Results:
         """Write the counts and the coverage, whose quotient is the estimate."""
         arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
         pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
-        return self._save("sections.zarr", arrays, SECTIONS_LABELS, pattern)
+        labels = SECTIONS_LABELS
+        if sections.counts.dtype.kind == "f":
+            labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
+        return self._save("sections.zarr", arrays, labels, pattern)
 
     def save_segmented(self, focus: Segmented) -> Path:
         """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""

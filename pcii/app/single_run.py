@@ -9,7 +9,7 @@ from pcii.app.results import Results
 from pcii.base.progress import Report, silent
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import planes_of
-from pcii.removal.methods import DEFAULT_METHODS, find_method
+from pcii.removal.methods import find_method
 
 
 def run(
@@ -17,13 +17,13 @@ def run(
     out: Path,
     z_mm: Sequence[float] | None,
     report: Report = silent,
-    methods: Sequence[str] = DEFAULT_METHODS,
+    methods: Sequence[str] | None = None,
 ) -> Outcome:
     """Analyse `dataset` and write all results into `out`.
 
     Raises `InputError` if `out` is no folder for results of this dataset, and as `analyse` does.
     """
-    for method in methods:  # an unknown name is reported before any work, and no folder is made
+    for method in methods or ():  # an unknown name is reported before any work, and no folder is made
         find_method(method)
     planes_of(dataset, z_mm)
     results = Results(out, dataset)
@@ -33,7 +33,8 @@ def run(
         results.save_sections(outcome.sections)
         for focus in outcome.focus:
             results.save_segmented(focus)
-        results.save_depth(outcome.depth)
+        if outcome.depth is not None:
+            results.save_depth(outcome.depth)
         results.save_score(outcome.score)
         with results.replacing("report.html") as page:
             write_report(page, outcome)

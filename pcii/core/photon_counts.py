@@ -13,6 +13,7 @@ from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
@@ -205,6 +206,11 @@ class PhotonCounts(Brief):
 
 def check_depth_counts(value: object) -> None:
     """Raise `InputError` unless `value` is `PhotonCounts` of at least two views, which depth needs."""
+    if isinstance(value, Views):
+        raise InputError(
+            "counts: needs photon counts, and these are images; draw them with pcii.limit_photons, or import "
+            "with --photons N"
+        )
     if not isinstance(value, PhotonCounts):
         raise InputError(f"counts: expected PhotonCounts, got {type(value).__name__}")
     if value.grid.view_count < 2:

@@ -39,6 +39,7 @@ def files_by_camera(folder: Path, pattern: str, shape: tuple[int, int] | None) -
             f"{folder}: {pattern} gives {size[0]} rows and {size[1]} columns, not {shape[0]} x {shape[1]} "
             "as --grid"
         )
+    _check_number(folder, size)
     cameras = [(first[0] + k, first[1] + l) for k, l in np.ndindex(*size)]
     return _table(folder, pattern, found, cameras, size)
 
@@ -105,6 +106,7 @@ def _by_index(folder: Path, pattern: str, found: Found, shape: tuple[int, int] |
         shape = side, side
     elif shape[0] * shape[1] < count:
         raise InputError(f"{folder}: {count} files fit the pattern, more than in {shape[0]} x {shape[1]}")
+    _check_number(folder, shape)
     cameras = [(first + number,) for number in range(shape[0] * shape[1])]
     return _table(folder, pattern, found, cameras, shape)
 
@@ -113,12 +115,16 @@ def _span(numbers: set[int]) -> int:
     return max(numbers) - min(numbers) + 1
 
 
+def _check_number(folder: Path, size: tuple[int, int]) -> None:
+    """Raise `InputError` for a grid of more views than anybody has, before anything is made of that size."""
+    if not 1 <= math.prod(size) <= MOST_VIEWS:
+        raise InputError(f"{folder}: the numbers in the files' names are of {size[0]} x {size[1]} views")
+
+
 def _table(
     folder: Path, pattern: str, found: Found, cameras: Iterable[tuple[int, ...]], size: tuple[int, int]
 ) -> np.ndarray:
     """Paths by camera; `InputError` if some are missing, naming the first."""
-    if math.prod(size) > MOST_VIEWS:
-        raise InputError(f"{folder}: the numbers in the files' names are of {size[0]} x {size[1]} views")
     cameras = list(cameras)
     missing = [camera for camera in cameras if camera not in found]
     if missing:

@@ -126,14 +126,17 @@ def _exr_header(path: Path) -> tuple[tuple[int, int, int], Any, int]:
 
     with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
         header = file.header()
-    names = sorted(channel.name for channel in header["channels"])
+        names = sorted(channel.name for channel in header["channels"])
+        data, display = (
+            [tuple(map(int, corner)) for corner in header[name]] for name in ("dataWindow", "displayWindow")
+        )
     if names not in (["Y"], ["B", "G", "R"]):
         if "A" in names:
             raise InputError(ALPHA)
         raise InputError(f"has the channels {', '.join(names)}; expected R, G, B or Y")
-    (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
-    if any(tuple(a) != tuple(b) for a, b in zip(header["dataWindow"], header["displayWindow"], strict=True)):
+    if data != display:
         raise InputError("its data window is not its display window; save the whole picture")
+    (left, top), (right, bottom) = data
     return (bottom - top + 1, right - left + 1, len(names)), np.float32, 1
 
 

@@ -88,7 +88,7 @@ class Dataset(Brief):
 
     @property
     def has_counts(self) -> bool:
-        """Whether the dataset has photon counts."""
+        """Whether the dataset has photon counts; without them it may have radiance."""
         return self.has(self._counts_name)
 
     @cached_property

@@ -1,0 +1,93 @@
+"""`pcii run` on datasets that no recipe made: with and without truth, counts only, radiance only."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pcii.app import single_run
+from pcii.app.commands import app
+from pcii.base import command_line
+from pcii.base.errors import InputError
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.depth.depth_map import estimate_depth
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_writer import save_dataset
+from pcii.io.verification import verify
+from pcii.removal.methods import segment
+
+GRID = CameraGrid(rows=2, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
+LIGHT = np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.float32)
+COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.2, GRID.shape_KLHW), GRID, cfa="GRBG")
+IDS = np.zeros((40, 48), np.int16)
+IDS[10:30, 10:30] = 1
+Z_MM = np.where(IDS > 0, 500.0, np.inf)
+
+
+def run(*arguments: object) -> int:
+    return command_line.run(app, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("has", ["counts", "counts truth", "counts views", "counts views depth"])
+def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, has: str) -> None:
+    truth = None
+    if "truth" in has:
+        truth = Truth(Z_MM, IDS, {1: "ball"})
+    if "depth" in has:  # of surfaces without names, as in benchmarks of depth
+        truth = Truth(np.full((40, 48), 500.0), 0 * IDS, {})
+    images = (COUNTS, Views(LIGHT, GRID)) if "views" in has else COUNTS
+    texts = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
+    dataset = save_dataset(tmp_path / "d", images, truth, z_mm=[500, 700], **texts)
+    outcome = single_run.run(dataset, tmp_path / "out", None, methods=["brightness"])
+    assert outcome.depth is not None
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert all(
+        text in page for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16])
+    )
+    assert run("score", tmp_path / "d", tmp_path / "out") == 0
+    assert verify(tmp_path / "out") > 5
+    if "depth" in has:
+        assert outcome.score.depth["hci"]["answered"] is not None
+
+
+@pytest.mark.parametrize("with_truth", [False, True])
+def test_radiance_alone_gives_sections_and_a_report(tmp_path: Path, with_truth: bool, capsys) -> None:
+    truth = Truth(Z_MM, IDS, {1: "ball"}) if with_truth else None
+    save_dataset(tmp_path / "d", Views(LIGHT, GRID), truth, z_mm=500)
+    out = tmp_path / "out"
+    assert run("run", tmp_path / "d", "-o", out) == 0
+    assert "sections only" in capsys.readouterr().out
+    page = (out / "report.html").read_text()
+    assert "without photon counts" in page
+    assert "full light (Eq. 2)" in page
+    assert "Figure 7" not in page
+    assert "<h2>Depth" not in page
+    assert not list(out.glob("depth*"))
+    assert verify(out) > 3
+    assert run("reconstruct", tmp_path / "d", "-o", tmp_path / "sections", "--z-mm", 600) == 0
+    assert (tmp_path / "sections" / "section_600mm.png").is_file()
+
+
+@pytest.mark.parametrize("command", [["segment"], ["depth"], ["run", "--method", "likelihood"]])
+def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
+    save_dataset(tmp_path / "d", Views(LIGHT, GRID), z_mm=500)
+    assert run(command[0], tmp_path / "d", "-o", tmp_path / "out", *command[1:]) == 2
+    assert "no photon counts; import the images with --photons N" in capsys.readouterr().err
+
+
+def test_methods_for_photon_counts_say_what_to_do_with_images() -> None:
+    views = Views(LIGHT, GRID)
+    for action in (lambda: segment(views, 500), lambda: estimate_depth(views, (400, 600))):  # type: ignore[arg-type]
+        with pytest.raises(InputError, match="needs photon counts, and these are images; draw them with"):
+            action()
+
+
+def test_results_of_one_strangers_dataset_are_not_taken_for_anothers(tmp_path: Path) -> None:
+    save_dataset(tmp_path / "a", Views(LIGHT, GRID), z_mm=500)
+    save_dataset(tmp_path / "b" / "a", Views(2 * LIGHT, GRID), z_mm=500)
+    single_run.run(open_dataset(tmp_path / "a"), tmp_path / "out", None)
+    with pytest.raises(InputError, match="the results of another dataset"):
+        single_run.run(open_dataset(tmp_path / "b" / "a"), tmp_path / "out", None)

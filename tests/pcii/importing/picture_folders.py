@@ -1,0 +1,61 @@
+"""Folders of small pictures in any format, whose numbers say of which view they are."""
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tifffile
+from PIL import Image
+
+from pcii.importing.camera_order import Optics
+from pcii.io.dataset_layout import write_exr_safely
+
+OPTICS = Optics(pitch_mm=(2.0, 2.0), focal_mm=35.0, sensor_mm=36.0)
+H, W = 6, 8
+
+
+def numbers(k: int, l: int, dtype: Any = np.uint8, channels: int = 3) -> np.ndarray:
+    """An image (H, W, C), different in every pixel, channel and view."""
+    values = np.arange(H * W * channels).reshape(H, W, channels) + 3 * k + l + 1
+    scale = {"uint8": 1, "uint16": 257}.get(np.dtype(dtype).name, 1 / 255)
+    return (values * scale).astype(dtype)
+
+
+def write(path: Path, image: np.ndarray, compression: str | None = None) -> None:
+    """Write an image (H, W, C) in the format of the path's ending, in all of its bits."""
+    if path.suffix == ".exr":
+        write_exr_safely(path, image)
+    elif path.suffix == ".tif":
+        kind = "rgb" if image.shape[2] == 3 else "minisblack"
+        tifffile.imwrite(path, image.squeeze(), photometric=kind, compression=compression)
+    elif path.suffix == ".png" and image.dtype == np.uint16:
+        path.write_bytes(png16(image))
+    else:
+        Image.fromarray(image.squeeze()).save(path)
+
+
+def png16(image: np.ndarray) -> bytes:
+    """A PNG file of 16 bits by the specification, without a library that might share a fault."""
+    height, width, channels = image.shape
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in image)
+    header = struct.pack(">IIBBBBB", width, height, 16, 2 if channels == 3 else 0, 0, 0, 0)
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND")
+    )
+
+
+def chunk(name: bytes, content: bytes = b"") -> bytes:
+    check = zlib.crc32(name + content)
+    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", check)
+
+
+def make_folder(
+    root: Path, rows: int = 2, cols: int = 3, *, ending: str = "png", dtype: Any = np.uint8, channels: int = 3
+) -> Path:
+    """A folder of files col_row.ending."""
+    root.mkdir(parents=True, exist_ok=True)
+    for k, l in np.ndindex(rows, cols):
+        write(root / f"{l}_{k}.{ending}", numbers(k, l, dtype, channels))
+    return root

@@ -1,0 +1,139 @@
+"""Pictures become radiance: formats and bits, curves, which file is which view."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from picture_folders import OPTICS, H, W, make_folder, numbers, write
+from PIL import Image
+
+from pcii.base.errors import InputError
+from pcii.core.images import Views
+from pcii.core.srgb import srgb_to_linear
+from pcii.importing.camera_order import Optics, ViewOrder
+from pcii.importing.image_folders import import_images
+from pcii.importing.light_encoding import to_radiance
+
+PATTERN = "{col}_{row}.%s"
+
+
+def by_the_standard(share: float) -> float:
+    """sRGB to linear as IEC 61966-2-1 has it, one number at a time."""
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("ending", "dtype"),
+    [
+        ("png", "uint8"),
+        ("png", "uint16"),
+        ("tif", "uint8"),
+        ("tif", "uint16"),
+        ("tif", "float32"),
+        ("exr", "float32"),
+    ],
+)
+def test_all_bits_of_every_format_arrive(tmp_path: Path, ending, dtype, channels) -> None:
+    folder = make_folder(tmp_path / "a", ending=ending, dtype=dtype, channels=channels)
+    views = import_images(folder, PATTERN % ending, OPTICS, encoding="linear")
+    assert views.radiance.shape == (2, 3, H, W, channels)
+    most = {"uint8": 255, "uint16": 65535}.get(dtype, 1)
+    for k, l in np.ndindex(2, 3):
+        expected = numbers(k, l, dtype, channels).astype(np.float64) / most
+        np.testing.assert_allclose(views.view(k, l), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
+def test_compressed_tiff(tmp_path: Path, compression: str) -> None:
+    image = numbers(0, 0, np.uint16)
+    write(tmp_path / "0_0.tif", image, compression)
+    views = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear")
+    np.testing.assert_array_equal(np.rint(views.view(0, 0) * 65535), image)
+
+
+def test_jpeg_is_read(tmp_path: Path) -> None:
+    Image.fromarray(np.full((H, W, 3), 188, np.uint8)).save(tmp_path / "0_0.jpg", quality=100)
+    views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
+    np.testing.assert_allclose(views.view(0, 0), by_the_standard(188 / 255), rtol=0.02)
+
+
+def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) -> None:
+    whole = make_folder(tmp_path / "whole")
+    share = float(numbers(1, 2)[3, 4, 1]) / 255
+    curves: list[tuple[Any, float]] = [(None, by_the_standard(share)), ("linear", share), (2.2, share**2.2)]
+    for encoding, expected in curves:
+        views = import_images(whole, PATTERN % "png", OPTICS, encoding=encoding)
+        assert views.view(1, 2)[3, 4, 1] == pytest.approx(expected, rel=1e-5)
+    floats = make_folder(tmp_path / "floats", ending="exr", dtype=np.float32)
+    curves = [(None, share), ("srgb", by_the_standard(share))]
+    for encoding, expected in curves:
+        views = import_images(floats, PATTERN % "exr", OPTICS, encoding=encoding)
+        assert views.view(1, 2)[3, 4, 1] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_srgb_of_every_number(dtype) -> None:
+    most = np.iinfo(dtype).max
+    values = np.linspace(0, most, 300).astype(dtype)
+    expected = [by_the_standard(int(value) / most) for value in values]
+    np.testing.assert_allclose(srgb_to_linear(values), expected, rtol=1e-12)
+    np.testing.assert_allclose(to_radiance(values, None), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern", "grid"),
+    [
+        (lambda k, l: f"{l}_{k}.png", "{col}_{row}.png", None),
+        (lambda k, l: f"r{k + 1:02d}c{l + 7}.png", "r{row:02d}c{col}.png", None),
+        (lambda k, l: f"input_Cam{3 * k + l:03d}.png", "input_Cam{index:03d}.png", (2, 3)),
+        (lambda k, l: f"{3 * k + l + 998}.png", "{index}.png", (2, 3)),
+        (lambda k, l: f"row {k}/[{l}].png", "row {row}/[{col}].png", None),
+    ],
+)
+def test_names_say_which_view_it_is(tmp_path: Path, names, pattern, grid) -> None:
+    for k, l in np.ndindex(2, 3):
+        path = tmp_path / names(k, l)
+        path.parent.mkdir(exist_ok=True)
+        write(path, numbers(k, l))
+    (tmp_path / "notes.txt").write_text("not a view")
+    views = import_images(tmp_path, pattern, OPTICS, grid=grid, encoding="linear")
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))
+    assert views.grid.pixel_mm == 36.0 / W
+    assert (views.grid.rows, views.grid.cols) == (2, 3)
+
+
+def test_numbers_that_count_the_other_way(tmp_path: Path) -> None:
+    for k, l in np.ndindex(2, 3):
+        write(tmp_path / f"{2 * (2 - l) + (1 - k)}.png", numbers(k, l))  # from the right, up the columns
+    order = ViewOrder(swap_axes=True, flip_rows=True, flip_cols=True)
+    views = import_images(tmp_path, "{index}.png", OPTICS, grid=(3, 2), order=order, encoding="linear")
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))
+
+
+def test_grey_pictures_can_be_mosaics(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "a", channels=1)
+    views = import_images(folder, PATTERN % "png", OPTICS, cfa="RGGB")
+    assert (views.cfa, views.channel_count) == ("RGGB", 3)
+
+
+def test_optics_take_a_sensor_or_a_pixel() -> None:
+    lengths: dict[str, Any] = {"pitch_mm": (2, 2), "focal_mm": 35}
+    assert Optics(**lengths, sensor_mm=36).grid((1, 1, 10, 720)).pixel_mm == 0.05
+    assert Optics(**lengths, pixel_mm=0.1).grid((1, 1, 10, 720)).pixel_mm == 0.1
+    both = {"sensor_mm": 36, "pixel_mm": 1}
+    wrong: list[dict[str, Any]] = [{}, both, {"sensor_mm": 0}, {"pixel_mm": -1}, {"sensor_mm": "x"}]
+    for sizes in wrong:
+        with pytest.raises(InputError, match="_mm: "):
+            Optics(**lengths, **sizes)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_views_do_not_take_numbers_of_pictures_for_light(dtype) -> None:
+    grid = OPTICS.grid((1, 2, H, W))
+    with pytest.raises(InputError, match="is sRGB, not light"):
+        Views(np.ones((1, 2, H, W, 3), dtype), grid)
+    Views(srgb_to_linear(np.ones((1, 2, H, W, 3), dtype)), grid)

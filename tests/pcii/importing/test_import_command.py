@@ -1,0 +1,337 @@
+# ruff: noqa: E501
+"""`pcii import` as a new user types it, and fifty ways to give it something wrong."""
+
+import io
+import re
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from picture_folders import H, W, chunk, make_folder, numbers, write
+from PIL import Image
+from rendered_planes import Card, render
+from test_other_sources import PARAMETERS, hci_folder, pfm
+
+from pcii.app.commands import app
+from pcii.base import command_line
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.srgb import linear_to_srgb
+from pcii.io.dataset import open_dataset
+from pcii.io.verification import verify
+
+CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
+NAMED = ["--pattern", "{col}_{row}.png", *CAMERAS]
+GRID = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 120, height=90, width=120)
+
+
+def run(*arguments: object) -> int:
+    return command_line.run(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """3 x 3 sRGB pictures by column and row: a card at 60 mm before a wall at 150 mm."""
+    folder = tmp_path_factory.mktemp("photos")
+    views = render(GRID, [Card(150, seed=1), Card(60, (0.2, 0.8, 0.2, 0.7), 2)], cell=8)
+    for k, l in np.ndindex(3, 3):
+        picture = (255 * linear_to_srgb(views[k, l])).round().astype(np.uint8)
+        Image.fromarray(picture).save(folder / f"{l}_{k}.png")
+    return folder
+
+
+def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "mine"
+    limits = ["--cfa", "GRBG", "--photons", "300", "--z-range-mm", "30", "200", "--licence", "CC0"]
+    assert run("import", photos, "-o", out, *NAMED, *limits) == 0
+    said = capsys.readouterr().out
+    assert "3 x 3 views of 120 x 90 px, GRBG" in said
+    assert "warning" not in said
+    dataset = open_dataset(out)
+    assert dataset.grid == GRID
+    assert dataset.cfa == "GRBG"
+    assert dataset.counts.total == pytest.approx(9 * 300, abs=4 * np.sqrt(2700))
+    assert dataset.views is not None
+    assert dataset.views.cfa == "GRBG"
+    disparities = [467 / z for z in dataset.analysis["z_mm"]]  # in px, from the first camera to the last
+    assert disparities == pytest.approx([467 / 60, 467 / 150], abs=0.4)
+    assert dataset.analysis["z_range_mm"] == [30, 200]
+    assert dataset.manifest["licence"] == "CC0"
+    assert "300 photons expected in each view, seed 1" in dataset.manifest["origin"]
+    assert verify(out) > 10
+    assert run("import", photos, "-o", out, *NAMED, *limits) == 0  # again: the same dataset
+    assert run("import", photos, "-o", out, *NAMED, *limits, "--seed", 2) == 2
+
+
+@pytest.mark.parametrize(
+    ("pattern", "options", "mend"),
+    [
+        ("{row}_{col}.png", [], "with --swap-axes"),
+        ("{col}_{row}.png", ["--flip-rows"], "without --flip-rows"),
+        ("{col}_{row}.png", ["--swap-axes", "--flip-cols"], "without --swap-axes --flip-cols"),
+        ("{row}_{col}.png", ["--flip-cols"], "with --swap-axes and without --flip-cols"),
+    ],
+)
+def test_the_option_that_mends_is_told(photos: Path, tmp_path: Path, capsys, pattern, options, mend) -> None:
+    told = ["--pattern", pattern, *CAMERAS, *options]
+    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
+    assert f"warning: the views fit together far better {mend};" in capsys.readouterr().out
+
+
+def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
+    told = ["--pattern", "{col}_{row}.png", "--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
+    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
+    said = capsys.readouterr().out
+    assert "warning: most is sharp at about" in said
+    assert "--pitch-mm" in said
+
+
+def test_other_sources(tmp_path: Path, capsys) -> None:
+    root = hci_folder(tmp_path / "hci")
+    pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
+    assert run("import", root, "-o", tmp_path / "a", "--photons", 50) == 0
+    dataset = open_dataset(tmp_path / "a")
+    assert dataset.truth is not None
+    np.testing.assert_allclose(dataset.truth.z_mm, 4000)
+    assert dataset.grid.shear_px[0] > 0
+    np.save(tmp_path / "frames.npy", np.ones((2, 3, 4, H, W), np.uint8))
+    cameras = ["--pitch-mm", 5, 5, "--focal-mm", 50, "--pixel-mm", 0.05]
+    assert run("import", tmp_path / "frames.npy", "-o", tmp_path / "b", "--counts", *cameras) == 0
+    assert open_dataset(tmp_path / "b").counts.total == 4 * 6 * H * W
+    write(tmp_path / "lenses.png", np.tile(numbers(0, 0)[:, :6], (3, 4, 1)))
+    lens = ["--lens-array", 3, 4, "--lens-pitch-px", 6, 6, "--focal-mm", 3, "--pixel-mm", 0.01]
+    assert run("import", tmp_path / "lenses.png", "-o", tmp_path / "c", *lens) == 0
+    grid = open_dataset(tmp_path / "c").grid
+    assert (grid.rows, grid.cols, grid.height, grid.pitch_mm) == (3, 4, 6, (0.06, 0.06))
+    assert "nothing is clearly sharp" in capsys.readouterr().out
+
+
+# What is wrong: a folder, the options, and words of the one sentence
+
+Make = Callable[[Path], Any]
+
+
+def folder(change: Make | None = None, **kinds: Any) -> Make:
+    def make(root: Path) -> Path:
+        made = make_folder(root / "in", **kinds)
+        if change is not None:
+            change(made)
+        return made
+
+    return make
+
+
+def picture(mode: str) -> Make:
+    return lambda root: Image.new(mode, (W, H)).save(root / "0_0.png")
+
+
+def png_of(width: int, height: int, bits: int = 8, colour: int = 2) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
+    pixels = zlib.compress(b"\0" * 1000)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND")
+
+
+def content(name: str, data: bytes) -> Make:
+    return lambda root: (root / name).write_bytes(data)
+
+
+def cut(name: str) -> Make:
+    return lambda root: (root / name).write_bytes((root / name).read_bytes()[:-25])
+
+
+def cmyk(root: Path) -> None:
+    buffer = io.BytesIO()
+    Image.new("CMYK", (W, H)).save(buffer, "JPEG")
+    (root / "0_0.png").write_bytes(buffer.getvalue())
+
+
+def turned(root: Path) -> None:
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    buffer = io.BytesIO()
+    Image.new("RGB", (W, H)).save(buffer, "JPEG", exif=exif)
+    (root / "0_0.png").write_bytes(buffer.getvalue())
+
+
+def exr_alpha(root: Path) -> None:
+    import OpenEXR
+
+    planes = {name: np.ones((H, W), np.float32) for name in "RGBA"}
+    with OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, planes
+    ) as file:
+        file.write(str(root / "0_0.exr"))
+
+
+def exr_nan(root: Path) -> None:
+    image = np.ones((H, W, 3), np.float32)
+    image[2, 3, 1] = np.nan
+    write(root / "0_0.exr", image)
+
+
+def hci(old: str = "", new: str = "", *, maps: Make | None = None) -> Make:
+    def make(root: Path) -> Path:
+        made = hci_folder(root / "in")
+        text = PARAMETERS.format(height=H, width=W, rows=3, cols=3)
+        assert old in text
+        (made / "parameters.cfg").write_text(text.replace(old, new) if old else text)
+        if maps is not None:
+            maps(made)
+        return made
+
+    return make
+
+
+def true_depth(image: Any, scale: float = -1.0, name: str = "gt_depth_lowres.pfm") -> Make:
+    return lambda root: pfm(root / name, np.asarray(image, np.float32), scale)
+
+
+def swapped(root: Path) -> None:
+    path = root / "gt_depth_lowres.pfm"
+    pfm(path, np.full((H, W), 4.0))
+    path.write_bytes(path.read_bytes().replace(b"\n-1\n", b"\n1\n"))
+
+
+def array(values: Any, name: str = "in.npy") -> Make:
+    def make(root: Path) -> Path:
+        np.save(root / name, values, allow_pickle=True)
+        return root / name
+
+    return make
+
+
+def file(name: str, data: bytes) -> Make:
+    def make(root: Path) -> Path:
+        (root / name).write_bytes(data)
+        return root / name
+
+    return make
+
+
+def lens_picture(root: Path) -> Path:
+    write(root / "in.png", numbers(0, 0))
+    return root / "in.png"
+
+
+def npz(root: Path) -> Path:
+    np.savez(root / "in.npz", a=np.zeros(3), b=np.zeros(3))
+    return root / "in.npz"
+
+
+def stack(root: Path) -> None:
+    tifffile.imwrite(root / "0_0.tif", np.zeros((3, H, W), np.uint8), photometric="minisblack")
+
+
+def huge_header(root: Path) -> Path:
+    with (root / "in.npy").open("wb") as opened:
+        description = {"descr": "<f8", "fortran_order": False, "shape": (100, 100, 10_000, 10_000)}
+        np.lib.format.write_array_header_1_0(opened, description)
+    return root / "in.npy"
+
+
+PNG, EXR, TIF = ({"ending": ending} for ending in ("png", "exr", "tif"))
+FLOATS = EXR | {"dtype": np.float32}
+LIGHT = np.ones((2, 2, H, W))
+WRONG: list[tuple[str, Make, list[Any], str]] = [
+    ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
+    ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; it is empty"),
+    ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
+    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "of 5 x 5 views 1 are missing: 1_1.png"),
+    ("pattern without field", folder(), ["--pattern", "a.png", *CAMERAS], "pattern: expected {row} and {col}"),
+    ("pattern with one field", folder(), ["--pattern", "{row}.png", *CAMERAS], "pattern: expected {row}"),
+    ("pattern of another field", folder(), ["--pattern", "{x}_{row}.png", *CAMERAS], "pattern: expected"),
+    ("open brace", folder(), ["--pattern", "{col_{row}.png", *CAMERAS], "pattern: expected"),
+    ("format of a pattern", folder(), ["--pattern", "{col:x}_{row}.png", *CAMERAS], "pattern: a number is"),
+    ("pattern that leaves the folder", folder(), ["--pattern", "../{index}.png", *CAMERAS], "pattern: expected names"),
+    ("no pattern", folder(), CAMERAS, "say how files are named with --pattern"),
+    ("two of one view", folder(lambda r: write(r / "00_0.png", numbers(0, 0))), NAMED, "is of the same view as"),
+    ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "the numbers in"),
+    ("no square", folder(lambda r: [p.rename(r / f"{n}.png") for n, p in enumerate(sorted(r.iterdir()))]), ["--pattern", "{index}.png", *CAMERAS], "6 views are no square grid; .*--grid"),
+    ("other grid", folder(), [*NAMED, "--grid", 3, 3], "gives 2 rows and 3 columns, not 3 x 3"),
+    ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm: are needed"),
+    ("no focal length", folder(), ["--pattern", "{col}_{row}.png", *CAMERAS[:3], *CAMERAS[5:]], "--focal-mm: missing"),
+    ("sensor and pixel", folder(), [*NAMED, "--pixel-mm", 1], "either the side of a pixel or the width"),
+    ("pitch 0", folder(), ["--pattern", "{col}_{row}.png", "--pitch-mm", 0, 2, *CAMERAS[3:]], "pitch_mm: expected"),
+    ("photons 0", folder(), [*NAMED, "--photons", 0], "photons: expected a number above 0"),
+    ("cfa unknown", folder(), [*NAMED, "--cfa", "RGB"], "cfa: there is no Bayer pattern"),
+    ("range turned round", folder(), [*NAMED, "--z-range-mm", 200, 30], "z_range_mm: expected two depths"),
+    ("two curves", folder(), [*NAMED, "--linear", "--srgb"], "--srgb, --linear, --gamma: give one"),
+    ("gamma 0", folder(), [*NAMED, "--gamma", 0], "encoding: expected srgb, linear, or a gamma"),
+    ("mixed sizes", folder(lambda r: write(r / "1_1.png", numbers(0, 0)[:5])), NAMED, "8 x 5 px, .* where 0_0.png has 8 x 6"),
+    ("mixed bits", folder(lambda r: write(r / "1_1.png", numbers(0, 0, np.uint16))), NAMED, "of uint16, where .* of uint8"),
+    ("mixed channels", folder(lambda r: write(r / "1_1.png", numbers(0, 0, channels=1))), NAMED, "1 channels .* 3 channels"),
+    ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
+    ("grey alpha", folder(picture("LA")), NAMED, "0_0.png: has an alpha channel"),
+    ("palette", folder(picture("P")), NAMED, "0_0.png: has a palette"),
+    ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
+    ("cmyk", folder(cmyk), NAMED, "0_0.png: a CMYK picture"),
+    ("turned", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("cut off", folder(cut("1_0.png")), NAMED, "1_0.png: damaged or cut off"),
+    ("cut off, 16 bits", folder(cut("1_0.png"), dtype=np.uint16), NAMED, "1_0.png: damaged or cut off"),
+    ("no picture", folder(content("0_0.png", b"GIF89a" + bytes(99))), NAMED, "0_0.png: not a PNG, JPEG, TIFF or EXR"),
+    ("empty file", folder(content("0_0.png", b"")), NAMED, "0_0.png: not a PNG"),
+    ("header only", folder(content("0_0.png", b"\x89PNG\r\n\x1a\n")), NAMED, "0_0.png: its header cannot be read"),
+    ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "60000 x 60000 px, and at most"),
+    ("many large", folder(content("0_0.png", png_of(11_000, 11_000)), rows=1, cols=1), [*NAMED, "--grid", 1, 1], "damaged"),
+    ("no pixels", folder(content("0_0.png", png_of(0, 5))), NAMED, "0 x 5 px"),
+    ("4 bits", folder(content("0_0.png", png_of(W, H, bits=4, colour=0))), NAMED, "a PNG picture of 4 bits"),
+    ("alpha in EXR", folder(exr_alpha, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "has an alpha channel"),
+    ("NaN in EXR", folder(exr_nan, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: holds NaN or infinity"),
+    ("cut EXR", folder(cut("0_0.exr"), **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: "),
+    ("cut TIFF", folder(cut("1_0.tif"), **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "1_0.tif: "),
+    ("pages", folder(stack, channels=1, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "has 3 pages"),
+    ("negative light", array(-LIGHT), [*CAMERAS, "--photons", 9], "holds light below 0"),
+    ("light below 0 encoded", array(-LIGHT), [*CAMERAS, "--srgb"], r"view \(0, 0\) holds numbers below 0"),
+    ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
+    ("three axes", array(LIGHT[0]), CAMERAS, r"expected \(K, L, H, W\)"),
+    ("two channels", array(np.ones((2, 2, H, W, 2))), CAMERAS, r"1 or 3\), got"),
+    ("NaN in array", array(LIGHT * np.nan), CAMERAS, r"view \(0, 0\) holds NaN"),
+    ("complex", array(LIGHT * 1j), CAMERAS, "expected float, uint8 or uint16"),
+    ("objects", array(np.array([None, {}], dtype=object)), CAMERAS, "holds Python objects"),
+    ("no array", file("in.npy", b"not an array"), CAMERAS, "not a NumPy array"),
+    ("huge array", huge_header, CAMERAS, "GiB, and at most 16 are read"),
+    ("several arrays", npz, CAMERAS, "has 2 arrays; name one by --array: a, b"),
+    ("unknown array", npz, [*CAMERAS, "--array", "c"], "has no array 'c'"),
+    ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),
+    ("fractional counts", array(LIGHT / 2), [*CAMERAS, "--counts"], "must be whole numbers"),
+    ("counts in colour", folder(), [*NAMED, "--counts"], "has 3 channels; photon counts have one"),
+    ("counts and photons", folder(), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
+    ("counts and curve", folder(), [*NAMED, "--counts", "--linear"], "--counts: photon counts are linear"),
+    ("lenses in a folder", folder(), ["--lens-array", 2, 2, "--lens-pitch-px", 6, 6, *CAMERAS], "this is a folder"),
+    ("lenses beyond", lens_picture, ["--lens-array", 1, 2, "--lens-pitch-px", 4.5, 6, *CAMERAS], "reach to 8.75, and the picture is 8 px wide"),
+    ("lenses before", lens_picture, ["--lens-array", 1, 1, "--lens-pitch-px", 6, 6, "--lens-offset-px", -1, 0, *CAMERAS], "from -1 px on"),
+    ("no lenses", lens_picture, ["--lens-array", 0, 2, "--lens-pitch-px", 4, 6, *CAMERAS], "rows: expected a whole number of lenses"),
+    ("lens pitch missing", folder(), [*CAMERAS, "--lens-array", 2, 2], "--lens-pitch-px: missing"),
+    ("lens option alone", folder(), [*NAMED, "--inverted"], "are for --lens-array"),
+    ("parameter missing", hci("baseline_mm = 25.0\n"), [], r"\[extrinsics\] lacks baseline_mm"),
+    ("text for a number", hci("100.0", "long"), [], "focal_length_mm: expected a number, got 'long'"),
+    ("NaN for a number", hci("100.0", "nan"), [], "focal_length_mm: expected a number"),
+    ("half a camera", hci("num_cams_x = 3", "num_cams_x = 2.5"), [], "num_cams_x: expected a whole number"),
+    ("no section", hci("[intrinsics]\n", ""), [], "not a file of parameters"),
+    ("other resolution", hci(f"_x_px = {W}", "_x_px = 512"), [], "image_resolution is 512 x 6 px"),
+    ("more cameras than views", hci("num_cams_x = 3", "num_cams_x = 4"), [], "3 are missing: input_Cam009.png"),
+    ("camera options beside", hci(), CAMERAS, "tells the cameras"),
+    ("byte order", hci(maps=swapped), [], "the sign of the scale in its header"),
+    ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 6 x 8 px, where the views are 8 x 6"),
+    ("cut map", hci(maps=lambda r: [true_depth(np.ones((H, W)))(r), cut("gt_depth_lowres.pfm")(r)]), [], "bytes after its header"),
+    ("depth 0", hci(maps=true_depth(np.zeros((H, W)))), [], "depths are not between"),
+    ("NaN depth", hci(maps=true_depth(np.full((H, W), np.nan))), [], "depths are not between"),
+    ("NaN disparity", hci(maps=true_depth(np.full((H, W), np.nan), name="gt_disp_lowres.pfm")), [], "holds NaN"),
+    ("colour map", hci(maps=content("gt_depth_lowres.pfm", b"PF\n8 6\n-1\n")), [], "not a PFM map of one channel"),
+    ("words in a map", hci(maps=content("gt_depth_lowres.pfm", b"Pf\n8 six\n-1\n")), [], "for width, height and scale"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
+def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
+    source, out = make(tmp_path), tmp_path / "out"
+    capsys.readouterr()
+    assert run("import", source, "-o", out, *options) == 2
+    *_, said = capsys.readouterr().err.strip().split("\n")
+    assert said.startswith("error: ")
+    assert re.search(words, said), said
+    assert not out.exists()
