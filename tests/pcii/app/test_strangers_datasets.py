@@ -1,6 +1,7 @@
 """`pcii run` on datasets that no recipe made: with and without truth, counts only, radiance only."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, has: str) -> N
     if "depth" in has:  # of surfaces without names, as in benchmarks of depth
         truth = Truth(np.full((40, 48), 500.0), 0 * IDS, {})
     images = (COUNTS, Views(LIGHT, GRID)) if "views" in has else COUNTS
-    texts = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
+    texts: dict[str, Any] = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
     dataset = save_dataset(tmp_path / "d", images, truth, z_mm=[500, 700], **texts)
     outcome = single_run.run(dataset, tmp_path / "out", None, methods=["brightness"])
     assert outcome.depth is not None
