@@ -135,8 +135,10 @@ def _stored(asked: Request) -> tuple[int, int] | None:
 
 
 def _kind(encoding: Encoding | None) -> str:
-    named = {None: "sRGB or linear by type", "srgb": "sRGB", "linear": "linear"}
-    return named[encoding] if not isinstance(encoding, float | int) else f"gamma {encoding:g}"
+    if isinstance(encoding, float | int):
+        return f"decoded by gamma {encoding:g}"
+    named = {None: "decoded as is usual for their type", "srgb": "decoded from sRGB", "linear": "linear"}
+    return named[encoding]
 
 
 def _with_pattern(imported: Imported, cfa: str | None) -> Imported:

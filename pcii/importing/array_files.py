@@ -72,7 +72,9 @@ def opened_array(source: str | Path | np.ndarray, array: str | None = None) -> t
         numbers = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
-    except (ValueError, EOFError, zipfile.BadZipFile, SyntaxError) as fault:
+    except (InputError, MemoryError):
+        raise
+    except Exception as fault:  # readers raise various exceptions for damaged content
         raise InputError(f"{path}: not a NumPy array ({visible(str(fault))})") from None
     return numbers, str(path)
 
