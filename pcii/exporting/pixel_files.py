@@ -1,6 +1,5 @@
 """Files of pixels that other tools read: PNG of 8 and 16 bits, PFM."""
 
-import io
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +10,9 @@ def write_png(path: Path, image: np.ndarray) -> None:
 
     Pillow, which draws the other pictures, has no colour images of 16 bits.
     """
-    import png
+    import imagecodecs
 
-    height, width = image.shape[:2]
-    rows = np.ascontiguousarray(image, dtype=image.dtype.newbyteorder(">")).reshape(height, -1)
-    bits, grey = 8 * image.dtype.itemsize, image.ndim == 2
-    writer = png.Writer(width, height, greyscale=grey, bitdepth=bits)  # pyright: ignore[reportArgumentType]
-    buffer = io.BytesIO()
-    writer.write_packed(buffer, rows.view(np.uint8))
-    path.write_bytes(buffer.getvalue())
+    path.write_bytes(imagecodecs.png_encode(np.ascontiguousarray(image)))
 
 
 def write_pfm(path: Path, values: np.ndarray) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rendered_planes import Card, render
+from rendered_cards import Card, render
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.importing.camera_order import ViewOrder

@@ -14,7 +14,7 @@ import pytest
 import tifffile
 from picture_folders import H, W, chunk, make_folder, numbers, write
 from PIL import Image
-from rendered_planes import Card, render
+from rendered_cards import Card, render
 from test_other_sources import PARAMETERS, hci_folder, pfm
 
 from pcii.app.commands import app

@@ -7,7 +7,7 @@ import pytest
 import tifffile
 from picture_folders import OPTICS, H, W, numbers, write
 from PIL import Image
-from rendered_planes import Card, render
+from rendered_cards import Card, render
 
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
