@@ -270,6 +270,30 @@ def test_a_budget_that_is_not_there_is_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("app", "command"),
+    [
+        (simgen_cli.app, "generate paper --seeds 2 --workers"),
+        (simgen_cli.app, "generate paper --seeds"),
+        (simgen_cli.app, "generate paper --scenes"),
+        (simgen_cli.app, "check drawn_room --scene"),
+        (simgen_cli.app, "preview drawn_room --scene"),
+        (simgen_cli.app, "preview drawn_room --samples-per-pixel"),
+        (simgen_cli.app, "draw drawn_room --scene"),
+        (pcii_cli.app, "evaluate somewhere --workers"),
+    ],
+)
+@pytest.mark.parametrize("given", ["2.5", "2.0", "1e3", "two"])
+def test_a_number_that_is_not_whole_is_refused_where_one_is_due(
+    app: object, command: str, given: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    option = command.split()[-1]
+    out = [] if "check" in command else ["-o", str(tmp_path / "out")]
+    said = refusal(app, [*command.split(), given, *out], capsys)
+    assert f"{option}: expected a whole number, got '{given}'" in said
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_failure_is_one_line_and_exit_code_1(
     monkeypatch: pytest.MonkeyPatch, small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,13 +18,13 @@ app = App(
     name="pcii",
     help="Reconstruct photon-counted integral images, remove defocused points, and score the result.",
     version=lambda: version("photon-integral-imaging"),
+    default_parameter=Parameter(converter=command_line.converted),
 )
 
 app.command(import_dataset, name="import")
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
-Subpixel = Annotated[int, Parameter(converter=command_line.whole)]
 Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
 Budget = Annotated[
     float | None,
@@ -74,7 +74,7 @@ def reconstruct(
     *,
     out: Out,
     z_mm: Depths = (),
-    subpixel: Subpixel = 1,
+    subpixel: int = 1,
     shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
 ) -> None:
@@ -149,7 +149,7 @@ def segment(
     z_mm: Depths = (),
     method: str = "likelihood",
     without: Without = (),
-    subpixel: Subpixel = 1,
+    subpixel: int = 1,
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages, shown_by
@@ -105,9 +105,13 @@ def _leave(code: int, sentence: str) -> int:
     return code
 
 
-def whole(_: object, tokens: Sequence["Token"]) -> int:
-    """Convert the token of a parameter to an int; raises ValueError for anything else, such as 2.5."""
-    text = tokens[0].value
+def converted(kind: Any, tokens: Sequence["Token"]) -> Any:
+    """Convert what is given for a parameter; raises ValueError for 2.5 workers, which cyclopts makes 2."""
+    from cyclopts import convert
+
+    if kind is not int:
+        return convert(kind, tokens)
+    text = tokens[-1].value
     try:
         return int(text)
     except ValueError:

@@ -7,7 +7,7 @@ from typing import Any, overload
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed
-from pcii.io.collection_layout import Split, check_manifest, read_collection, read_index
+from pcii.io.collection_layout import check_manifest, read_collection, read_index
 from pcii.io.dataset import Dataset, open_dataset
 
 COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
@@ -66,10 +66,6 @@ class Collection(Brief, Sequence[Dataset]):
             and (condition is None or condition(row))
         ]
         return replace(self, rows=tuple(rows))
-
-    def split(self, name: Split) -> "Collection":
-        """The datasets of the training, validation or test split."""
-        return self.where(split=name)
 
     def table(self) -> dict[str, list[Any]]:
         """Columns by name, a value for each dataset: what a data frame is made of."""

@@ -18,6 +18,7 @@ app = App(
     name="simgen",
     help="Make photon-limited elemental images from physics, with their truth.",
     version=lambda: version("photon-integral-imaging"),
+    default_parameter=Parameter(converter=command_line.converted),
 )
 
 MOST_TOLD = 5
@@ -58,8 +59,8 @@ def generate(
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    seeds: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
-    scenes: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
+    seeds: int | None = None,
+    scenes: int | None = None,
     crew: Annotated[Crew, Parameter(name="*")] = ALONE,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base import command_line
 from pcii.base.command_line import say
 
 
@@ -47,7 +46,7 @@ def check(
     target: str,
     *,
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    scene: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
+    scene: int | None = None,
     json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
 ) -> int:
     """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
@@ -97,7 +96,7 @@ def preview(
     *,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
-    scene: Annotated[int | None, Parameter(converter=command_line.whole)] = None,
+    scene: int | None = None,
     samples_per_pixel: int = 32,
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
@@ -132,7 +131,7 @@ def preview(
 def draw(
     target: str,
     *,
-    scene: Annotated[int, Parameter(converter=command_line.whole)],
+    scene: int,
     out: Annotated[Path, Parameter(name=("--out", "-o"))],
 ) -> None:
     """Write one draw of a distribution of scenes as a scene of its own, with the files that it names.

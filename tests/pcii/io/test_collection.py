@@ -62,7 +62,7 @@ def test_datasets_are_found_by_any_value(collection: Collection) -> None:
 
 
 def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None:
-    parts = {name: collection.split(name) for name in ("train", "validation", "test")}
+    parts = {name: collection.where(split=name) for name in ("train", "validation", "test")}
     assert [len(part) for part in parts.values()] == [32, 4, 4]
     scenes = [{row["scene_number"] for row in part.rows} for part in parts.values()]
     assert set.union(*scenes) == set(range(20))
