@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from pcii.io.collection_layout import (
     write_index,
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_manifest
+from simgen.dataset.software import decisive_versions, other_versions
 from simgen.spec.sweeps import Sweep
 
 Row = Mapping[str, Any]
@@ -29,7 +29,7 @@ def begin(sweep: Sweep, out: Path) -> None:
     """Make the folder of a sweep's collection, or see that it is one of the same recipe.
 
     Other values of the swept fields may be there already. `InputError` for a file, a dataset, the
-    collection of another recipe, or a folder that holds something else.
+    collection of another recipe or other software, or a folder that holds something else.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: this is a file; name a folder for the collection")
@@ -38,7 +38,7 @@ def begin(sweep: Sweep, out: Path) -> None:
     document = {
         "fields": [axis.field for axis in sweep.axes],
         "recipe": {name: value for name, value in sweep.base.items() if name != "publication"},
-        "software": {"photon-integral-imaging": version("photon-integral-imaging")},
+        "versions": decisive_versions(),
     }
     out.mkdir(parents=True, exist_ok=True)
     others = [
@@ -53,6 +53,12 @@ def begin(sweep: Sweep, out: Path) -> None:
     if any(known.get(name) != document[name] for name in ("fields", "recipe")):
         raise InputError(
             f"{out}: holds the collection of another recipe or of other swept fields; name a new folder"
+        )
+    differ = other_versions(known.get("versions", {}))
+    if differ:
+        raise InputError(
+            f"{out}: holds the collection that was made with {differ}; name a new folder, or install those "
+            "versions"
         )
 
 

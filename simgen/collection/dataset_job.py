@@ -6,12 +6,14 @@ process that holds it.
 
 from pathlib import Path
 
+from pcii.base.errors import InputError
 from pcii.base.progress import silent
 from simgen.collection.collection_folder import Row, row_of
 from simgen.dataset.dataset_folder import finished
 from simgen.dataset.generation import make
 from simgen.dataset.prepared import prepare
 from simgen.dataset.reuse import Reuse
+from simgen.dataset.software import decisive_versions, other_versions
 from simgen.renderer import backend
 from simgen.spec.sweeps import Sweep
 
@@ -21,12 +23,19 @@ class DatasetJob:
 
     def __init__(self, sweep: Sweep, out: Path) -> None:
         self.sweep, self.out, self.reuse = sweep, out, Reuse()
+        self.versions = decisive_versions()
 
     def __call__(self, piece: int) -> Row:
         """Make one dataset, unless it is finished; its row of the index.
 
-        Raises `BusyError` if another process is at it, `InputError` if it cannot be made.
+        Raises `BusyError` if another process is at it, `InputError` if it cannot be made, or if this process
+        has other versions of the software than the one that made the job.
         """
+        differ = other_versions(self.versions)
+        if differ:
+            raise InputError(
+                f"{self.name(piece)}: the collection is made with {differ}; install those versions"
+            )
         prepared = prepare(self.sweep.recipe(piece), self.sweep.near)
         folder = self.out / self.sweep.folder(piece)
         # Sizes show well enough that it is whole: hashes are compared when it is read and verified.

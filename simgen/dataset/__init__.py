@@ -10,4 +10,5 @@ rendered_views    Radiance images of every view on disk: products of a dataset, 
 resources         What a recipe takes of the machine, estimated before any work: memory of each step,
                   bytes of each product.
 reuse             What datasets that are made one after another have in common, made once.
+software          The software that a dataset is made with: other versions may give other bytes.
 """

@@ -2,15 +2,16 @@
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import is_locked, locked
-from pcii.io.dataset_layout import MARKER
-from pcii.io.dataset_writer import held_dataset
+from pcii.io.dataset_layout import MANIFEST, MARKER, REMEDY, read_manifest
+from pcii.io.sealed_json import check_file
+from simgen.dataset.software import DECISIVE, other_versions, versions
 
 
 def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
@@ -19,7 +20,23 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
     folder that holds anything else.
     """
-    return None if (out / MARKER).is_file() else held_dataset(out, identity, content=content)
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: this is a file; name a folder for the dataset")
+    if not out.is_dir() or not any(out.iterdir()) or (out / MARKER).is_file():
+        return None
+    if not (out / MANIFEST).is_file():
+        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    return whole(out, identity, content=content)
+
+
+def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
+    """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
+    manifest = read_manifest(out)
+    if manifest.get("identity") != identity:
+        raise _other(out, "dataset", manifest.get("versions", {}))
+    for name, entry in manifest["files"].items():
+        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
+    return manifest
 
 
 def check_free(out: Path) -> None:
@@ -38,7 +55,8 @@ def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
             if text:
                 _check_begun(out / MARKER, text, identity, engine)
             else:
-                file.write(json.dumps({"identity": identity, "backend": engine}).encode())
+                mark = {"identity": identity, "versions": versions(), "backend": engine}
+                file.write(json.dumps(mark).encode())
                 file.flush()
                 os.fsync(file.fileno())
             yield out / MARKER
@@ -50,19 +68,28 @@ def _busy(out: Path) -> BusyError:
     return BusyError(f"{out}: another run is writing this dataset")
 
 
+def _other(out: Path, what: str, made_with: Mapping[str, str]) -> InputError:
+    """That a folder holds something of another recipe, or of other versions of the software."""
+    differ = other_versions(made_with)
+    if differ:
+        return InputError(
+            f"{out}: holds the {what} that was made with {differ}; name a new or empty folder, or install "
+            "those versions"
+        )
+    return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
+
+
 def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
     """Raise `InputError` unless the dataset was begun for the same recipe on the same backend."""
     decisive = ("variant", "mitsuba", "drjit")
     try:
         begun = json.loads(text)
         known, before = begun["identity"], {key: begun["backend"][key] for key in decisive}
+        made_with = {name: begun["versions"][name] for name in DECISIVE}
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{marker}: damaged; delete the folder {marker.parent} to start again") from None
     if known != identity:
-        raise InputError(
-            f"{marker.parent}: holds the unfinished dataset of another recipe or scene; "
-            "name a new or empty folder"
-        )
+        raise _other(marker.parent, "unfinished dataset", made_with)
     if before != {key: engine[key] for key in decisive}:
         raise InputError(
             f"{marker.parent}: was begun with {before['variant']}, and this machine now runs "

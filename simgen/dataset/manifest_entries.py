@@ -1,10 +1,10 @@
 """What the manifest says of a dataset: recipe, scene, software, and what work was skipped."""
 
 from dataclasses import asdict
-from importlib.metadata import version
 from typing import Any
 
 from simgen.dataset.prepared import Prepared
+from simgen.dataset.software import versions
 from simgen.photons.counting_plan import Plan
 from simgen.renderer.mitsuba_scene import RenderScene
 
@@ -26,7 +26,7 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
         "analysis": recipe.analysis.model_dump(mode="json"),
         "recipe": prepared.recipe_of_data,
         "scene": scene.model_dump(mode="json"),
-        "versions": {name: version(name) for name in ("photon-integral-imaging", "numpy", "zarr")},
+        "versions": versions(),
     }
 
 

@@ -14,6 +14,7 @@ from pcii.io.sealed_json import hash_file
 from simgen.base.asset_names import asset
 from simgen.cameras.calibration import rig_of
 from simgen.dataset.resources import Needs
+from simgen.dataset.software import decisive_versions
 from simgen.photons.counting_plan import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
@@ -55,10 +56,14 @@ class Prepared:
 
     @cached_property
     def identity(self) -> str:
-        """Hash of all that decides the dataset's content, but for the machine."""
+        """Hash of all that decides the dataset's content, but for the machine: what a cache goes by.
+
+        Recipe and scene as they are resolved, every byte of the files that they name, versions of software.
+        """
         content = self.scene_content | {
             "recipe": self.recipe_of_data,
             "format_version": FORMAT_VERSION,
+            "software": decisive_versions(),
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

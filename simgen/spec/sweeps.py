@@ -87,17 +87,16 @@ class Sweep:
     def _with(self, values: Mapping[str, Any]) -> dict[str, Any]:
         plain = deepcopy(dict(self.written))
         for field, value in values.items():
-            *tables, last = field.split(".")
-            target = plain
-            for table in tables:
-                target = target[table]
-            target[last] = value
+            _put(plain, field, value)
         return plain
 
     @cached_property
     def base(self) -> dict[str, Any]:
-        """What all datasets have in common: the recipe without the swept values."""
-        return self._with({axis.field: None for axis in self.axes})
+        """What all datasets have in common: the recipe with all defaults, None for the swept values."""
+        resolved = self.recipe(0).model_dump(mode="json")
+        for axis in self.axes:
+            _put(resolved, axis.field, None)
+        return resolved
 
     def check(self) -> None:
         """Raise `InputError` if a value of a swept field makes no recipe beside the others' first values."""
@@ -153,6 +152,14 @@ def _read(name_or_path: str, overrides: Sequence[str]) -> tuple[dict[str, Any], 
         override(values, overrides)
         return values, f"a recipe of the scene {name_or_path}", Path()
     return read_recipe(name_or_path, overrides)
+
+
+def _put(values: dict[str, Any], field: str, value: Any) -> None:
+    """Set a field, dotted, whose tables are there."""
+    *tables, last = field.split(".")
+    for table in tables:
+        values = values[table]
+    values[last] = value
 
 
 def _swept(values: Mapping[str, Any], model: type[BaseModel], prefix: str) -> Iterator[tuple[str, Any]]:

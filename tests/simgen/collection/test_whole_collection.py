@@ -23,6 +23,7 @@ from pcii.io.verification import verify
 from simgen.app import commands as cli
 from simgen.collection import dataset_job
 from simgen.collection.whole_collection import generate_collection
+from simgen.dataset import software
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
 from simgen.spec.sweeps import Sweep, load_sweep
@@ -132,6 +133,30 @@ def test_another_recipe_a_dataset_and_a_file_are_refused(
     recipe, near = load_recipe(str(recipe_file), ["photons.budget=5"])
     with pytest.raises(InputError, match="holds something else"):
         generate(recipe, near, collection)
+
+
+def test_the_same_recipe_written_otherwise_is_the_same_collection(collection: Path, tmp_path: Path) -> None:
+    other, before = tmp_path / "other.toml", (collection / COLLECTION).read_bytes()
+    grid = "\n".join(reversed(GRID_2_X_3.strip().splitlines()[1:]))
+    other.write_text(
+        'seed = { range = [7, 10] } # as with --seeds 3\nscene = "plain_pair"\ntitle = ""\n'
+        f"[photons]\nbudget = {{ each = [100, 200] }}\nscope = 'view'\n[grid]\nfocal_mm = 50\n{grid}"
+    )
+    assert generate_collection(load_sweep(str(other)), collection) == []
+    assert (collection / COLLECTION).read_bytes() == before
+    assert len(open_collection(collection)) == 6
+
+
+def test_other_software_neither_extends_a_collection_nor_works_on_it(
+    recipe_file: Path, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job, original = dataset_job.DatasetJob(sweep_of(recipe_file), tmp_path), software.version
+    monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
+    with pytest.raises(InputError, match=r"holds the collection that was made with .* mitsuba 9\.9"):
+        generate_collection(sweep_of(recipe_file, 4), collection)
+    with pytest.raises(InputError, match=r"is made with .* mitsuba 9\.9.*; install those versions"):
+        job(0)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_workers_make_the_same_bytes_and_the_same_index_but_for_times(

@@ -16,7 +16,7 @@ from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
 from pcii.io.verification import verify
 from simgen.cameras.calibration import rig_of
-from simgen.dataset import rendered_views
+from simgen.dataset import rendered_views, software
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import Prepared
 from simgen.spec.recipe import Recipe
@@ -157,6 +157,25 @@ def test_a_folder_with_something_else_is_refused_and_untouched(made: Path, tmp_p
         generate(recipe(seed=99), Path(), made)
     with pytest.raises(InputError, match="this is a file"):
         generate(recipe(), Path(), tmp_path / "thesis.tex")
+
+
+@pytest.mark.parametrize("package", ["photon-integral-imaging", "mitsuba"])
+def test_what_other_software_made_is_refused_and_untouched(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    out, original = tmp_path / "begun", software.version
+    monkeypatch.setattr(
+        rendered_views, "render_view", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
+    with pytest.raises(KeyboardInterrupt):
+        generate(recipe(), Path(), out)
+    monkeypatch.setattr(software, "version", lambda name: "9.9" if name == package else original(name))
+    before = digest(out)
+    for folder, what in ((made, "holds the dataset"), (out, "holds the unfinished dataset")):
+        with pytest.raises(InputError, match=f"{what} that was made with .* and here is .*{package} 9.9"):
+            generate(recipe(), Path(), folder)
+    assert digest(out) == before
+    assert verify(made) > 0
 
 
 @pytest.mark.parametrize("part", ["counts.zarr/n/c/0", "truth.zarr/z_mm/c/0/0", f"{RADIANCE}/view_00_01.exr"])
