@@ -113,33 +113,24 @@ def named_in_errors(path: Path) -> Iterator[None]:
 def locked(path: Path, *, wait: bool) -> Iterator[IO[bytes]]:
     """The file `path`, created if missing, open for reading and appending and locked against other processes.
 
-    The holder of the lock may delete the file. Raises BlockingIOError if another process holds it and
-    `wait` is false.
+    The holder of the lock may delete the file, and its folder. Raises BlockingIOError if another process
+    holds it and `wait` is false.
     """
     import fcntl  # not available on every system, and needed by writers only
 
     while True:
-        with path.open("a+b") as file:
+        try:
+            opened = path.open("a+b")
+        except FileNotFoundError:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            continue
+        with opened as file:
             fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
             # The last holder may have deleted the file between opening and locking; then try again.
             if _is_same_file(file, path):
                 file.seek(0)
                 yield file
                 return
-
-
-def is_locked(path: Path) -> bool:
-    """Whether another process holds the lock on a file; a file that does not exist is not made."""
-    import fcntl
-
-    try:
-        with path.open("rb") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except FileNotFoundError:
-        return False
-    except BlockingIOError:
-        return True
-    return False
 
 
 def _is_same_file(file: IO[bytes], path: Path) -> bool:

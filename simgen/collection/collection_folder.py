@@ -86,12 +86,16 @@ def _finished_rows(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> list[Row
     for number in range(len(sweep)):
         name = sweep.folder(number)
         row = rows.get(number) or listed.get(name)
-        if row is None and name in present and (out / name / MANIFEST).is_file():
+        if row is None and name in present and _is_finished(out / name):
             row = row_of(sweep, number, out, read_manifest(out / name))
         if row is not None:
             found[name] = row
     others = {name: row for name, row in listed.items() if name not in found and name in present}
     return [*found.values(), *others.values()]
+
+
+def _is_finished(folder: Path) -> bool:
+    return (folder / MANIFEST).is_file() and not (folder / MARKER).exists()
 
 
 def _known(out: Path) -> list[dict[str, Any]]:

@@ -2,13 +2,13 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import BusyError, InputError
-from pcii.base.safe_files import is_locked, locked
+from pcii.base.safe_files import locked
 from pcii.io.dataset_layout import MANIFEST, MARKER, REMEDY, read_manifest
 from pcii.io.sealed_json import check_file
 from simgen.dataset.software import DECISIVE, other_versions, versions
@@ -39,16 +39,14 @@ def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     return manifest
 
 
-def check_free(out: Path) -> None:
-    """Raise `BusyError` if another process is making the dataset."""
-    if is_locked(out / MARKER):
-        raise _busy(out)
-
-
 @contextmanager
 def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
-    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark."""
-    out.mkdir(parents=True, exist_ok=True)
+    """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark.
+
+    If nothing was put into the folder before the block raises, the mark is removed, and what folders were
+    made for it. Raises `BusyError` at once if another process is making the dataset.
+    """
+    new = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
         with locked(out / MARKER, wait=False) as file:
             text = file.read()
@@ -59,13 +57,22 @@ def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
                 file.write(json.dumps(mark).encode())
                 file.flush()
                 os.fsync(file.fileno())
-            yield out / MARKER
+            try:
+                yield out / MARKER
+            except BaseException:
+                _leave_nothing(out, new)
+                raise
     except BlockingIOError:
-        raise _busy(out) from None
+        raise BusyError(f"{out}: another run is writing this dataset") from None
 
 
-def _busy(out: Path) -> BusyError:
-    return BusyError(f"{out}: another run is writing this dataset")
+def _leave_nothing(out: Path, new: Sequence[Path]) -> None:
+    """Remove the mark of a folder in which there is nothing else, and these folders if they are empty."""
+    with suppress(OSError):
+        if [entry.name for entry in out.iterdir()] == [MARKER]:
+            (out / MARKER).unlink()
+            for folder in new:
+                folder.rmdir()
 
 
 def _other(out: Path, what: str, made_with: Mapping[str, str]) -> InputError:

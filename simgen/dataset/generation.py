@@ -21,9 +21,8 @@ from pcii.io.dataset_layout import (
     read_manifest,
     write_manifest,
 )
-from pcii.io.dataset_writer import held_dataset
 from pcii.io.sealed_json import list_files
-from simgen.dataset.dataset_folder import check_free, claimed, finished
+from simgen.dataset.dataset_folder import claimed, finished, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
@@ -70,25 +69,23 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     What it has in common with those made before with the same `reuse` is not made again. Raises
     `BusyError` if another process is at it.
     """
-    check_free(out)
     recipe, identity = prepared.recipe, prepared.identity
     needs = needs_of(recipe)
     check_resources(needs, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)
     clock, made, capture = _Clock(), None, capture_of(recipe)
     common = in_common(reuse, prepared, engine)
-    with clock.stage("load"):  # before the folder is made: a bad scene shows here
-        render_scene = common.scene(prepared.render_scene)
-    if recipe.products.counts:  # likewise: too much light
-        with clock.stage("plan"):
-            samples = least_samples(recipe)
-            made = common.plan(partial(plan, capture, render_scene, engine["kind"], samples))
-            check_resources(needs, made, out)
     with named_in_errors(out), claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
-            held_dataset(out, identity)
-            return read_manifest(out)
+            return whole(out, identity, content=True)
+        with clock.stage("load"):  # before anything is written: a bad scene shows here
+            render_scene = common.scene(prepared.render_scene)
+        if recipe.products.counts:  # likewise: too much light
+            with clock.stage("plan"):
+                samples = least_samples(recipe)
+                made = common.plan(partial(plan, capture, render_scene, engine["kind"], samples))
+                check_resources(needs, made, out)
         sweep_temporaries(out)
         photons = _work(prepared, capture, render_scene, made, common, out, clock, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)

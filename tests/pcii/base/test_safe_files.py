@@ -120,3 +120,12 @@ def test_a_process_that_waited_for_a_lock_that_was_deleted_holds_a_new_one(tmp_p
         path.unlink()
     thread.join(5)
     assert order == ["first", "second", True]
+
+
+def test_a_lock_is_got_in_a_folder_that_is_not_there_or_was_deleted(tmp_path):
+    path = tmp_path / "new" / "lock"
+    for _ in range(2):
+        with locked(path, wait=False) as file:
+            assert os.path.samestat(os.fstat(file.fileno()), path.stat())
+            path.unlink()
+            path.parent.rmdir()

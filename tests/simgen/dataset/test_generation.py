@@ -140,6 +140,22 @@ def test_a_run_is_refused_while_another_one_writes(tmp_path: Path) -> None:
             generate(recipe(), Path(), tmp_path / "out")
 
 
+def test_a_scene_that_cannot_be_loaded_leaves_no_folder_behind(tmp_path: Path) -> None:
+    (tmp_path / "scene").mkdir()
+    (tmp_path / "scene" / "a.png").write_text("no picture")
+    (tmp_path / "scene" / "scene.toml").write_text(
+        'title = "bad"\n[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 1.0\n[[objects]]\nname = "card"\n'
+        'position_mm = [0, 0, 500]\nmaterial = { texture = "a.png" }\n'
+        'shape = { type = "card", width_mm = 9.0, height_mm = 9.0 }\n'
+    )
+    (tmp_path / "empty").mkdir()
+    for out in (tmp_path / "new" / "deep" / "out", tmp_path / "empty"):
+        with pytest.raises(InputError, match="this file is not a PNG"):
+            generate(recipe(scene=str(tmp_path / "scene")), Path(), out)
+    assert not (tmp_path / "new").exists()
+    assert list((tmp_path / "empty").iterdir()) == []
+
+
 @pytest.mark.parametrize("content", ["{", "[]", '{"identity": 1}', '{"identity": "", "backend": 3}'])
 def test_a_damaged_mark_of_an_unfinished_dataset_is_named(tmp_path: Path, content: str) -> None:
     (tmp_path / "out").mkdir()

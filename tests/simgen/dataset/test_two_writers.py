@@ -1,0 +1,83 @@
+"""Two processes that make the same dataset, or the same collection, at the same time."""
+
+import random
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from digests import digest
+from tiny import GRID_2_X_2, with_radiance
+from writers import Writer
+
+from pcii.io.collection import open_collection
+from pcii.io.verification import verify
+
+pytestmark = pytest.mark.renders
+TIMES = [1, pytest.param(20, marks=pytest.mark.slow)]
+REFUSED_WITHIN_S = 1.0
+"""From the call of the command in a process that has imported all modules, to its end."""
+LATER_S = 1.0
+"""The second begins at most so much later; the first takes longer to load the scene alone."""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("log") / "made.txt"
+
+
+@pytest.fixture(scope="module")
+def writers(log: Path) -> Iterator[tuple[Writer, Writer]]:
+    both = Writer(log), Writer(log)
+    yield both
+    for writer in both:
+        writer.close()
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_of_two_on_one_dataset_one_is_refused_at_once(
+    writers: tuple[Writer, Writer], tmp_path: Path, times: int
+) -> None:
+    recipe, alone, chance = tmp_path / "one.toml", tmp_path / "alone", random.Random(times)
+    recipe.write_text(with_radiance(1).replace("seed = { range = [0, 1] }\n", ""))
+    writers[0].start("generate", str(recipe), "-o", str(alone))
+    assert writers[0].end().code == 0
+    for number in range(times):
+        out = tmp_path / f"shared-{number}"
+        first, second = chance.sample(writers, 2)
+        first.start("generate", str(recipe), "-o", str(out))
+        time.sleep(chance.choice([0, chance.uniform(0, LATER_S)]))
+        second.start("generate", str(recipe), "-o", str(out))
+        one, other = sorted([first.end(), second.end()])
+        assert (one.code, other.code) == (0, 2)
+        assert other.seconds < REFUSED_WITHIN_S
+        sentence = f"error: {out}: another run is writing this dataset"
+        assert other.error.splitlines()[-1] == sentence
+        assert digest(out) == digest(alone)
+        assert verify(out) == verify(alone)
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_two_on_one_collection_share_the_work(
+    writers: tuple[Writer, Writer], log: Path, tmp_path: Path, times: int
+) -> None:
+    recipe, alone = tmp_path / "many.toml", tmp_path / "alone"
+    recipe.write_text(
+        f'scene = "plain_pair"\nseed = {{ range = [0, 3] }}\n{GRID_2_X_2}[photons]\nbudget = 200\n'
+    )
+    writers[0].start("generate", str(recipe), "-o", str(alone))
+    assert writers[0].end().code == 0
+    names = [row["path"] for row in open_collection(alone).rows]
+    assert len(names) == 3
+    for number in range(times):
+        out = tmp_path / f"shared-{number}"
+        log.unlink()
+        for writer in writers:
+            writer.start("generate", str(recipe), "-o", str(out))
+        assert [writer.end().code for writer in writers] == [0, 0]
+        assert sorted(log.read_text().splitlines()) == sorted(str(out / name) for name in names)
+        assert [row["path"] for row in open_collection(out).rows] == names
+        assert {name: digest(out / name) for name in names} == {name: digest(alone / name) for name in names}
+        assert verify(out) == verify(alone)
+        shutil.rmtree(out)
