@@ -20,9 +20,14 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
     folder that holds anything else.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the dataset")
-    if not out.is_dir() or not any(out.iterdir()) or (out / MARKER).is_file():
+    try:
+        entries = {entry.name for entry in out.iterdir()}
+    except FileNotFoundError:
+        return None
+    except NotADirectoryError:
+        raise InputError(f"{out}: this is a file; name a folder for the dataset") from None
+    # In this order, since another run may finish it meanwhile: the manifest is there before the mark is gone.
+    if entries <= {MARKER} or (out / MARKER).is_file():
         return None
     if not (out / MANIFEST).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")

@@ -71,7 +71,6 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     """
     recipe, identity = prepared.recipe, prepared.identity
     needs = needs_of(recipe)
-    check_resources(needs, None, out)
     engine = backend.describe(spectral=recipe.is_spectral)
     clock, made, capture = _Clock(), None, capture_of(recipe)
     common = in_common(reuse, prepared, engine)
@@ -79,6 +78,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return whole(out, identity, content=True)
+        check_resources(needs, None, out)
         with clock.stage("load"):  # before anything is written: a bad scene shows here
             render_scene = common.scene(prepared.render_scene)
         if recipe.products.counts:  # likewise: too much light

@@ -75,7 +75,8 @@ def test_two_on_one_collection_share_the_work(
         log.unlink()
         for writer in writers:
             writer.start("generate", str(recipe), "-o", str(out))
-        assert [writer.end().code for writer in writers] == [0, 0]
+        ends = [writer.end() for writer in writers]
+        assert [end.code for end in ends] == [0, 0], ends
         assert sorted(log.read_text().splitlines()) == sorted(str(out / name) for name in names)
         assert [row["path"] for row in open_collection(out).rows] == names
         assert {name: digest(out / name) for name in names} == {name: digest(alone / name) for name in names}
