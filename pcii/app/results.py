@@ -23,6 +23,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.safe_files import (
     locked,
+    named_in_errors,
     replace_folder,
     sweep_temporaries,
     sync_folder,
@@ -78,7 +79,7 @@ class Results:
         """Make the folder and lock it against other writers until the end of the block."""
         self.check()
         self.path.mkdir(parents=True, exist_ok=True)
-        with locked(self.path / LOCK, wait=True):
+        with named_in_errors(self.path), locked(self.path / LOCK, wait=True):
             try:
                 self.check()
                 sweep_temporaries(self.path)

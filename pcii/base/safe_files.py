@@ -18,7 +18,7 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with named_in_errors(path), os.fdopen(handle, "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -65,7 +65,7 @@ def replace_folder(new: Path, folder: Path) -> None:
     new.chmod(0o755)
     for file in new.rglob("*"):
         if file.is_file():
-            with file.open("rb") as opened:
+            with named_in_errors(folder), file.open("rb") as opened:
                 os.fsync(opened.fileno())
     with temporary_folder(folder) as old:
         replaces = folder.exists()
@@ -84,7 +84,8 @@ def sync_folder(folder: Path) -> None:
     """Flush a folder's entries (new names, renames) to disk."""
     handle = os.open(folder, os.O_RDONLY)
     try:
-        os.fsync(handle)
+        with named_in_errors(folder):
+            os.fsync(handle)
     finally:
         os.close(handle)
 

@@ -10,6 +10,7 @@ from typing import Any
 from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.base.safe_files import named_in_errors
 from pcii.depth.depth_map import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.rows import (
@@ -61,7 +62,7 @@ def evaluate(
     crew: Crew = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
-    """Score methods on datasets and compare them; returns the content of evaluation.json (`summarise`).
+    """Score methods on datasets and compare them; returns the figures of evaluation.json (`summarise`).
 
     `datasets` are dataset folders, collections, or folders of dataset folders. `methods` default to all;
     "depth" is the depth map. `budgets` default to all that each dataset has. `crew` does the work.
@@ -90,7 +91,7 @@ def evaluate(
             if done.fault:
                 raise InputError(done.fault)
             report("scores", finished, len(remaining))
-    with all_rows(folder) as rows:
+    with all_rows(folder) as rows, named_in_errors(folder):
         result = summarise(rows)
         write_evaluation(folder, result)
     return result

@@ -5,17 +5,23 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.plain_text import in_markdown
-from pcii.base.safe_files import write_bytes_safely, write_json_safely
+from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.tables import budget_name, markdown, overview, tables_of, with_interval
+from pcii.io.evaluation_layout import seal_evaluation
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
-    """Write the result of `summarise` as evaluation.json, evaluation.md and evaluation.html."""
-    write_json_safely(out / "evaluation.json", evaluation)
-    write_bytes_safely(out / "evaluation.md", _markdown(evaluation).encode())
-    write_bytes_safely(out / "evaluation.html", _page(evaluation))
+    """Write the result of `summarise` as evaluation.md and evaluation.html, and last as evaluation.json.
+
+    The caller keeps others from adding rows meanwhile.
+    """
+    sweep_temporaries(out)
+    pages = {"evaluation.md": _markdown(evaluation).encode(), "evaluation.html": _page(evaluation)}
+    for name, content in pages.items():
+        write_bytes_safely(out / name, content)
+    seal_evaluation(out, evaluation, list(pages))
 
 
 def _methods(evaluation: Mapping[str, Any]) -> list[str]:

@@ -1,6 +1,7 @@
 """rows.jsonl: one JSON object per measured score, written safely by several processes at once.
 
-A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice.
+A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice. It ends in
+a checksum of its line (see `pcii.io.sealed_json`).
 """
 
 import hashlib
@@ -12,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import locked
+from pcii.base.safe_files import locked, named_in_errors
 from pcii.io.dataset import Dataset
+from pcii.io.evaluation_layout import ROWS
+from pcii.io.sealed_json import check_seal, sealed
 
-ROWS = "rows.jsonl"
 DEPTH = "depth"
 """Name of the depth map among the methods."""
 Row = dict[str, Any]
@@ -83,25 +85,26 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
     """All rows of the folder, each key once; other processes wait until the block ends before they add any.
 
     A last line without a line break is left by a process that was killed, and is ignored. Raises `InputError`
-    for any other line that is not a row.
+    for any other line that is not a row as it was written.
     """
     with locked(out / ROWS, wait=True) as file:
         *lines, _ = file.read().split(b"\n")
         rows: dict[Key, Row] = {}
         for number, line in enumerate(lines, start=1):
             try:
+                check_seal(line)
                 row = json.loads(line)
+                del row["sha256"]
                 rows.setdefault(key_of(row), row)
-            except (ValueError, KeyError, TypeError):
-                raise InputError(f"{out / ROWS}: line {number} is damaged; delete that line") from None
+            except (ValueError, KeyError, TypeError) as fault:
+                raise InputError(f"{out / ROWS}: line {number}: {fault}; delete that line") from None
         yield list(rows.values())
 
 
 def append_row(out: Path, row: Row) -> None:
     """Add a row and flush it to disk, after removing an incomplete last line of a killed process."""
-    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
-    line = text.encode(errors="backslashreplace") + b"\n"
-    with locked(out / ROWS, wait=True) as file:
+    line = sealed(row, _on_one_line) + b"\n"
+    with named_in_errors(out / ROWS), locked(out / ROWS, wait=True) as file:
         if file.seek(0, os.SEEK_END):
             file.seek(-1, os.SEEK_END)
             if file.read(1) != b"\n":
@@ -110,3 +113,9 @@ def append_row(out: Path, row: Row) -> None:
         file.write(line)
         file.flush()
         os.fsync(file.fileno())
+
+
+def _on_one_line(row: Mapping[str, Any]) -> bytes:
+    text = json.dumps(row, ensure_ascii=False, allow_nan=False)
+    # Names of files may hold bytes that are not valid characters.
+    return text.encode(errors="backslashreplace")

@@ -7,6 +7,8 @@ dataset            Datasets: counts, truth and radiance of a dataset folder, che
 dataset_layout     The dataset folder on disk: its files, their arrays and its manifest.
 dataset_writer     Datasets written from images and truth in memory: whole folders that `open_dataset`
                    opens.
+evaluation_layout  The folder of an evaluation: rows that grow while several processes measure, and what
+                   sums them up.
 manifest_schema    Pydantic models of the manifests; members that they do not name are allowed and
                    ignored.
 results_list       The file results.json: the dataset of the results in a folder, and their files with
@@ -15,7 +17,8 @@ sealed_json        JSON documents that list the files of a folder and end in a c
                    itself.
 stored_radiance    Radiance on disk, one EXR file per view, each read when it is used.
 suggested_depths   Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
-verification       Comparison of all files of a dataset, of results or of a collection with its manifest.
+verification       Comparison of all files of a dataset, a collection, results or an evaluation with its
+                   manifest.
 zarr_groups        Groups of arrays on disk: Zarr v3, zstd and crc32c, each array with its axes, unit and
                    meaning.
 """

@@ -147,13 +147,18 @@ class DatasetManifest(_Model):
     files: dict[FileName, FileEntry]
 
 
-class ResultsManifest(_Model):
+class FileList(_Model):
+    """A list of the files of a folder."""
+
+    files: dict[FileName, FileEntry]
+
+
+class ResultsManifest(FileList):
     """The manifest of a folder of results."""
 
     dataset: Text
     identity: str | None
     budget: Photons | None
-    files: dict[FileName, FileEntry]
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:

@@ -1,13 +1,13 @@
 """JSON documents that list the files of a folder and end in a checksum of the document itself.
 
-The last member of such a document is "sha256": the SHA-256 of the file's bytes with 64 zeros in its place.
+The last member of such a document is "sha256": the SHA-256 of its bytes with 64 zeros in the place of that.
 """
 
 import hashlib
 import json
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,31 +17,41 @@ from pcii.base.safe_files import json_bytes, write_bytes_safely
 LARGEST_DOCUMENT_BYTES = 1 << 24
 """JSON takes up to 30 times its length in memory; a list of 100 000 files is shorter than this."""
 _BLANK = b"0" * 64
-_SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"\n\}\n\Z')
+_SEAL = re.compile(rb'"sha256": "([0-9a-f]{64})"(\n\}\n|\})\Z')
 
 
 def write_sealed(path: Path, document: Mapping[str, Any]) -> None:
     """Write `document` with its checksum, atomically."""
-    blank = json_bytes({**document, "sha256": _BLANK.decode()})
-    write_bytes_safely(path, _with_seal(blank, hashlib.sha256(blank).hexdigest().encode()))
+    write_bytes_safely(path, sealed(document, json_bytes))
 
 
-def read_sealed(path: Path, remedy: str) -> dict[str, Any]:
-    """Members of a document whose checksum is right; else raises `InputError`, which ends in `remedy`."""
-    content = read_small(path, LARGEST_DOCUMENT_BYTES, remedy)
+def sealed(document: Mapping[str, Any], to_bytes: Callable[[Mapping[str, Any]], bytes]) -> bytes:
+    """What `to_bytes` makes of a document, on one line or indented, with its checksum."""
+    blank = to_bytes({**document, "sha256": _BLANK.decode()})
+    start = blank.rindex(_BLANK)
+    checksum = hashlib.sha256(blank).hexdigest().encode()
+    return blank[:start] + checksum + blank[start + len(_BLANK) :]
+
+
+def check_seal(content: bytes) -> None:
+    """Raise ValueError unless a document ends in its checksum, and that is right."""
     found = _SEAL.search(content)
     if found is None:
-        raise InputError(f"{path}: damaged or of another release, it does not end in its checksum; {remedy}")
-    blank = _with_seal(content, _BLANK)
+        raise ValueError("damaged or of another release, it does not end in its checksum")
+    blank = content[: found.start(1)] + _BLANK + content[found.end(1) :]
     if hashlib.sha256(blank).hexdigest().encode() != found[1]:
-        raise InputError(f"{path}: changed since it was written, its checksum does not match; {remedy}")
+        raise ValueError("changed since it was written, its checksum does not match")
+
+
+def read_sealed(path: Path, remedy: str, *, largest_bytes: int = LARGEST_DOCUMENT_BYTES) -> dict[str, Any]:
+    """Members of a document whose checksum is right; else raises `InputError`, which ends in `remedy`."""
+    content = read_small(path, largest_bytes, remedy)
+    try:
+        check_seal(content)
+    except ValueError as fault:
+        raise InputError(f"{path}: {fault}; {remedy}") from None
     document = parse_json(content, path, remedy)
     return {name: value for name, value in document.items() if name != "sha256"}
-
-
-def _with_seal(content: bytes, seal: bytes) -> bytes:
-    end = len(content) - len(b'"\n}\n')
-    return content[: end - len(seal)] + seal + content[end:]
 
 
 def read_small(path: Path, limit: int, remedy: str) -> bytes:

@@ -1,4 +1,4 @@
-"""Comparison of all files of a dataset, of results or of a collection with its manifest."""
+"""Comparison of all files of a dataset, a collection, results or an evaluation with its manifest."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
+from pcii.io import dataset_layout, evaluation_layout
 from pcii.io.collection_layout import (
     COLLECTION,
     INDEX,
@@ -15,7 +16,8 @@ from pcii.io.collection_layout import (
     read_collection,
     read_index,
 )
-from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, REMEDY, read_manifest
+from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, read_manifest
+from pcii.io.evaluation_layout import EVALUATION, is_evaluation, read_evaluation
 from pcii.io.results_list import RESULTS, read_results
 from pcii.io.sealed_json import check_file, read_sealed, strays
 
@@ -26,10 +28,10 @@ MOST_NAMED = 5
 
 
 def verify(path: Path, report: Report = silent) -> int:
-    """Compare every file of a dataset, of results or of a collection with its manifest; the number of files.
+    """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
-    Raises `InputError` that names the faults: files that are missing, truncated or changed, or that no
-    manifest lists.
+    Returns the number of files. Raises `InputError` that names the faults: files that are missing, truncated
+    or changed, or that no manifest lists.
     """
     if is_collection(path):
         return _verify_collection(path, report)
@@ -50,9 +52,12 @@ def _verify_collection(path: Path, report: Report) -> int:
 
 
 def _verify_folder(path: Path, report: Report) -> int:
-    is_results = (path / RESULTS).exists() and not (path / MANIFEST).exists()
-    name, remedy = (RESULTS, "make them again") if is_results else (MANIFEST, REMEDY)
-    files = read_results(path)["files"] if is_results else read_manifest(path)["files"]
+    if (path / RESULTS).exists() and not (path / MANIFEST).exists():
+        name, remedy, files = RESULTS, "make them again", read_results(path)["files"]
+    elif is_evaluation(path) and not (path / MANIFEST).exists():
+        name, remedy, files = EVALUATION, evaluation_layout.REMEDY, read_evaluation(path)["files"]
+    else:
+        name, remedy, files = MANIFEST, dataset_layout.REMEDY, read_manifest(path)["files"]
 
     def check(listed: tuple[str, Mapping[str, Any]]) -> int:
         check_file(path, *listed, remedy, content=True)

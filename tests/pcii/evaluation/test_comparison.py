@@ -12,6 +12,7 @@ import numba as nb
 import numpy as np
 import pytest
 from slow_clock import SlowClock
+from stored_datasets import flip_a_bit
 from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
@@ -19,12 +20,15 @@ from pcii.base import command_line
 from pcii.base.crew import Crew
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
+from pcii.evaluation import evaluation_pages
 from pcii.evaluation.comparison import evaluate, find_datasets
-from pcii.evaluation.rows import ROWS, all_rows, append_row, claim_rows
+from pcii.evaluation.rows import all_rows, append_row, claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import markdown, overview, with_interval
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
+from pcii.io.evaluation_layout import EVALUATION, ROWS
+from pcii.io.verification import verify
 from pcii.removal.methods import METHODS
 
 HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
@@ -67,7 +71,9 @@ def test_every_figure_by_hand(series: Path, tmp_path: Path, calls: list[str]) ->
     evaluation = evaluate([series], tmp_path / "out", methods=FAKES)
     (group,) = evaluation["groups"]
     assert (group["title"], group["scene"], group["datasets"]) == ("by hand", "by hand", 3)
-    assert json.loads((tmp_path / "out" / "evaluation.json").read_text()) == evaluation
+    written = json.loads((tmp_path / "out" / EVALUATION).read_text())
+    assert {name: written[name] for name in evaluation} == evaluation
+    assert verify(tmp_path / "out") == len({ROWS, "evaluation.html", "evaluation.md"})
     result = result_of(evaluation, OWN, "by count")
     near, far = result["planes"]
     # 0.6, 0.8, 0.7 of the near object: mean 0.7, half width 4.302653 * 0.1 / sqrt(3) = 0.248414.
@@ -310,8 +316,48 @@ def test_a_damaged_line_is_named(series: Path, tmp_path: Path, calls: list[str])
     lines = rows.read_text().splitlines()
     lines[4] = lines[4][:20]
     rows.write_text("\n".join(lines) + "\n")
-    with pytest.raises(InputError, match="line 5 is damaged"):
+    with pytest.raises(InputError, match=r"rows.jsonl: line 5: damaged .*; delete that line"):
         evaluate([series], tmp_path / "out", methods=FAKES)
+
+
+def test_a_flipped_bit_of_a_row_is_never_summed_up(series: Path, tmp_path: Path, calls: list[str]) -> None:
+    out, rng = tmp_path / "out", np.random.default_rng(8)
+    evaluate([series], out, methods=FAKES)
+    whole = (out / ROWS).read_bytes()
+    for bit in rng.integers(8 * (len(whole) - 1), size=300):  # all but the last line break
+        flip_a_bit(out / ROWS, int(bit))
+        with pytest.raises(InputError, match=r"rows.jsonl: line \d+: "):
+            rows_of(out)
+        (out / ROWS).write_bytes(whole)
+
+
+def test_an_evaluation_that_grew_is_whole_once_its_pages_are_written(
+    series: Path, tmp_path: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, write = tmp_path / "out", evaluation_pages.write_bytes_safely
+    evaluate([series], out, methods=FAKES[:1])
+    before = (out / EVALUATION).read_bytes()
+
+    def killed(path: Path, content: bytes) -> None:
+        if path.name == "evaluation.html":
+            (out / f".{path.name}.x.tmp").touch()
+            raise KeyboardInterrupt
+        write(path, content)
+
+    monkeypatch.setattr(evaluation_pages, "write_bytes_safely", killed)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate([series], out, methods=FAKES)
+    assert (out / EVALUATION).read_bytes() == before
+    with pytest.raises(InputError, match=r"rows.jsonl: .*repeat the `pcii evaluate` command"):
+        verify(out)
+    monkeypatch.setattr(evaluation_pages, "write_bytes_safely", write)
+    calls.clear()
+    evaluate([series], out, methods=FAKES)
+    assert calls == []
+    assert verify(out) == 3
+    (out / EVALUATION).unlink()
+    with pytest.raises(InputError, match=r"out: unfinished; the same `pcii evaluate` command"):
+        verify(out)
 
 
 def test_datasets_are_found_in_the_order_of_their_seeds(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Whatever happens to the files of a dataset or of results is found."""
+"""Whatever happens to the files of a dataset, of results or of an evaluation is found."""
 
 import shutil
 from collections.abc import Callable
@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from stored_datasets import flip_a_bit, make_dataset
+from tiny_datasets import OWN, write_dataset
 
 from pcii.app.results import Results
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
+from pcii.evaluation.comparison import evaluate
 from pcii.io.dataset import open_dataset
 from pcii.io.verification import verify
 
@@ -23,6 +25,15 @@ def make_results(root: Path) -> Path:
         results.save_depth(DepthMap(np.full(shape, 540.0), np.ones(shape)))
         with results.replacing("report.html") as path:
             path.write_text("<!doctype html>")
+    return root
+
+
+def make_evaluation(root: Path) -> Path:
+    """Two methods on two datasets that stand beside it."""
+    data = root.with_name("data")
+    for seed in (3, 4):
+        write_dataset(data / f"seed_{seed}", seed, {OWN: 5 + seed})
+    evaluate([data], root, methods=["brightness", "variance"])
     return root
 
 
@@ -50,7 +61,7 @@ def append(path: Path, rng: np.random.Generator) -> None:
     path.write_bytes(path.read_bytes() + b"\n")
 
 
-@pytest.mark.parametrize("make", [make_dataset, make_results])
+@pytest.mark.parametrize("make", [make_dataset, make_results, make_evaluation])
 @pytest.mark.parametrize("damage", [flip, truncate, delete, add, add_a_folder, append])
 def test_every_damage_to_every_file_is_found(
     tmp_path: Path, make: Callable[[Path], Path], damage: Callable[[Path, np.random.Generator], None]
