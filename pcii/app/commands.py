@@ -277,7 +277,7 @@ def evaluate(
 
 @app.command
 def verify(folder: Path) -> None:
-    """Compare every file of a dataset, or of a folder of results, with its manifest.
+    """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
@@ -286,7 +286,7 @@ def verify(folder: Path) -> None:
     Parameters
     ----------
     folder
-        A dataset folder, or a folder of results.
+        Folder of a dataset, of a collection, of results or of an evaluation.
     """
     from pcii.io.verification import verify as compare
 

@@ -193,7 +193,7 @@ def export(
 
 @app.command
 def verify(dataset: Path) -> None:
-    """Compare every file of a dataset, or of a folder of results, with its manifest.
+    """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
