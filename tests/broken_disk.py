@@ -28,7 +28,7 @@ class BrokenDisk:
     done: int = 0
 
     def environment(self, site: Path) -> dict[str, str]:
-        """Variables that give this disk to new processes and those that they start; `site` is a new folder."""
+        """Variables that give this disk to new processes and to theirs; `site` is a new folder."""
         site.mkdir()
         (site / "sitecustomize.py").write_text(SITE)
         paths = [str(site), str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
