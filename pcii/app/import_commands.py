@@ -5,7 +5,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from pcii.base import command_line
 from pcii.base.command_line import say
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
@@ -18,7 +17,6 @@ Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Flag = Annotated[bool, Parameter(negative="")]
 Pair = Annotated[tuple[float, float] | None, Parameter(negative="")]
 WholePair = Annotated[tuple[int, int] | None, Parameter(negative="")]
-Seed = Annotated[int, Parameter(converter=command_line.whole)]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm", negative="")]
 
 
@@ -47,7 +45,7 @@ def import_dataset(
     gamma: float | None = None,
     cfa: str | None = None,
     photons: float | None = None,
-    seed: Seed = 1,
+    seed: int = 1,
     z_mm: Depths = (),
     z_range_mm: Pair = None,
     title: str | None = None,

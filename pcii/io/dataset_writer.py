@@ -134,9 +134,14 @@ def held_dataset(out: Path, identity: str | None, *, content: bool = True) -> di
     if identity is not None and manifest.get("identity") != identity:
         found = "the dataset of other images, or of another recipe or scene"
         raise InputError(f"{out}: holds {found}; name a new or empty folder")
+    check_files(out, manifest, content=content)
+    return manifest
+
+
+def check_files(out: Path, manifest: Mapping[str, Any], *, content: bool) -> None:
+    """Raise `InputError` for a listed file that is missing or has another size, or, if `content`, hash."""
     for name, entry in manifest["files"].items():
         check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
-    return manifest
 
 
 def _told_apart(images: object) -> tuple[PhotonCounts | None, Views | None]:

@@ -9,8 +9,8 @@ from typing import Any
 
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import locked
-from pcii.io.dataset_layout import MANIFEST, MARKER, REMEDY, read_manifest
-from pcii.io.sealed_json import check_file
+from pcii.io.dataset_layout import MANIFEST, MARKER, read_manifest
+from pcii.io.dataset_writer import check_files
 from simgen.dataset.software import DECISIVE, other_versions, versions
 
 
@@ -39,8 +39,7 @@ def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     manifest = read_manifest(out)
     if manifest.get("identity") != identity:
         raise _other(out, "dataset", manifest.get("versions", {}))
-    for name, entry in manifest["files"].items():
-        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
+    check_files(out, manifest, content=content)
     return manifest
 
 
