@@ -21,6 +21,7 @@ from pcii.exporting.export_formats import export_dataset
 from pcii.importing.array_files import import_arrays
 from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.count_frames import import_counts
+from pcii.importing.exported_files import import_exported
 from pcii.importing.grid_check import check_grid
 from pcii.importing.hci_scenes import import_hci
 from pcii.importing.image_folders import import_images
@@ -57,6 +58,7 @@ __all__ = [
     "export_dataset",
     "import_arrays",
     "import_counts",
+    "import_exported",
     "import_hci",
     "import_images",
     "import_lens_array",

@@ -73,8 +73,9 @@ def import_dataset(
     Parameters
     ----------
     source
-        A folder of pictures, a folder of the HCI 4D light field benchmark, a picture of a lens array, or an
-        array in a .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
+        A folder of pictures, a folder of the HCI 4D light field benchmark, a picture of a lens array, an
+        array in a .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W); or
+        events.npz or views.exr of `simgen export`, which need no options.
     out
         Folder for the dataset: new or empty.
     pattern
@@ -163,7 +164,7 @@ def import_dataset(
         z_range = z_range_mm or imported.z_range_mm
         sharp, warning = checked(imported, asked, z_range)
         images = imported.images
-        origin, given = imported.origin, [images]
+        origin, given = imported.origin, [images, *imported.beside]
         if photons is not None and isinstance(images, Views):
             given.append(limit_photons(images, photons, seed=seed))
             origin += f"; {photons:g} photons expected in each view, seed {seed}"

@@ -15,6 +15,7 @@ from pcii.core.truth import Truth
 from pcii.importing.array_files import import_arrays
 from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.count_frames import import_counts
+from pcii.importing.exported_files import exported_file, import_exported
 from pcii.importing.grid_check import GridCheck, check_grid
 from pcii.importing.hci_scenes import PARAMETERS, import_hci
 from pcii.importing.image_folders import import_images
@@ -42,13 +43,14 @@ class Request:
 
 @dataclass(frozen=True, eq=False)
 class Imported:
-    """Images as they were read, with what the source says of them."""
+    """Images as they were read, with what the source says of them; `beside` them it may have other ones."""
 
     images: Views | PhotonCounts
     origin: str
     truth: Truth | None = None
     z_range_mm: tuple[float, float] | None = None
     notes: list[str] = field(default_factory=list)
+    beside: tuple[Views | PhotonCounts, ...] = ()
 
     def view_of(self) -> Callable[[int, int], np.ndarray]:
         """A function that returns the light (H, W) of a view, all colours together."""
@@ -67,6 +69,13 @@ def read(asked: Request, report: Report) -> Imported:
         raise InputError("--counts: photon counts are linear; leave out --linear, --srgb and --gamma")
     if asked.pattern is None and asked.lenses is None and (source / PARAMETERS).is_file():
         return _hci(asked, report)
+    if asked == Request(source, None, ViewOrder()) and (file := exported_file(source)) is not None:
+        found = import_exported(file)
+        notes = ["with the truth of the virtual centre"] if found.truth is not None else []
+        first, *others = found.images
+        return Imported(
+            first, f"{file.name}, exported from a dataset", found.truth, None, notes, tuple(others)
+        )
     if source.is_dir() and asked.lenses is not None:
         raise InputError(f"{source}: --lens-array is for one picture, and this is a folder")
     if source.is_dir() and asked.pattern is None:

@@ -4,6 +4,8 @@ array_files     Elemental images in NumPy arrays and files: (K, L, H, W) or (K, 
 camera_order    Cameras of imported images: their optics, and the order in which the views were stored.
 count_frames    Photon counts of real detectors: arrays, or stacks of frames, of one bit each or more,
                 added up.
+exported_files  Files that `simgen export` writes and that say themselves which cameras saw them:
+                events.npz, views.exr.
 file_patterns   Files of views by names: a pattern with {row} and {col}, or with {index}, and the files
                 that fit it.
 grid_check      Whether views fit the cameras that were told: where they are sharp, and which mistake

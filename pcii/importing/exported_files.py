@@ -1,0 +1,162 @@
+"""Files that `simgen export` writes and that say themselves which cameras saw them: events.npz, views.exr."""
+
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.importing.array_files import opened_array
+from pcii.importing.image_folders import check_size
+
+EVENTS, PARTS = "events.npz", "views.exr"
+CENTRE = "virtual_centre"
+GRID = tuple(field.name for field in fields(CameraGrid))
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """Photon counts, radiance or both, and the truth if the file has it."""
+
+    images: tuple[PhotonCounts | Views, ...]
+    truth: Truth | None
+
+
+def exported_file(source: Path) -> Path | None:
+    """The file to read if `source` is one of these files or a folder of one, else None."""
+    for file in (source / EVENTS, source / PARTS):
+        if file.is_file():
+            return file
+    if source.suffix == ".exr" and source.is_file():
+        return source
+    if source.is_file() and zipfile.is_zipfile(source):
+        with zipfile.ZipFile(source) as archive:
+            if {f"{name}.npy" for name in ("k", "l", "i", "j", "n", *GRID)} <= set(archive.namelist()):
+                return source
+    return None
+
+
+def import_exported(source: str | Path) -> Exported:
+    """Read the events.npz or views.exr of `simgen export`; raises `InputError` for any other file."""
+    path = exported_file(Path(source))
+    if path is None:
+        raise InputError(f"{source}: neither {EVENTS} nor {PARTS} of `simgen export`")
+    try:
+        return _events(path) if path.suffix != ".exr" else _parts(path)
+    except (InputError, MemoryError):
+        raise
+    except Exception as fault:  # readers raise various exceptions for damaged content
+        raise InputError(f"{path}: cannot be read ({visible(str(fault))})") from None
+
+
+def _events(path: Path) -> Exported:
+    with zipfile.ZipFile(path) as archive:
+        names = {name.removesuffix(".npy") for name in archive.namelist()}
+
+    def read(name: str) -> np.ndarray:
+        if name not in names:
+            raise InputError(f"{path}: {name}: missing")
+        return opened_array(path, name)[0]
+
+    def optional(name: str) -> np.ndarray | None:
+        return read(name) if name in names else None
+
+    grid = _grid(path, {name: read(name).tolist() for name in GRID})
+    try:
+        pixels = {name: read(name) for name in "klijn"}
+        counts = PhotonCounts.from_events(**pixels, grid=grid, cfa=str(read("cfa")) or None)
+        truth = None
+        if "truth_z_mm" in names:
+            keys, titles = read("object_keys").tolist(), read("object_names").tolist()
+            photons = None
+            if "photon_z_mm" in names:
+                events = counts.events
+                at = {name: getattr(events, name).repeat(events.n) for name in "klij"}
+                photons = PhotonTruth(**at, object_id=read("photon_object_id"), z_mm=read("photon_z_mm"))
+            maps = {name: optional(f"truth_{name}") for name in OPTIONAL_MAPS}
+            named = dict(zip(keys, titles, strict=True))
+            truth = Truth(read("truth_z_mm"), read("truth_object_id"), named, photons, **maps)
+    except InputError as fault:
+        raise fault if str(fault).startswith(str(path)) else InputError(f"{path}: {fault}") from None
+    return Exported((counts,), truth)
+
+
+def _parts(path: Path) -> Exported:
+    import OpenEXR
+
+    with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
+        told = json.loads(file.parts[0].header.get("comments", "null"))
+    if not isinstance(told, Mapping) or not isinstance(told.get("grid"), Mapping):
+        raise InputError(f"{path}: its comments do not say which cameras saw it; not of `simgen export`")
+    grid, cfa = _grid(path, told["grid"]), told.get("cfa")
+    check_size(path, (*grid.shape_KLHW, 3))
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        # Pixels are gone when the file is closed.
+        parts = {
+            part.name(): {name: np.array(channel.pixels) for name, channel in part.channels.items()}
+            for part in file.parts
+        }
+    views = {place: channels for name, channels in parts.items() if (place := _place(name)) is not None}
+    missing = [place for place in np.ndindex(grid.rows, grid.cols) if place not in views]
+    if views and missing:
+        raise InputError(f"{path}: the view of camera {missing[0]} is missing")
+    images: list[PhotonCounts | Views] = []
+    try:
+        for names in (("R", "G", "B"), ("Y",)):
+            if views and all(set(names) <= set(channels) for channels in views.values()):
+                radiance = _stacked(views, names, grid)
+                images.append(Views(radiance, grid, cfa if names == ("Y",) else None))
+        if views and all("photons" in channels for channels in views.values()):
+            dense = _stacked(views, ("photons",), grid)[..., 0]
+            images.append(PhotonCounts.from_dense(dense, grid, cfa=cfa))
+        truth = None
+        if CENTRE in parts:
+            z_mm, object_id = (parts[CENTRE][name] for name in ("Z", "objectId"))
+            named = {int(key): str(name) for key, name in told.get("objects", {}).items()}
+            truth = Truth(z_mm, object_id.astype(np.int16), named)
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None
+    if not images:
+        raise InputError(f"{path}: has neither radiance nor photons of the views")
+    return Exported(tuple(images), truth)
+
+
+def _place(part: str) -> tuple[int, int] | None:
+    """Camera (k, l) of a part named k03_l04, None for other parts."""
+    row, _, col = part.partition("_")
+    if row[:1] != "k" or col[:1] != "l" or not (row[1:] + col[1:]).isdecimal():
+        return None
+    return int(row[1:]), int(col[1:])
+
+
+def _stacked(
+    views: Mapping[tuple[int, int], Mapping[str, np.ndarray]], names: tuple[str, ...], grid: CameraGrid
+) -> np.ndarray:
+    """Channels of all views, (K, L, H, W, C)."""
+    dtype = next(iter(views.values()))[names[0]].dtype
+    stacked = np.empty((*grid.shape_KLHW, len(names)), dtype)
+    for place in np.ndindex(grid.rows, grid.cols):
+        for channel, name in enumerate(names):
+            pixels = views[place][name]
+            if pixels.shape != stacked.shape[2:4]:
+                raise InputError(f"camera {place}: expected {stacked.shape[2:4]} pixels, got {pixels.shape}")
+            stacked[(*place, ..., channel)] = pixels
+    return stacked
+
+
+def _grid(path: Path, told: Mapping[str, Any]) -> CameraGrid:
+    try:
+        return CameraGrid(**{name: told[name] for name in GRID})
+    except KeyError as fault:
+        raise InputError(f"{path}: the camera grid has no {fault.args[0]}") from None
+    except InputError as fault:
+        raise InputError(f"{path}: {fault}") from None

@@ -1,0 +1,99 @@
+"""What `simgen export` writes comes back as it was."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stored_datasets import make_dataset, one_sentence
+
+import pcii
+from pcii.app.commands import app
+from pcii.core.truth import Truth
+from pcii.importing.exported_files import import_exported
+
+
+@pytest.fixture
+def dataset(tmp_path: Path) -> pcii.Dataset:
+    return pcii.open_dataset(make_dataset(tmp_path / "made"))
+
+
+def the_truth(found: Truth | None) -> Truth:
+    assert found is not None
+    return found
+
+
+def test_events_come_back(dataset: pcii.Dataset, tmp_path: Path) -> None:
+    folder = pcii.export_dataset(dataset, "events", tmp_path / "out")
+    found = import_exported(folder)
+    (counts,) = found.images
+    assert isinstance(counts, pcii.PhotonCounts)
+    assert (counts.grid, counts.cfa) == (dataset.grid, "GRBG")
+    for name in "klijn":
+        assert np.array_equal(getattr(counts.events, name), getattr(dataset.counts.events, name))
+    truth, known = the_truth(found.truth), the_truth(dataset.truth)
+    assert np.array_equal(truth.z_mm, known.z_mm)
+    assert np.array_equal(truth.object_id, known.object_id)
+    assert truth.names == known.names
+    assert truth.photons is not None
+    assert known.photons is not None
+    assert np.array_equal(truth.photons.z_mm, known.photons.z_mm)
+    assert np.array_equal(truth.photons.j, known.photons.j)
+
+
+def test_parts_of_an_exr_file_come_back(dataset: pcii.Dataset, tmp_path: Path) -> None:
+    folder = pcii.export_dataset(dataset, "exr", tmp_path / "out")
+    found = import_exported(folder / "views.exr")
+    views, counts = found.images
+    assert isinstance(views, pcii.Views)
+    assert isinstance(counts, pcii.PhotonCounts)
+    assert views.grid == counts.grid == dataset.grid
+    assert dataset.views is not None
+    for k, l in np.ndindex(2, 3):
+        assert np.array_equal(views.view(k, l), dataset.views.view(k, l))
+        assert np.array_equal(counts.view(k, l), dataset.counts.view(k, l))
+    truth, known = the_truth(found.truth), the_truth(dataset.truth)
+    assert np.array_equal(truth.z_mm, known.z_mm)
+    assert truth.names == known.names
+
+
+@pytest.mark.parametrize("format", ["events", "exr"])
+def test_the_command_needs_no_options_for_them(dataset: pcii.Dataset, tmp_path: Path, format: str) -> None:
+    folder = pcii.export_dataset(dataset, format, tmp_path / "out")  # pyright: ignore[reportArgumentType]
+    app(["import", str(folder), "-o", str(tmp_path / "again")], result_action="return_value")
+    again = pcii.open_dataset(tmp_path / "again")
+    assert again.grid == dataset.grid
+    assert again.counts.total == dataset.counts.total
+    assert (again.views is None) == (format == "events")
+    assert np.array_equal(the_truth(again.truth).z_mm, the_truth(dataset.truth).z_mm)
+
+
+def without(path: Path, name: str) -> None:
+    """Drop an array from an archive."""
+    with zipfile.ZipFile(path) as archive:
+        members = {member: archive.read(member) for member in archive.namelist() if member != f"{name}.npy"}
+    with zipfile.ZipFile(path, "w") as archive:
+        for member, content in members.items():
+            archive.writestr(member, content)
+
+
+@pytest.mark.parametrize(
+    "name", ["cfa", "n", "pitch_mm", "object_names", "truth_object_id", "photon_object_id"]
+)
+def test_an_archive_that_lacks_an_array_is_refused(dataset: pcii.Dataset, tmp_path: Path, name: str) -> None:
+    file = pcii.export_dataset(dataset, "events", tmp_path / "out") / "events.npz"
+    without(file, name)
+    assert name in one_sentence(lambda: import_exported(tmp_path / "out"), file)
+
+
+@pytest.mark.parametrize("damage", ["truncated", "text"])
+def test_a_damaged_file_is_refused(dataset: pcii.Dataset, tmp_path: Path, damage: str) -> None:
+    file = pcii.export_dataset(dataset, "exr", tmp_path / "out") / "views.exr"
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2] if damage == "truncated" else b"no picture")
+    one_sentence(lambda: import_exported(file), file)
+
+
+def test_another_exr_file_is_refused(dataset: pcii.Dataset) -> None:
+    one_view = dataset.path / "radiance" / "view_00_00.exr"
+    assert "do not say which cameras" in one_sentence(lambda: import_exported(one_view), one_view)
