@@ -15,7 +15,7 @@ from pcii.core.photon_limit import limit_photons
 from pcii.core.section_stack import Sections
 from pcii.core.srgb import srgb_to_linear
 from pcii.core.truth import Truth
-from pcii.depth.depth_map import estimate_depth
+from pcii.depth.methods import depth_methods, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.exporting.export_formats import export_dataset
 from pcii.importing.array_files import import_arrays
@@ -53,6 +53,7 @@ __all__ = [
     "Views",
     "check_grid",
     "demosaic",
+    "depth_methods",
     "estimate_depth",
     "evaluate",
     "export_dataset",

@@ -70,7 +70,7 @@ KNOW_RECIPE = {
     "simgen.dataset.prepared",
     "simgen.spec.sweeps",
 }
-SMALL_ROOMS = {"depth"}
+SMALL_ROOMS: set[str] = set()
 
 
 def modules(package: str) -> dict[str, ast.Module]:

@@ -26,10 +26,7 @@ app.command(import_dataset, name="import")
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
 Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
-Budget = Annotated[
-    float | None,
-    Parameter(help="Use the photons of this smaller, nested budget of the recipe."),
-]
+Budget = Annotated[float | None, Parameter(help="Use the photons of this smaller, nested budget.")]
 
 
 def _open(dataset: Path, budget: float | None) -> Dataset:
@@ -63,8 +60,8 @@ def run(
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
-    if outcome.depth is None:
-        say("sections only: removal and depth need photon counts; import the images with --photons N")
+    if not outcome.focus:
+        say("sections and depth only: removal needs photon counts; import the images with --photons N")
     say(f"report: {out / 'report.html'}")
 
 
@@ -101,8 +98,7 @@ def reconstruct(
     from pcii.sections.reconstruction import reconstruct as make
 
     data = _open(dataset, budget)
-    images = data.counts if data.has_counts else data.views or data.counts
-    sections = make(images, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
+    sections = make(data.counts_or_views, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
     with Results(out, data).writing() as results:
         say(f"{results.save_sections(sections)}")
         for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
@@ -115,10 +111,10 @@ def reconstruct(
 
 
 @app.command
-def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
-    """Map the depth of every pixel of the virtual centre, with a picture.
+def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget = None) -> None:
+    """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
-    Example:  pcii depth out/paper -o out/depth
+    Example:  pcii depth out/paper --method texture -o out/depth
 
     Parameters
     ----------
@@ -126,14 +122,17 @@ def depth(dataset: Path, *, out: Out, budget: Budget = None) -> None:
         A dataset folder.
     out
         Folder for the results.
+    method
+        Of counts: focus (default), texture (better in much light), likelihood-sweep or variance-sweep. Of
+        radiance: variance-sweep (default) or structure-tensor. Or one that a package registers.
     """
-    from pcii.depth.depth_map import estimate_depth
+    from pcii.depth.methods import estimate_depth
     from pcii.imaging.pictures import depth_image, write_png
     from pcii.io.suggested_depths import depth_range_of
 
     data = _open(dataset, budget)
     z_range = depth_range_of(data)
-    depth_map = estimate_depth(data.counts, z_range)
+    depth_map = estimate_depth(data.counts_or_views, z_range, method=method)
     with Results(out, data).writing() as results:
         say(f"{results.save_depth(depth_map)}")
         with results.replacing("depth.png") as path:

@@ -11,7 +11,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import ArrayLike5D, Views
 from pcii.core.photon_counts import check_depth_counts
 from pcii.core.section_stack import Sections
-from pcii.depth.depth_map import estimate_depth
+from pcii.depth.methods import estimate_depth
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.scoring import score
@@ -29,8 +29,7 @@ class Outcome:
     sections: Sections
     """Sections of the photon counts (Eq. 3), or of the radiance if there are no counts."""
     focus: tuple[Segmented, ...]
-    depth: DepthMap | None
-    """None without photon counts, which removal and depth need."""
+    depth: DepthMap
     score: Score
     timings_s: dict[str, float] = field(default_factory=dict)
 
@@ -44,8 +43,9 @@ def analyse(
     """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
     `z_mm` defaults to the depths in the dataset's recipe, `methods` to `DEFAULT_METHODS`. Of a dataset
-    without photon counts only sections of its radiance are made. Raises `InputError` without depths, without
-    both counts and radiance, and for an unknown method or one of which there are no counts.
+    without photon counts sections and depth are those of its radiance, and nothing is removed. Raises
+    `InputError` without depths, without both counts and radiance, and for an unknown method or one of which
+    there are no counts.
     """
     seconds: dict[str, float] = {}
     planes, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
@@ -83,7 +83,9 @@ def analyse(
         finished(f"removal, {method}", start)
 
     start = time.perf_counter()
-    depth = None if counts is None else estimate_depth(counts, z_range)
+    seen = dataset.views if counts is None else counts
+    assert seen is not None
+    depth = estimate_depth(seen, z_range)
     finished("depth", start)
 
     start = time.perf_counter()

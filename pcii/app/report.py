@@ -201,8 +201,6 @@ def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, 
 
 def _depth_panels(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
     truth, depth = outcome.dataset.truth, outcome.depth
-    if depth is None:
-        return []
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
     if truth is not None:

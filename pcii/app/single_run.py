@@ -33,8 +33,7 @@ def run(
         results.save_sections(outcome.sections)
         for focus in outcome.focus:
             results.save_segmented(focus)
-        if outcome.depth is not None:
-            results.save_depth(outcome.depth)
+        results.save_depth(outcome.depth)
         results.save_score(outcome.score)
         with results.replacing("report.html") as page:
             write_report(page, outcome)

@@ -1,9 +1,9 @@
 """What other installed packages add: entry points of a group, by name."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pcii.base.errors import InputError
 
@@ -33,6 +33,20 @@ def registered(group: str, taken: Collection[str], own: Mapping[str, str] = NONE
             raise InputError(f"{label} and {found[point.name].value} are both named {point.name!r}")
         found[point.name] = point
     return found
+
+
+def load_function(point: "EntryPoint", label: str) -> Callable[..., Any]:
+    """The function of an entry point, which errors call `label`.
+
+    Raises `InputError` if it cannot be imported or called.
+    """
+    try:
+        function = point.load()
+    except Exception as fault:  # importing another package's module may raise anything
+        raise InputError(f"{label} cannot be loaded: {type(fault).__name__}: {fault}") from fault
+    if not callable(function):
+        raise InputError(f"{label} is {type(function).__name__}, which cannot be called")
+    return function
 
 
 def package_of(point: "EntryPoint") -> str:

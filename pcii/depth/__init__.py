@@ -1,5 +1,13 @@
 """Estimators of depth.
 
-depth_map  Depth maps from the focus evidence of planes: a depth and its posterior probability for each
-           pixel.
+depth_planes     Planes that a search of depth compares, and the depth between planes where a measure is
+                 largest.
+epipolar_slopes  Depth from the slope of lines in epipolar images, by the structure tensor: a textbook
+                 estimator.
+focus_labels     Depth by focus evidence: a plane for each cell, with a cost of changes, and its posterior
+                 probability.
+methods          Estimators of depth by name: a depth for each pixel of the virtual centre.
+plane_sweeps     Textbook estimators of depth to compare others with: plane sweeps with windows of one
+                 size.
+texture_depth    Depth by texture, each pixel in the smallest window that is sure of it.
 """

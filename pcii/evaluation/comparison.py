@@ -11,7 +11,7 @@ from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors
-from pcii.depth.depth_map import estimate_depth
+from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.rows import (
     DEPTH,

@@ -160,6 +160,12 @@ class Dataset(Brief):
         shape = (*self.grid.shape_KLHW, channels)
         return Views(StoredRadiance(shape, lambda k, l: self.check(radiance_name(k, l))), self.grid, cfa)
 
+    @property
+    def counts_or_views(self) -> PhotonCounts | Views:
+        """The photon counts or, of a dataset without, the radiance; `InputError` if there is neither."""
+        views = None if self.has_counts else self.views
+        return self.counts if views is None else views
+
     def has(self, part: str) -> bool:
         """Whether the manifest lists the file `part`, or files of a folder of this name."""
         return lists_part(self.manifest["files"], part)

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import package_of
+from pcii.base.extensions import load_function, package_of
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -33,12 +33,7 @@ def load(point: "EntryPoint") -> Method:
     of the given sections.
     """
     label = f"method: {point.name!r} of {package_of(point)}"
-    try:
-        remove = point.load()
-    except Exception as fault:  # importing another package's module may raise anything
-        raise InputError(f"{label} cannot be loaded: {type(fault).__name__}: {fault}") from fault
-    if not callable(remove):
-        raise InputError(f"{label} is {type(remove).__name__}, which cannot be called")
+    remove = load_function(point, label)
 
     def checked(counts: PhotonCounts, sections: Sections) -> Segmented:
         result = remove(counts, sections)

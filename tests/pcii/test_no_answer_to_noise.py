@@ -9,7 +9,7 @@ from twins import even_light
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
-from pcii.depth.depth_map import estimate_depth
+from pcii.depth.methods import estimate_depth
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 

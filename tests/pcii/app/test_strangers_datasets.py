@@ -14,7 +14,6 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
-from pcii.depth.depth_map import estimate_depth
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_writer import save_dataset
 from pcii.io.verification import verify
@@ -55,24 +54,23 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, has: str) -> N
 
 
 @pytest.mark.parametrize("with_truth", [False, True])
-def test_radiance_alone_gives_sections_and_a_report(tmp_path: Path, with_truth: bool, capsys) -> None:
+def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, with_truth: bool, capsys) -> None:
     truth = Truth(Z_MM, IDS, {1: "ball"}) if with_truth else None
     save_dataset(tmp_path / "d", Views(LIGHT, GRID), truth, z_mm=500)
     out = tmp_path / "out"
     assert run("run", tmp_path / "d", "-o", out) == 0
-    assert "sections only" in capsys.readouterr().out
+    assert "sections and depth only" in capsys.readouterr().out
     page = (out / "report.html").read_text()
     assert "without photon counts" in page
     assert "full light (Eq. 2)" in page
     assert "Figure 7" not in page
-    assert "<h2>Depth" not in page
-    assert not list(out.glob("depth*"))
+    assert "<h2>Depth" in page
     assert verify(out) > 3
     assert run("reconstruct", tmp_path / "d", "-o", tmp_path / "sections", "--z-mm", 600) == 0
     assert (tmp_path / "sections" / "section_600mm.png").is_file()
 
 
-@pytest.mark.parametrize("command", [["segment"], ["depth"], ["run", "--method", "likelihood"]])
+@pytest.mark.parametrize("command", [["segment"], ["run", "--method", "likelihood"]])
 def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
     save_dataset(tmp_path / "d", Views(LIGHT, GRID), z_mm=500)
     assert run(command[0], tmp_path / "d", "-o", tmp_path / "out", *command[1:]) == 2
@@ -81,9 +79,8 @@ def test_what_needs_photons_says_so(tmp_path: Path, command, capsys) -> None:
 
 def test_methods_for_photon_counts_say_what_to_do_with_images() -> None:
     views = Views(LIGHT, GRID)
-    for action in (lambda: segment(views, 500), lambda: estimate_depth(views, (400, 600))):  # type: ignore[arg-type]
-        with pytest.raises(InputError, match="needs photon counts, and these are images; draw them with"):
-            action()
+    with pytest.raises(InputError, match="needs photon counts, and these are images; draw them with"):
+        segment(views, 500)  # type: ignore[arg-type]
 
 
 def test_results_of_one_strangers_dataset_are_not_taken_for_anothers(tmp_path: Path) -> None:

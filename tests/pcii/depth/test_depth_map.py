@@ -8,7 +8,7 @@ from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap
 from pcii.core.photon_counts import PhotonCounts
-from pcii.depth.depth_map import estimate_depth
+from pcii.depth.methods import estimate_depth
 
 RANGE_MM = (1 / 9, 1 / 1)
 
@@ -198,7 +198,7 @@ def test_a_range_that_is_not_near_to_far_is_refused(bad):
 def test_one_view_is_refused():
     grid = unit_grid(1, 1, 8, 8)
     counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
-    with pytest.raises(InputError, match=r"^counts: one view has no depth"):
+    with pytest.raises(InputError, match=r"^data: one view has no depth"):
         estimate_depth(counts, (1.0, 2.0))
 
 

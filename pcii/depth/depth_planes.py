@@ -1,0 +1,56 @@
+"""Planes that a search of depth compares, and the depth between planes where a measure is largest."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.core.arrays import check_z_mm
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
+
+MOST_SPAN_PX = 2000.0
+"""Largest change of total disparity between the ends of a range that is searched."""
+
+
+def check_range_mm(grid: CameraGrid, z_range_mm: object) -> tuple[float, float]:
+    """Near and far end of a range of depths; raises `InputError` if it cannot be searched."""
+    if not isinstance(z_range_mm, Sequence) or len(z_range_mm) != 2:
+        raise InputError(f"z_range_mm: expected (near, far), got {z_range_mm!r}")
+    near, far = check_z_mm(z_range_mm).tolist()
+    if near >= far:
+        raise InputError(f"z_range_mm: near must be less than far, got {near:g} and {far:g}")
+    span = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
+    if span > MOST_SPAN_PX:
+        raise InputError(
+            f"z_range_mm: from {near:g} to {far:g} mm total disparity changes by {span:.3g} px, and at "
+            f"most {MOST_SPAN_PX:g} px can be searched; choose a farther near end"
+        )
+    return near, far
+
+
+def neighbours_of(measure: np.ndarray, best: np.ndarray) -> np.ndarray:
+    """A measure (Z, h, w) at the plane before the `best` (h, w), at it, and after it; (3, h, w).
+
+    Beyond the first and the last plane it is minus infinity.
+    """
+    padded = np.pad(measure, ((1, 1), (0, 0), (0, 0)), constant_values=-np.inf)
+    return np.stack([np.take_along_axis(padded, (best + step)[None], axis=0)[0] for step in range(3)])
+
+
+def peak_depth_mm(planes: FocalPlanes, best: np.ndarray, nearby: np.ndarray) -> np.ndarray:
+    """Depth (h, w) in mm of the top of a parabola through the `best` plane (h, w) and its neighbours.
+
+    `nearby` (3, h, w) is a measure that is larger the better the plane, as of `neighbours_of`; total
+    disparities of the planes are evenly spaced. The depth stays within half a step of the best plane.
+    """
+    total_px = planes.total_disparity_px
+    before, at, after = nearby
+    inner = np.isfinite(nearby).all(axis=0)
+    with np.errstate(invalid="ignore"):
+        curvature = np.where(inner, before - 2 * at + after, 0.0)
+        slope = np.where(inner, before - after, 0.0)
+    offset = np.where(curvature < 0, slope / (2 * np.where(curvature < 0, curvature, 1)), 0.0)
+    step_px = total_px[1] - total_px[0]
+    return depth_of_total_disparity_mm(planes.grid, total_px[best] + np.clip(offset, -0.5, 0.5) * step_px)

@@ -1,0 +1,113 @@
+"""Estimators of depth by name: a depth for each pixel of the virtual centre.
+
+Another package registers one as an entry point of the group `pcii.depth_methods`:
+
+    [project.entry-points."pcii.depth_methods"]
+    my-method = "my_package:depth"
+
+`depth` is called with the `PhotonCounts` or `Views` and the range (near, far) in mm, and returns a `DepthMap`
+of their height and width.
+"""
+
+from collections.abc import Callable
+
+from pcii.base.errors import InputError
+from pcii.base.extensions import load_function, package_of, registered
+from pcii.core.estimates import DepthMap
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.depth.depth_planes import check_range_mm
+from pcii.depth.epipolar_slopes import structure_tensor
+from pcii.depth.focus_labels import focus_depth
+from pcii.depth.plane_sweeps import likelihood_sweep, variance_sweep
+from pcii.depth.texture_depth import TextureDepth
+
+GROUP = "pcii.depth_methods"
+Method = Callable[..., DepthMap]
+
+FOR_COUNTS: dict[str, Method] = {
+    "focus": focus_depth,
+    "texture": TextureDepth(),
+    "likelihood-sweep": likelihood_sweep,
+    "variance-sweep": variance_sweep,
+}
+FOR_VIEWS: dict[str, Method] = {"variance-sweep": variance_sweep, "structure-tensor": structure_tensor}
+"""The built-in methods by what they take; the first is the default."""
+BUILT_IN = FOR_COUNTS | FOR_VIEWS
+
+
+def estimate_depth(
+    data: PhotonCounts | Views, z_range_mm: tuple[float, float], *, method: str | Method | None = None
+) -> DepthMap:
+    """Depth per pixel, (H, W) float64 in mm within `z_range_mm`, NaN where the method abstains.
+
+    `method` is one of `pcii.depth_methods()`, or a function that returns a `DepthMap` for the data and the
+    range. Of photon counts "focus", the default, compares how well planes predict the photons, and abstains
+    where they do not tell; "texture" compares the contrast of sections, in windows as small as the light
+    allows, and is the better one where there is much light and texture (docs/experiments/depth.md);
+    "likelihood-sweep" and "variance-sweep" are simple ones to compare it with, which
+    answer wherever there are samples. Of radiance there are "variance-sweep", the default, and
+    "structure-tensor".
+
+    Raises `InputError` for a range that is not 0 < near < far, a single view, or a method that is not known
+    or cannot take the data.
+
+    >>> import numpy as np
+    >>> import pcii
+    >>> grid = pcii.CameraGrid(
+    ...     rows=2, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.25, height=16, width=16
+    ... )
+    >>> no_photons = pcii.PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid)
+    >>> depth = estimate_depth(no_photons, z_range_mm=(450, 750))
+    >>> depth.z_mm.shape, bool(np.isnan(depth.z_mm).all()), float(depth.confidence.max())
+    ((16, 16), True, 0.0)
+    """
+    if not isinstance(data, PhotonCounts | Views):
+        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
+    z_range_mm = check_range_mm(data.grid, z_range_mm)
+    if data.grid.view_count < 2:
+        raise InputError("data: one view has no depth; at least 2 cameras are needed")
+    if method is None:
+        method = next(iter(FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS))
+    estimate = method if callable(method) else find_depth_method(method, data)
+    return estimate(data, z_range_mm)
+
+
+def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
+    """Names of the methods that `estimate_depth` accepts for the data, or for any: built-in ones come first.
+
+    Raises `InputError` for a registered name that is already taken or no file name.
+
+    >>> depth_methods()
+    ('focus', 'texture', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
+    """
+    return (*_built_in(data), *registered(GROUP, BUILT_IN))
+
+
+def find_depth_method(name: str, data: PhotonCounts | Views) -> Method:
+    """The method of this name; `InputError` listing the known names if there is none for such data."""
+    known = _built_in(data)
+    if name in known:
+        return known[name]
+    others = {} if name in BUILT_IN else registered(GROUP, BUILT_IN)
+    if name not in others:
+        kind = "photon counts" if isinstance(data, PhotonCounts) else "radiance"
+        names = ", ".join(depth_methods(data))
+        raise InputError(f"method: no estimator of depth from {kind} is named {name!r}; use {names}")
+    label = f"method: {name!r} of {package_of(others[name])}"
+    estimate = load_function(others[name], label)
+
+    def checked(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
+        found = estimate(data, z_range_mm)
+        film = data.grid.height, data.grid.width
+        if not isinstance(found, DepthMap) or found.z_mm.shape != film:
+            raise InputError(f"{label} must return a pcii.DepthMap of {film[0]} x {film[1]} pixels")
+        return found
+
+    return checked
+
+
+def _built_in(data: PhotonCounts | Views | None) -> dict[str, Method]:
+    if data is None:
+        return BUILT_IN
+    return FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS

@@ -1,0 +1,131 @@
+"""Textbook estimators of depth to compare others with: plane sweeps with windows of one size.
+
+Each measures at every plane how well the samples of a voxel agree, sums that over a window, and answers with
+the best plane. They answer wherever there are samples, and state no uncertainty: `confidence` is 1.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pcii.core.estimates import DepthMap
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
+from pcii.depth.depth_planes import peak_depth_mm
+from pcii.sections.photon_statistics import cells_to_pixels
+from pcii.sections.reconstruction import reconstruct
+
+STEP_PX = 1.0
+"""Total disparity between neighbouring planes."""
+BATCH = 8
+"""Planes made at a time: views that stay on disk are read once for all of them."""
+VARIANCE_WINDOW_PX = 7
+LIKELIHOOD_SIGMA_PX = 17 / 4
+"""Standard deviation of the Gaussian window of the likelihood: its middle 95 % are 17 px wide."""
+WIDER = 2.0
+"""The wider window by the window; with 1 and 4 errors are nearly the same."""
+LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-9
+"""What is divided by, where a window has no samples or no photons."""
+PRIOR_PHOTONS = 0.5
+"""Weight of the mean rate beside the other samples of a voxel, in photons (Jeffreys' prior of a rate)."""
+
+
+def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
+    """The depth at which the samples of the views differ least, in a square window.
+
+    Of photon counts the variance beyond that of Poisson noise, the mean, is compared.
+    """
+    from scipy.ndimage import uniform_filter
+
+    is_counted = isinstance(data, PhotonCounts)
+
+    def evenness(sections: Sections, plane: int) -> np.ndarray:
+        assert sections.variance is not None
+        freedom = np.maximum(sections.coverage[plane].astype(np.float64) - 1, 0)
+        noise = sections.estimate[plane] if is_counted else 0.0
+        excess = (freedom * (sections.variance[plane] - noise)).sum(axis=-1)
+        window = {"size": VARIANCE_WINDOW_PX, "mode": "constant"}
+        freedom = uniform_filter(freedom.sum(axis=-1), **window)
+        return np.where(freedom > 0.5, -uniform_filter(excess, **window) / np.maximum(freedom, 0.5), -np.inf)
+
+    return _swept(data, z_range_mm, evenness, variance=True)
+
+
+def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthMap:
+    """The depth at which the photons of each view are predicted best by those of the other views.
+
+    The rate of a sample of m photons, of a voxel of K photons in n samples, is
+    (K - m + a) / (n - 1 + a / r), a = `PRIOR_PHOTONS` and r the mean rate of its colour in a wider Gaussian
+    window of the same section; the log-likelihood of all samples of a voxel relative to r is summed over a
+    Gaussian window. Relative to the mean of the film instead, what is bright would win at any plane.
+    """
+    from scipy.ndimage import gaussian_filter
+
+    events = data.events
+    squared = PhotonCounts.from_events(
+        events.k, events.l, events.i, events.j, events.n**2, data.grid, cfa=data.cfa
+    )
+
+    # Where all shifts are even a colour falls on every fourth voxel only, which then has four times as many
+    # samples: of a mosaic 2 x 2 voxels are taken together.
+    side = 1 if data.cfa is None else 2
+
+    def gain(sections: Sections, plane: int) -> np.ndarray:
+        photons, samples = (_blocks(sums[plane], side) for sums in (sections.counts, sections.coverage))
+        around, reached = (
+            gaussian_filter(sums, WIDER * LIKELIHOOD_SIGMA_PX / side, mode="constant", axes=(0, 1))
+            for sums in (photons, samples)
+        )
+        mean = np.maximum(around / np.maximum(reached, LEAST_SAMPLES), LEAST_RATE)
+        # Of the photons of a voxel each is in a sample of sum m^2 / sum m photons on average.
+        squares = reconstruct(squared, sections.planes.take([plane])).counts[0]
+        others = photons - _blocks(squares, side) / np.maximum(photons, 1)
+        weight = np.maximum(samples - 1, 0) + PRIOR_PHOTONS / mean
+        rate = (others + PRIOR_PHOTONS) / weight
+        # All samples of the voxel expect K (n - 1) + n a photons over n - 1 + a / r.
+        expected = (photons * np.maximum(samples - 1, 0) + samples * PRIOR_PHOTONS) / weight
+        nats = photons * np.log(rate / mean) - (expected - samples * mean)
+        nats = np.where(around > 0, nats, 0.0)
+        smooth = gaussian_filter(nats.sum(axis=-1), LIKELIHOOD_SIGMA_PX / side, mode="constant")
+        return cells_to_pixels(smooth, side, data.grid)
+
+    return _swept(data, z_range_mm, gain)
+
+
+def _blocks(values: np.ndarray, side: int) -> np.ndarray:
+    """Sums (h, w, C), float64, over squares of values (H, W, C); those at the ends may be smaller."""
+    H, W, C = values.shape
+    whole = np.zeros((-(-H // side) * side, -(-W // side) * side, C))
+    whole[:H, :W] = values
+    return whole.reshape(whole.shape[0] // side, side, whole.shape[1] // side, side, C).sum(axis=(1, 3))
+
+
+def _swept(
+    data: PhotonCounts | Views,
+    z_range_mm: tuple[float, float],
+    measure: Callable[[Sections, int], np.ndarray],
+    **options: Any,
+) -> DepthMap:
+    """The depth of the plane of largest `measure` (H, W), which is told sections and which of their planes.
+
+    Sections, which have these `options`, are made of a few planes at a time.
+    """
+    planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
+    film = data.grid.height, data.grid.width
+    best = np.zeros(film, np.int64)
+    nearby, last, least = np.full((3, *film), -np.inf), np.full(film, -np.inf), np.full(film, np.inf)
+    for first in range(0, len(planes), BATCH):
+        sections = reconstruct(data, planes.take(slice(first, first + BATCH)), **options)
+        for within in range(len(sections.planes)):
+            plane, current = first + within, measure(sections, within)
+            nearby[2] = np.where(best == plane - 1, current, nearby[2])
+            better = current > nearby[1]
+            nearby[:, better] = np.stack([last, current, np.full(film, -np.inf)])[:, better]
+            best[better] = plane
+            last, least = current, np.minimum(least, current)
+    # Where all planes are alike there is nothing to choose from.
+    depth = np.where(nearby[1] > least, peak_depth_mm(planes, best, nearby), np.nan)
+    return DepthMap(depth, np.isfinite(depth).astype(np.float64))
