@@ -1,12 +1,12 @@
 """Depth by texture, each pixel in the smallest window that is sure of it.
 
-The evidence of a window is the sum over its blocks. With Z planes, each as likely before as all of them
-together are as likely as no surface, the posterior of plane z is
+The evidence S(z) of a window is the sum over its blocks. If a surface is as probable beforehand as none, and
+each of the Z planes as probable as the others, the posterior probability of plane z is
 
-    p(z) = exp(S(z)) / (Z + sum over planes of exp(S))
+    p(z) = exp(S(z)) / (Z + sum over planes of exp(S)),
 
-and what is left is that of no surface. Where there is much light a window of some pixels is enough, and keeps
-to the outlines of things; where there is little it takes the photons of more.
+and what is missing to 1 is that of no surface. In much light a window of some pixels is sure, and keeps to
+the outlines of things; in little light it takes the photons of a larger one.
 """
 
 from dataclasses import dataclass, field

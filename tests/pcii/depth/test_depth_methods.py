@@ -3,7 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from twins import unit_grid
+from twins import even_light, unit_grid
 
 import pcii
 from pcii.core.camera_grid import CameraGrid
@@ -144,3 +144,12 @@ def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> Non
         pcii.InputError, match=r"'half_a_map' of a package must return a pcii\.DepthMap of 8 x 8"
     ):
         estimate_depth(counts, (0.5, 1.0), method="half_a_map")
+
+
+@pytest.mark.parametrize("rate", [0.01, 1.0])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_texture_gives_even_light_no_depth(rate: float, cfa: str | None) -> None:
+    depth = estimate_depth(
+        even_light(unit_grid(7, 7, 128, 128), rate, 1, cfa), (1 / 9, 1.0), method="texture"
+    )
+    assert np.isfinite(depth.z_mm).mean() <= 0.001
