@@ -74,7 +74,8 @@ def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> N
     _, said = process.communicate(timeout=60)
     assert (process.returncode, said.splitlines()[-1]) == (130, ON)
     assert "Traceback" not in said
-    assert (out / MARKER).exists()
+    # The folder stays if anything was written to it.
+    assert (out / MARKER).exists() or begun == MARKER
     assert subprocess.run(generating(out, 4), capture_output=True, check=False).returncode == 0
     assert command_line.run(simgen_cli.app, ["verify", str(out)]) == 0
 

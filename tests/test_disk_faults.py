@@ -215,10 +215,9 @@ def test_a_disk_may_break_at_any_change(
     assert broken_at(folders, name, tmp_path / "out", capsys, range) > 15
 
 
-@pytest.mark.parametrize("times", [1, pytest.param(20, marks=pytest.mark.slow)])
-def test_a_disk_that_breaks_in_workers_is_told_and_loses_nothing(
-    folders: Folders, tmp_path: Path, times: int
-) -> None:
+@pytest.mark.slow
+def test_a_disk_that_breaks_in_workers_is_told_and_loses_nothing(folders: Folders, tmp_path: Path) -> None:
+    times = 20
     out, chance, failed = tmp_path / "out", random.Random(times), 0
     for number in range(times):
         before = folders.before("collection", out)
