@@ -16,9 +16,11 @@ import json
 import os
 import platform
 import re
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -122,7 +124,8 @@ def load(*, spectral: bool = False) -> Any:
     """
     mi, variant = _mitsuba(), choose().variant_for(spectral)
     if mi.variant() != variant:
-        mi.set_variant(variant)
+        with _uninterrupted():
+            mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
     return mi
 
@@ -148,9 +151,26 @@ def _mitsuba() -> Any:
     if backend.kind == "llvm" and backend.library:
         # Read once, when Dr.Jit first needs LLVM; a later setting does nothing.
         os.environ["DRJIT_LIBLLVM_PATH"] = backend.library
-    import mitsuba as mi
+    with _uninterrupted():
+        import mitsuba as mi
 
     return mi
+
+
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Let Ctrl-C wait for the end of the block: while the library is loading it would abort the process."""
+    if threading.current_thread() is not threading.main_thread():  # which alone hears of it
+        yield
+        return
+    arrived: list[tuple[Any, ...]] = []
+    before = signal.signal(signal.SIGINT, lambda *told: arrived.append(told))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if arrived and callable(before):
+        before(*arrived[0])
 
 
 def shape_numbers(scene: Any) -> list[int]:
