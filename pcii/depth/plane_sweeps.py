@@ -15,7 +15,7 @@ from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.depth_planes import peak_depth_mm
-from pcii.sections.photon_statistics import cells_to_pixels
+from pcii.sections.photon_statistics import cell_sums, cells_to_pixels
 from pcii.sections.reconstruction import reconstruct
 
 STEP_PX = 1.0
@@ -73,8 +73,12 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     # samples: of a mosaic 2 x 2 voxels are taken together.
     side = 1 if data.cfa is None else 2
 
+    def in_cells(sums: np.ndarray) -> np.ndarray:
+        """Sums (h, w, C) over cells of voxels (H, W, C)."""
+        return np.moveaxis(cell_sums(np.moveaxis(sums, -1, 0), side, np.float64), 0, -1)
+
     def gain(sections: Sections, plane: int) -> np.ndarray:
-        photons, samples = (_blocks(sums[plane], side) for sums in (sections.counts, sections.coverage))
+        photons, samples = (in_cells(sums[plane]) for sums in (sections.counts, sections.coverage))
         around, reached = (
             gaussian_filter(sums, WIDER * LIKELIHOOD_SIGMA_PX / side, mode="constant", axes=(0, 1))
             for sums in (photons, samples)
@@ -82,7 +86,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
         mean = np.maximum(around / np.maximum(reached, LEAST_SAMPLES), LEAST_RATE)
         # Of the photons of a voxel each is in a sample of sum m^2 / sum m photons on average.
         squares = reconstruct(squared, sections.planes.take([plane])).counts[0]
-        others = photons - _blocks(squares, side) / np.maximum(photons, 1)
+        others = photons - in_cells(squares) / np.maximum(photons, 1)
         weight = np.maximum(samples - 1, 0) + PRIOR_PHOTONS / mean
         rate = (others + PRIOR_PHOTONS) / weight
         # All samples of the voxel expect K (n - 1) + n a photons over n - 1 + a / r.
@@ -95,21 +99,13 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     return _swept(data, z_range_mm, gain)
 
 
-def _blocks(values: np.ndarray, side: int) -> np.ndarray:
-    """Sums (h, w, C), float64, over squares of values (H, W, C); those at the ends may be smaller."""
-    H, W, C = values.shape
-    whole = np.zeros((-(-H // side) * side, -(-W // side) * side, C))
-    whole[:H, :W] = values
-    return whole.reshape(whole.shape[0] // side, side, whole.shape[1] // side, side, C).sum(axis=(1, 3))
-
-
 def _swept(
     data: PhotonCounts | Views,
     z_range_mm: tuple[float, float],
     measure: Callable[[Sections, int], np.ndarray],
     **options: Any,
 ) -> DepthMap:
-    """The depth of the plane of largest `measure` (H, W), which is told sections and which of their planes.
+    """The depth of the plane of largest measure, (H, W) for sections and the number of one of their planes.
 
     Sections, which have these `options`, are made of a few planes at a time.
     """

@@ -19,7 +19,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import BLOCK_PX, TextureModel, evidence_of_texture, expanded
-from pcii.sections.photon_statistics import cells_to_pixels
+from pcii.sections.photon_statistics import cell_sums, cells_to_pixels
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def _in_windows(evidence: np.ndarray, planes: FocalPlanes, sigma: float) -> tupl
     # A wide window is as good on a coarser grid, four of whose steps it is wide.
     halvings = max(0, int(np.log2(sigma / 4)))
     step = 1 << halvings
-    coarse = _summed(evidence, step)
+    coarse = cell_sums(evidence, step, np.float32)
     blur = (0, sigma / step, sigma / step)
     total = gaussian_filter(coarse, blur, mode="constant") * np.float32(2 * np.pi * (sigma / step) ** 2)
     best = total.argmax(axis=0)
@@ -74,11 +74,3 @@ def _in_windows(evidence: np.ndarray, planes: FocalPlanes, sigma: float) -> tupl
         depth, probability = expanded(depth), expanded(probability)
     h, w = evidence.shape[1:]
     return depth[:h, :w], probability[:h, :w]
-
-
-def _summed(evidence: np.ndarray, step: int) -> np.ndarray:
-    """Sums (Z, h, w) over squares of `step` x `step` blocks."""
-    Z, h, w = evidence.shape
-    padded = np.pad(evidence, ((0, 0), (0, -h % step), (0, -w % step)))
-    h, w = padded.shape[1] // step, padded.shape[2] // step
-    return padded.reshape(Z, h, step, w, step).sum(axis=(2, 4))

@@ -25,6 +25,7 @@ import numpy as np
 
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.photon_statistics import cell_sums
 from pcii.sections.reconstruction import reconstruct
 
 BLOCK_PX = 2
@@ -56,19 +57,14 @@ def evidence_of_texture(
 
     def of_plane(plane: int) -> np.ndarray:
         section = reconstruct(counts, planes.take([plane]))
-        photons, samples = (_blocks(sums[0].sum(axis=-1)) for sums in (section.counts, section.coverage))
+        photons, samples = (
+            cell_sums(sums[0].sum(axis=-1), BLOCK_PX, np.float32)
+            for sums in (section.counts, section.coverage)
+        )
         return _of_section(photons, samples, chosen)
 
     with ThreadPoolExecutor(threads()) as pool:
         return np.stack(list(pool.map(of_plane, range(len(planes)))))
-
-
-def _blocks(values: np.ndarray) -> np.ndarray:
-    """Sums (h, w), float32, over blocks of an image (H, W); those at the ends may be smaller."""
-    H, W = values.shape
-    padded = np.pad(values, ((0, -H % BLOCK_PX), (0, -W % BLOCK_PX)))
-    h, w = padded.shape[0] // BLOCK_PX, padded.shape[1] // BLOCK_PX
-    return padded.reshape(h, BLOCK_PX, w, BLOCK_PX).sum(axis=(1, 3), dtype=np.float32)
 
 
 def _of_section(photons: np.ndarray, samples: np.ndarray, model: TextureModel) -> np.ndarray:
@@ -78,7 +74,7 @@ def _of_section(photons: np.ndarray, samples: np.ndarray, model: TextureModel) -
     margin = (0, -h % step), (0, -w % step)
     levels = [(np.pad(photons, margin), np.pad(samples, margin))]
     for _ in range(model.octaves):
-        levels.append((reduced(levels[-1][0]), reduced(levels[-1][1])))
+        levels.append((_reduced(levels[-1][0]), _reduced(levels[-1][1])))
     rates = [photons / np.maximum(samples, LEAST_SAMPLES) for photons, samples in levels]
     evidence, around = np.zeros_like(rates[-1]), np.maximum(rates[-1], LEAST_RATE)
     for octave in reversed(range(model.octaves)):
@@ -99,7 +95,7 @@ LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
 """What is divided by where there are no samples, or no light."""
 
 
-def reduced(values: np.ndarray) -> np.ndarray:
+def _reduced(values: np.ndarray) -> np.ndarray:
     """Half the size in both axes, which are even, smoothed by weights 1, 3, 3, 1; zero beyond the borders."""
     return _reduced_rows(_reduced_rows(values).T).T
 

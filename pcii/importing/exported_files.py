@@ -15,11 +15,12 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.exporting.event_archive import ARCHIVE as EVENTS
+from pcii.exporting.exr_parts import CENTRE
+from pcii.exporting.exr_parts import FILE as PARTS
 from pcii.importing.array_files import opened_array
 from pcii.importing.image_folders import check_size
 
-EVENTS, PARTS = "events.npz", "views.exr"
-CENTRE = "virtual_centre"
 GRID = tuple(field.name for field in fields(CameraGrid))
 
 

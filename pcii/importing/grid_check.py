@@ -76,7 +76,7 @@ def check_grid(
     if z_mm.size < 2:
         return GridCheck()
     told = sweep(small, grid, z_mm)
-    if not told.seen.any():
+    if not told.covered.any():
         return GridCheck()
     best, least = GridCheck(), CLEARLY * _remaining(told)
     for mistake, other, numbers in _mistakes(grid, order, counted):
@@ -142,7 +142,7 @@ def _sharpness(found: Sweep) -> np.ndarray:
 
 def _remaining(found: Sweep) -> float:
     """Mean over the pixels of the least variance."""
-    return float(found.least[found.seen].mean()) if found.seen.any() else np.inf
+    return float(found.least[found.covered].mean()) if found.covered.any() else np.inf
 
 
 def _mass(found: Sweep) -> np.ndarray:

@@ -39,14 +39,14 @@ class Sweep:
     variance: np.ndarray
 
     @property
-    def seen(self) -> np.ndarray:
+    def covered(self) -> np.ndarray:
         """Pixels (h, w), bool, that enough views reach at some plane."""
         return np.asarray(np.isfinite(self.variance).any(axis=0))
 
     @property
     def least(self) -> np.ndarray:
         """Least variance (h, w) over the planes, 0 where there is none."""
-        return np.where(self.seen, self.variance.min(axis=0), 0)
+        return np.where(self.covered, self.variance.min(axis=0), 0)
 
 
 def small_views(view: Callable[[int, int], np.ndarray], grid: CameraGrid, most_px: int) -> SmallViews:

@@ -71,7 +71,7 @@ def save_dataset(
     ...     save_dataset(Path(folder) / "mine", counts, z_mm=500, title="Two views").counts.total
     48
     """
-    counts, views = _told_apart(images)
+    counts, views = _counts_and_views(images)
     analysis = _analysis(z_mm, z_range_mm)
     texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
     for name, text in texts.items():
@@ -144,7 +144,7 @@ def check_files(out: Path, manifest: Mapping[str, Any], *, content: bool) -> Non
         check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
 
 
-def _told_apart(images: object) -> tuple[PhotonCounts | None, Views | None]:
+def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
     """Counts and views among the images; `InputError` if there is neither, or they do not go together."""
     given = images if isinstance(images, tuple | list) else [images]
     counts = [one for one in given if isinstance(one, PhotonCounts)]

@@ -136,6 +136,14 @@ def view_samples(
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
 
 
+def cell_sums(pixels: np.ndarray, cell_px: int, dtype: type) -> np.ndarray:
+    """Sums over cells of `cell_px` x `cell_px` pixels (..., H, W); those at the ends may be smaller."""
+    *others, H, W = pixels.shape
+    padded = np.pad(pixels, [(0, 0)] * len(others) + [(0, -H % cell_px), (0, -W % cell_px)])
+    h, w = padded.shape[-2] // cell_px, padded.shape[-1] // cell_px
+    return padded.reshape(*others, h, cell_px, w, cell_px).sum(axis=(-3, -1), dtype=dtype)
+
+
 def cells_to_pixels(cells: np.ndarray, cell_px: int, grid: CameraGrid) -> np.ndarray:
     """Values on cells, (H / cell_px, W / cell_px) rounded up, as values on pixels (H, W)."""
     full = cells.repeat(cell_px, axis=0).repeat(cell_px, axis=1)
