@@ -67,15 +67,25 @@ def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
 def read_manifest(root: Path) -> dict[str, Any]:
     """The manifest of a finished dataset, with all fields checked that this package uses.
 
-    Raises `InputError` if it is missing, was changed since it was written, or has an invalid field.
+    Raises `InputError` if the dataset is unfinished, and as `read_written_manifest` does.
+    """
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
+    return read_written_manifest(root)
+
+
+def read_written_manifest(root: Path) -> dict[str, Any]:
+    """The manifest that was written last, with all fields checked that this package uses.
+
+    For a process that knows that the dataset is finished: another one may mark it as its own for the moment
+    until it finds so. Raises `InputError` if the manifest is missing, was changed since it was written, or
+    has an invalid field.
     """
     from pcii.io.manifest_schema import DatasetManifest, validate
 
     path = root / MANIFEST
     if not root.is_dir():
         raise InputError(f"{root}: there is no such dataset folder")
-    if (root / MARKER).is_file():
-        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
     if not path.is_file():
         raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
     manifest = read_sealed(path, REMEDY)

@@ -18,7 +18,7 @@ from pcii.io.collection_layout import (
     write_collection,
     write_index,
 )
-from pcii.io.dataset_layout import MANIFEST, MARKER, read_manifest
+from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from simgen.dataset.software import decisive_versions, other_versions
 from simgen.spec.sweeps import Sweep
 
@@ -87,7 +87,7 @@ def _finished_rows(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> list[Row
         name = sweep.folder(number)
         row = rows.get(number) or listed.get(name)
         if row is None and name in present and _is_finished(out / name):
-            row = row_of(sweep, number, out, read_manifest(out / name))
+            row = row_of(sweep, number, out, read_written_manifest(out / name))
         if row is not None:
             found[name] = row
     others = {name: row for name, row in listed.items() if name not in found and name in present}

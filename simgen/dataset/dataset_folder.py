@@ -9,7 +9,7 @@ from typing import Any
 
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import locked
-from pcii.io.dataset_layout import MANIFEST, MARKER, read_manifest
+from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from pcii.io.dataset_writer import check_files
 from simgen.dataset.software import DECISIVE, other_versions, versions
 
@@ -36,7 +36,7 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
 
 def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
-    manifest = read_manifest(out)
+    manifest = read_written_manifest(out)
     if manifest.get("identity") != identity:
         raise _other(out, "dataset", manifest.get("versions", {}))
     check_files(out, manifest, content=content)

@@ -18,7 +18,7 @@ from pcii.io.dataset_layout import (
     RADIANCE,
     TRUTH,
     nested_name,
-    read_manifest,
+    read_written_manifest,
     write_manifest,
 )
 from pcii.io.sealed_json import list_files
@@ -103,7 +103,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
         }
         write_manifest(out, manifest)
         marker.unlink()
-    return read_manifest(out)
+    return read_written_manifest(out)
 
 
 def _work(

@@ -103,6 +103,24 @@ def test_a_killed_run_is_resumed_to_the_same_bytes(
     assert digest(out) == digest(made)
 
 
+def test_another_run_may_look_at_it_the_moment_it_is_finished(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It saw an unfinished dataset, and marks the folder once more before it finds the manifest."""
+    out, original = tmp_path / "looked_at", Path.unlink
+
+    def marked_again(path: Path, *, missing_ok: bool = False) -> None:
+        original(path, missing_ok=missing_ok)
+        if path.name == MARKER:
+            path.touch()
+
+    monkeypatch.setattr(Path, "unlink", marked_again)
+    generate(recipe(), Path(), out)
+    monkeypatch.undo()
+    generate(recipe(), Path(), out)  # the other run
+    assert digest(out) == digest(made)
+
+
 def test_a_finished_dataset_is_left_alone(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Prepared, "render_scene", lambda _: pytest.fail("rendered again"))
     before = (made / MANIFEST).stat().st_mtime_ns
