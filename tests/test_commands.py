@@ -46,7 +46,15 @@ def test_score_json_is_as_in_the_contract(results: Path) -> None:
     }
     assert [row["name"] for row in score["objects"]] == ["ball", "bird"]
     contract = ["mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage"]
-    assert list(score["depth"]) == [*contract, "median_px", "mae_px", "hci", "hci_objects"]
+    assert list(score["depth"]) == [
+        *contract,
+        "median_px",
+        "mae_px",
+        "hci",
+        "hci_objects",
+        "ece",
+        "reliability",
+    ]
     said = [[row[key] for key in ("z_mm", "method", "truth")] for row in score["planes"]]
     assert [[row[key] for key in ("z_mm", "method", "truth")] for row in score["bounds"]["planes"]] == said
     # The objects are textured and 140 000 photons tell their depth to within a tenth of a pixel.

@@ -72,7 +72,8 @@ class Segmented(Brief):
 class DepthMap(Brief):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
-    `confidence` (H, W) is in [0, 1]: 0 where no depth is given. Raises `InputError` if the shapes differ.
+    `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
+    true one, as the method states it: 0 where no depth is given. Raises `InputError` if the shapes differ.
     """
 
     z_mm: np.ndarray

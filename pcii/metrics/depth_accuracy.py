@@ -1,4 +1,4 @@
-"""Errors of a depth map: in mm, in px of total disparity, and by the 4D light field benchmark.
+"""Errors of a depth map, in mm, px and by the 4D light field benchmark, and whether its confidence is right.
 
 Notation: d disparity in px between neighbouring views at the virtual centre; e = d true - d estimated. A
 pixel without an estimate counts as bad in every share. Means and quantiles are of the pixels with an
@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap
 from pcii.core.geometry import parallax_px, total_disparity_px
@@ -23,10 +24,15 @@ FINE_STEP_PX = 0.15
 FINE_WIDTH_PX = 11
 """Structures into which no square of this side fits are fine."""
 NEAR_EDGE_PX = 5
+CORRECT_PX = 1.0
+"""Error in px of total disparity up to which a depth is what its confidence is the probability of."""
+CONFIDENCE_BINS = 10
+ROUNDING = 1e-6
+"""By which a sum of probabilities may exceed 1."""
 
 
 def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
-    """Errors of a depth map over the objects' pixels, and those of `hci_errors`.
+    """Errors of a depth map over the objects' pixels, those of `hci_errors`, and its `calibration`.
 
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
     since a dark backdrop has no photons to estimate depth from.
@@ -38,6 +44,7 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     errors: dict[str, Any] = dict.fromkeys(keys)
     errors["hci"] = hci_errors(grid, depth, truth, None if truth is None else np.isfinite(truth.z_mm))
     errors["hci_objects"] = hci_errors(grid, depth, truth, None if truth is None else truth.object_id > 0)
+    errors |= calibration(grid, depth, truth)
     if grid is None or depth is None or truth is None or not (truth.object_id > 0).any():
         return errors
     on_object = truth.object_id > 0
@@ -85,16 +92,62 @@ def hci_errors(
     known = np.abs(error[judged & ~missing])
     fine = fine_structures(true)
     for key, threshold in BADPIX.items():
-        errors[key] = _share((np.abs(error) > threshold) | missing, judged)
+        errors[key] = _mean((np.abs(error) > threshold) | missing, judged)
     wrong = (np.abs(error) > DISCONTINUITY_BADPIX) | missing
-    errors["discontinuities"] = _share(wrong, judged & near_edges(true))
-    errors["fine_fattening"] = _share((error < -FINE_STEP_PX) | missing, judged & _near(fine) & ~fine)
-    errors["fine_thinning"] = _share((error > FINE_STEP_PX) | missing, judged & fine)
-    errors["answered"] = _share(~missing, judged)
+    errors["discontinuities"] = _mean(wrong, judged & near_edges(true))
+    errors["fine_fattening"] = _mean((error < -FINE_STEP_PX) | missing, judged & _near(fine) & ~fine)
+    errors["fine_thinning"] = _mean((error > FINE_STEP_PX) | missing, judged & fine)
+    errors["answered"] = _mean(~missing, judged)
     if known.size:
         errors["mse_x100"] = float(100 * np.mean(known**2))
         errors["q25_x100"] = float(100 * np.quantile(known, 0.25))
     return errors
+
+
+def calibration(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
+    """Whether the confidence of a depth map is the share of its depths that are right.
+
+    Of all pixels of the film with an estimate; it is right if it is within 1 px of total disparity of the
+    truth, and wrong where nothing is hit. `reliability` has ten bins of confidence of equal width by name,
+    "0.0-0.1" to "0.9-1.0" (an end between two belongs to the upper one): the `share` of the pixels, their
+    mean `confidence` and the share that is `correct`, None in an empty bin. `ece`, the expected calibration
+    error (Naeini, Cooper and Hauskrecht 2015), is the mean of |correct - confidence| over the bins, weighted
+    by their shares. Both are None without truth or without any estimate. Raises `InputError` for a confidence
+    that is no probability.
+
+    >>> grid = CameraGrid(
+    ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=1, width=4
+    ... )
+    >>> true = Truth(np.full((1, 4), 500.0), np.ones((1, 4), dtype=int), {1: "wall"})
+    >>> depth = DepthMap(np.array([[500.0, 500.0, 500.0, 900.0]]), np.full((1, 4), 0.75))
+    >>> calibration(grid, depth, true)["ece"]
+    0.0
+    """
+    nothing = {"ece": None, "reliability": None}
+    if grid is None or depth is None or truth is None:
+        return nothing
+    answered = _answered(depth.z_mm)
+    if not answered.any():
+        return nothing
+    stated = depth.confidence[answered]
+    if not ((stated >= 0) & (stated <= 1 + ROUNDING)).all():
+        raise InputError("confidence: expected probabilities from 0 to 1 where a depth is given")
+    hit = np.isfinite(truth.z_mm[answered])
+    error_px = total_disparity_px(grid, depth.z_mm[answered]) - total_disparity_px(grid, truth.z_mm[answered])
+    correct = hit & (np.abs(error_px) <= CORRECT_PX)
+    place = np.minimum((stated * CONFIDENCE_BINS).astype(int), CONFIDENCE_BINS - 1)
+    reliability: dict[str, dict[str, float | None]] = {}
+    ece = 0.0
+    for number in range(CONFIDENCE_BINS):
+        inside = place == number
+        share = float(inside.mean())
+        confidence, right = _mean(stated, inside), _mean(correct, inside)
+        if confidence is not None and right is not None:
+            ece += share * abs(right - confidence)
+        ends = (number / CONFIDENCE_BINS, (number + 1) / CONFIDENCE_BINS)
+        name = f"{ends[0]:.1f}-{ends[1]:.1f}"
+        reliability[name] = {"share": share, "confidence": confidence, "correct": right}
+    return {"ece": ece, "reliability": reliability}
 
 
 def near_edges(disparity: np.ndarray) -> np.ndarray:
@@ -135,5 +188,5 @@ def _disparity_px(grid: CameraGrid, z_mm: np.ndarray) -> np.ndarray:
     return across if grid.cols > 1 else down
 
 
-def _share(bad: np.ndarray, where: np.ndarray) -> float | None:
-    return float(bad[where].mean()) if where.any() else None
+def _mean(values: np.ndarray, where: np.ndarray) -> float | None:
+    return float(values[where].mean()) if where.any() else None

@@ -1,13 +1,16 @@
 """Depth errors on maps small enough to count by hand."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from twins import unit_grid
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap
 from pcii.core.truth import Truth
-from pcii.metrics.depth_accuracy import depth_errors, fine_structures, hci_errors, near_edges
+from pcii.metrics.depth_accuracy import calibration, depth_errors, fine_structures, hci_errors, near_edges
 
 GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total disparity 2 / z px
 
@@ -125,3 +128,60 @@ def test_depths_that_cannot_be_are_no_answers() -> None:
         assert found["coverage"] == found["hci"]["answered"] == 0.0
         assert found["bad_3px"] == found["hci"]["badpix_007"] == 1.0
         assert found["mae_mm"] is found["median_px"] is None
+
+
+def calibrated(total_px: np.ndarray, confidence: np.ndarray, true_px: np.ndarray) -> dict[str, Any]:
+    """`calibration` of maps of total disparity; NaN: no answer, 0 in the truth: nothing is hit."""
+    with np.errstate(divide="ignore"):
+        z = 2 / true_px
+    grid = unit_grid(3, 3, *z.shape)
+    truth = Truth(z, np.isfinite(z).astype(int), {1: "wall"})
+    return calibration(grid, DepthMap(2 / total_px, confidence), truth)
+
+
+def test_reliability_is_counted_by_hand() -> None:
+    # 1 px off is still right, and more is not; the fifth is of nothing, and the last is no answer.
+    true = np.array([[8.0, 8.0, 8.0, 8.0, 0.0, 8.0]])
+    estimate = np.array([[8.0, 9.0, 6.75, 8.5, 0.5, np.nan]])
+    confidence = np.array([[0.75, 0.75, 0.75, 1.0, 0.25, 0.0]])
+    found = calibrated(estimate, confidence, true)
+    bins = found["reliability"]
+    assert list(bins) == [f"0.{n}-{(n + 1) / 10}" for n in range(10)]
+    assert bins["0.7-0.8"] == {"share": 0.6, "confidence": 0.75, "correct": pytest.approx(2 / 3)}
+    assert bins["0.9-1.0"] == {"share": 0.2, "confidence": 1.0, "correct": 1.0}
+    assert bins["0.2-0.3"] == {"share": 0.2, "confidence": 0.25, "correct": 0.0}
+    assert bins["0.0-0.1"] == {"share": 0.0, "confidence": None, "correct": None}
+    assert found["ece"] == pytest.approx(0.6 * (0.75 - 2 / 3) + 0.2 * 0.25)
+
+
+def test_an_end_between_two_bins_belongs_to_the_upper_one() -> None:
+    confidence = np.arange(11)[None] / 10
+    bins = calibrated(np.full((1, 11), 8.0), confidence, np.full((1, 11), 8.0))["reliability"]
+    assert [round(11 * one["share"]) for one in bins.values()] == [1] * 9 + [2]
+
+
+def test_a_map_that_is_as_often_right_as_it_says_is_calibrated_and_an_overconfident_one_is_not() -> None:
+    rng = np.random.default_rng(5)
+    stated = rng.random((400, 500))
+    true = np.full(stated.shape, 8.0)
+    estimate = np.where(rng.random(stated.shape) < stated, 8.4, 11.0)
+    # Each of ten bins of 20 000 pixels is off by 0.003 at most, as a standard deviation.
+    assert calibrated(estimate, stated, true)["ece"] < 0.004
+    # Planted: who always says 1 is right half the time; who says sqrt(p) is over by 2/3 - 1/2 on average.
+    assert calibrated(estimate, np.ones(stated.shape), true)["ece"] == pytest.approx(0.5, abs=0.005)
+    over = calibrated(estimate, np.sqrt(stated), true)
+    assert over["ece"] == pytest.approx(1 / 6, abs=0.005)
+    assert all(one["correct"] < one["confidence"] for one in over["reliability"].values())
+
+
+def test_without_answers_or_truth_there_is_no_calibration() -> None:
+    none = {"ece": None, "reliability": None}
+    assert calibrated(np.full((2, 2), np.nan), np.zeros((2, 2)), np.full((2, 2), 8.0)) == none
+    assert calibration(GRID, DepthMap(np.ones((2, 2)), np.ones((2, 2))), None) == none
+
+
+@pytest.mark.parametrize("wrong", [-0.1, 1.1, np.nan])
+def test_a_confidence_that_is_no_probability_is_refused(wrong: float) -> None:
+    confidence = np.array([[0.5, wrong]])
+    with pytest.raises(InputError, match=r"^confidence: expected probabilities"):
+        calibrated(np.full((1, 2), 8.0), confidence, np.full((1, 2), 8.0))
