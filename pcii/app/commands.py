@@ -242,7 +242,7 @@ def evaluate(
     *,
     out: Out,
     method: Annotated[tuple[str, ...], Parameter(negative=())] = (),
-    budget: Annotated[tuple[float, ...], Parameter(negative=())] = (),
+    budget: Annotated[tuple[str, ...], Parameter(negative=())] = (),
     crew: Annotated[Crew, Parameter(name="*")] = ALONE,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
@@ -254,7 +254,7 @@ def evaluate(
 
         pcii evaluate out/twenty -o out/compared
 
-        pcii evaluate out/twenty out/slats -o out/compared --method likelihood --budget 300 --workers 2
+        pcii evaluate out/twenty out/slats -o out/compared --method depth:focus --budget 300 --workers 2
 
     Parameters
     ----------
@@ -263,9 +263,10 @@ def evaluate(
     out
         Folder for the evaluation: new, empty, or that of an earlier evaluation, which is extended.
     method
-        A method of removal, or "depth"; may be repeated. Default: all.
+        A method of removal, as in `pcii segment`, or depth:NAME, as in `pcii depth` ("depth": the default
+        one); may be repeated. Default: all that can take the data.
     budget
-        A photon budget that every dataset has; may be repeated. Default: all that each has.
+        A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
     """
     from pcii.evaluation.comparison import evaluate as compare
 

@@ -3,15 +3,19 @@
 comparison        Methods compared over many datasets: each dataset, budget and method is scored and timed
                   once.
 evaluation_pages  Files of an evaluation: evaluation.json, a self-contained HTML page, and Markdown.
+method_names      Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME.
 pages             HTML pages made from templates: content is escaped as text, and pages run and fetch
                   nothing.
 paired_tests      Means over seeds with confidence intervals, and paired tests of two methods on the same
                   datasets.
-plots             Plots of an evaluation: IoU against photons per view, and against run time.
+plots             Plots of an evaluation: accuracy against photons per view and run time, and reliability
+                  of confidence.
 rows              rows.jsonl: one JSON object per measured score, written safely by several processes at
                   once.
 summary           Summary of the rows of an evaluation: means over seeds, and paired comparisons of
                   methods.
 tables            Tables of an evaluation as text, the same for HTML and Markdown.
+tasks             What an evaluation measures: every dataset at every light by every method, checked
+                  before any work.
 timing            Wall time of a method without the time of compiling or importing code.
 """

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,15 @@ from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import named_in_errors
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
 from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
+from pcii.evaluation.method_names import estimator_of
 from pcii.evaluation.rows import (
-    DEPTH,
-    Key,
+    FULL_LIGHT,
+    Budget,
     Row,
     all_rows,
     append_row,
@@ -25,32 +28,16 @@ from pcii.evaluation.rows import (
     key_of,
 )
 from pcii.evaluation.summary import summarise
+from pcii.evaluation.tasks import Task, tasks_of
 from pcii.evaluation.timing import timed
 from pcii.io.collection_layout import is_collection, read_index
 from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.dataset_layout import MANIFEST, MARKER, TRUTH
+from pcii.io.dataset_layout import MANIFEST, MARKER
 from pcii.io.suggested_depths import depth_range_of, planes_of
+from pcii.metrics.bounds import object_bounds
 from pcii.metrics.scoring import score
-from pcii.removal.methods import removal_methods, segment
-
-
-def known_methods() -> tuple[str, ...]:
-    """Names of the methods that can be evaluated: those of removal, and the depth map."""
-    return (*removal_methods(), DEPTH)
-
-
-@dataclass(frozen=True)
-class Task:
-    """A dataset, photon budget and method to score."""
-
-    dataset: Dataset
-    budget: float | None
-    method: str
-
-    @property
-    def key(self) -> Key:
-        """Key of its row."""
-        return identity_of(self.dataset.manifest), self.budget, self.method
+from pcii.removal.methods import segment
+from pcii.sections.reconstruction import reconstruct
 
 
 def evaluate(
@@ -58,20 +45,22 @@ def evaluate(
     out: str | Path,
     *,
     methods: Sequence[str] = (),
-    budgets: Sequence[float] = (),
+    budgets: Sequence[float | str] = (),
     crew: Crew = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score methods on datasets and compare them; returns the figures of evaluation.json (`summarise`).
 
-    `datasets` are dataset folders, collections, or folders of dataset folders. `methods` default to all;
-    "depth" is the depth map. `budgets` default to all that each dataset has. `crew` does the work.
+    `datasets` are dataset folders, collections, or folders of dataset folders. `methods` are those of
+    `pcii.removal_methods()`, and those of `pcii.depth_methods()` as "depth:NAME"; "depth" is the default one
+    of depth. Without, all that can take the data. `budgets` default to all that each dataset has; among them
+    "full-light", its radiance, which some methods of depth take. `crew` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again;
     evaluation.json, .html and .md summarise all of them. The seconds of a row are the wall time of the method
     alone, after a warm-up call, in a call in which no code was compiled or imported; where several processes
-    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths or counts, or an
-    unknown method or budget:
+    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
+    radiance, for an unknown method or budget, and for a named method that cannot take the data of a dataset:
 
     >>> evaluate(["out/no-such-dataset"], "out/compared")
     Traceback (most recent call last):
@@ -81,7 +70,7 @@ def evaluate(
     `evaluate(["out/twenty"], "out/compared")["groups"][0]["results"][0]["object"]["iou"]["mean"]`.
     """
     folder = Path(out)
-    tasks = _tasks([open_dataset(path) for path in find_datasets(datasets)], _checked(methods), budgets)
+    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], methods, budgets)
     claim_rows(folder)
     with all_rows(folder) as rows:
         measured = {key_of(row) for row in rows}
@@ -130,39 +119,18 @@ def _is_begun(folder: Path) -> bool:
     return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
 
 
-def _checked(methods: Sequence[str]) -> tuple[str, ...]:
-    known = known_methods()
-    for name in methods:
-        if name not in known:
-            raise InputError(f"method: there is no method named {name!r}; use {', '.join(known)}")
-    return tuple(dict.fromkeys(methods)) or known
-
-
-def _tasks(datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float]) -> list[Task]:
-    """The tasks, dataset by dataset; raises `InputError` for what a dataset lacks before any work is done."""
-    tasks: dict[str, list[Task]] = {}
-    for dataset in datasets:
-        if not dataset.has(TRUTH):
-            raise InputError(f"{dataset.path}: has no truth to score with; its recipe left it out")
-        planes_of(dataset, ())
-        chosen = dict.fromkeys(budgets or dataset.budgets)
-        for budget in chosen:
-            dataset.at_budget(budget)
-        each = [Task(dataset, budget, method) for budget in chosen for method in methods]
-        tasks.setdefault(identity_of(dataset.manifest), each)
-    return [task for each in tasks.values() for task in each]
-
-
 class Measuring:
     """The job of measuring `tasks`: each piece adds a row to those in the folder `out`."""
 
     def __init__(self, tasks: Sequence[Task], out: Path) -> None:
         self.tasks, self.out = tasks, out
-        self.warm: set[tuple[float | None, str]] = set()
+        self.warm: set[tuple[Budget, str]] = set()
+        self.full_light: tuple[str, Sections] | None = None
+        """Identity of the last dataset with bounds, and the sections of its radiance."""
 
     def __call__(self, piece: int) -> bool:
         """Measure a task and add its row; raises `InputError` for a dataset that is damaged."""
-        append_row(self.out, _measured(self.tasks[piece], self.warm))
+        append_row(self.out, self._measured(self.tasks[piece]))
         return True
 
     def name(self, piece: int) -> str:
@@ -176,32 +144,48 @@ class Measuring:
 
         compiled_loops.use_threads(count)
 
+    def _measured(self, task: Task) -> Row:
+        """The row of a task; the first call of a method at a budget is a warm-up, the second is timed."""
+        data, estimator = task.data, estimator_of(task.method)
+        seen = data.views if task.budget == FULL_LIGHT else data.counts
+        assert seen is not None
 
-def _measured(task: Task, warm: set[tuple[float | None, str]]) -> Row:
-    """The row of a task; the first call of a method at a budget is a warm-up, the second is timed."""
-    data = task.dataset.at_budget(task.budget)
-    counts, planes, z_range_mm = data.counts, planes_of(data, ()), depth_range_of(data)
+        def work() -> Any:
+            if estimator is not None:
+                return estimate_depth(seen, depth_range_of(data), method=estimator)
+            assert isinstance(seen, PhotonCounts)
+            return segment(seen, planes_of(data, ()), method=task.method)
 
-    def work() -> Any:
-        if task.method == DEPTH:
-            return estimate_depth(counts, z_range_mm)
-        return segment(counts, planes, method=task.method)
+        if (task.budget, task.method) not in self.warm:
+            work()
+            self.warm.add((task.budget, task.method))
+        seconds, estimate = timed(work)
+        photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
+        row = described(data) | {
+            "budget": task.budget,
+            "photons_per_view": photons,
+            "method": task.method,
+            "seconds": round(seconds, 6),
+        }
+        if estimator is not None:
+            depth = dict(score(None, estimate, data.truth, grid=data.grid).depth)
+            return row | {"depth": depth} | self._bounds(data, seen)
+        result = score(estimate, None, data.truth)
+        planes = [
+            {name: value for name, value in (bound | plane).items() if name != "method"}
+            for plane, bound in zip(result.planes, result.bounds["planes"], strict=True)
+        ]
+        return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 
-    if (task.budget, task.method) not in warm:
-        work()
-        warm.add((task.budget, task.method))
-    seconds, estimate = timed(work)
-    row = described(data) | {
-        "budget": task.budget,
-        "photons_per_view": counts.total / counts.grid.view_count,
-        "method": task.method,
-        "seconds": round(seconds, 6),
-    }
-    if task.method == DEPTH:
-        return row | {"depth": dict(score(None, estimate, data.truth, grid=data.grid).depth)}
-    result = score(estimate, None, data.truth)
-    planes = [
-        {name: value for name, value in (bound | plane).items() if name != "method"}
-        for plane, bound in zip(result.planes, result.bounds["planes"], strict=True)
-    ]
-    return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
+    def _bounds(self, data: Dataset, seen: PhotonCounts | Views) -> Row:
+        """`bounds` of the depth of objects from these photons, if there is radiance to know textures from."""
+        views, truth = data.views, data.truth
+        if not isinstance(seen, PhotonCounts) or views is None or not data.analysis.get("z_mm"):
+            return {}
+        assert truth is not None
+        planes, identity = planes_of(data, ()), identity_of(data.manifest)
+        if self.full_light is None or self.full_light[0] != identity:
+            self.full_light = identity, reconstruct(views, planes)
+        # By their origin where that is known, so no sections are needed to count photons.
+        sections = None if truth.photons is not None else reconstruct(seen, planes)
+        return {"bounds": {"objects": object_bounds(truth, self.full_light[1], sections)}}

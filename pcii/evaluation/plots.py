@@ -1,63 +1,154 @@
-"""Plots of an evaluation: IoU against photons per view, and against run time."""
+"""Plots of an evaluation: accuracy against photons per view and run time, and reliability of confidence."""
 
 import base64
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pcii.base.plain_text import visible
+from pcii.evaluation.tables import light_name
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 """The palette of Okabe and Ito, which the colour-blind can distinguish."""
 MARKERS = "osD^vPX"
 LONGEST_NAME = 40
 """Characters of a method's name in the legend, about a third of the plot's width."""
+MEASURES = {
+    "iou": ("object", "IoU, mean over planes"),
+    "bad_1px": ("depth", "share of errors of depth above 1 px"),
+}
+"""What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
+PANELS = 4
+"""Of reliability, side by side."""
+LEAST_AREA, WHOLE_AREA = 4.0, 120.0
+"""Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 
 
-def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
-    """Object IoU against photons per view, and against seconds, as a PNG in a data URI.
+def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: str = "iou") -> str:
+    """One of `MEASURES` against photons per view, and against seconds, as a PNG in a data URI.
 
     Each of `methods` has its colour and marker in all groups, also in those without it; bars are intervals.
+    Full light is at no number of photons. Empty if none of them has the measure.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator, NullLocator
 
-    figure = Figure(figsize=(10.5, 3.9), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    part, label = MEASURES[measure]
+    has_measure = {row["method"] for row in group["results"] if row.get(part, {}).get(measure)}
+    if has_measure.isdisjoint(methods):
+        return ""
+    figure = _figure(3.9)
     by_photons, by_seconds = figure.subplots(1, 2, sharey=True)
     for number, method in enumerate(methods):
-        rows = [row for row in group["results"] if row["method"] == method and row["object"].get("iou")]
-        if not rows:
-            continue
-        style = {
-            "color": COLOURS[number % len(COLOURS)],
-            "marker": MARKERS[number % len(MARKERS)],
-            "linestyle": "-" if number < len(COLOURS) else "--",
-            "markersize": 5,
-            "linewidth": 1.4,
-            "capsize": 2.5,
-        }
-        iou = [row["object"]["iou"]["mean"] for row in rows]
-        bars = _bars([row["object"]["iou"] for row in rows])
-        by_photons.errorbar(
-            [row["photons_per_view"] for row in rows], iou, yerr=bars, label=_legend(method), **style
-        )
-        seconds = [row["seconds"]["mean"] for row in rows]
-        by_seconds.errorbar(seconds, iou, yerr=bars, **style)
+        rows = [row for row in group["results"] if row["method"] == method and row[part].get(measure)]
+        style = _style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
+        lit = [row for row in rows if row["photons_per_view"] is not None]
+        for axes, own, places in (
+            (by_photons, lit, [row["photons_per_view"] for row in lit]),
+            (by_seconds, rows, [row["seconds"]["mean"] for row in rows]),
+        ):
+            if own:
+                means = [row[part][measure] for row in own]
+                heights = [mean["mean"] for mean in means]
+                axes.errorbar(places, heights, yerr=_bars(means), label=_legend(method), **style)
+    photons = [row["photons_per_view"] for row in group["results"] if row["photons_per_view"] is not None]
     for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
         axes.set_xlabel(name)
-        axes.set_ylim(-0.02, 1.02)
-        axes.grid(True, color="#d9dde5", linewidth=0.6)
-        axes.spines[["top", "right"]].set_visible(False)
-        if name != "photons per view" or all(row["photons_per_view"] > 0 for row in group["results"]):
+        _frame(axes)
+        if axes is by_seconds or (photons and min(photons) > 0):
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-    by_photons.set_ylabel("IoU, mean over planes")
-    if by_photons.get_legend_handles_labels()[0]:
-        by_photons.legend(frameon=False, fontsize=9)
+    by_photons.set_ylabel(label)
+    # By name, since methods of full light alone are in one of the two.
+    handles = {
+        name: line
+        for axes in (by_seconds, by_photons)
+        for line, name in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    by_photons.legend([handles[name] for name in sorted(handles)], sorted(handles), frameon=False, fontsize=9)
+    return _data_uri(figure)
+
+
+def reliability_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
+    """Share of correct depths against stated confidence, a panel for each budget, as a PNG in a data URI.
+
+    Confidence that is right lies on the diagonal, overconfidence below it. The area of a marker grows with
+    its bin's share of the pixels. Empty if no method of `methods` answers anything.
+    """
+    from matplotlib.lines import Line2D
+
+    found = [row for row in group["results"] if row["method"] in methods and row["depth"].get("reliability")]
+    budgets = list(dict.fromkeys(row["budget"] for row in found))
+    if not budgets:
+        return ""
+    columns = min(PANELS, len(budgets))
+    lines = -(-len(budgets) // columns)
+    figure = _figure(0.7 + 2.6 * lines, 0.7 + 2.45 * columns)
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    for budget, axes in zip(budgets, panels.flat, strict=False):
+        axes.plot([0, 1], [0, 1], color="#8a94a6", linewidth=0.8)
+        for row in found:
+            if row["budget"] == budget:
+                _draw_bins(axes, row["depth"]["reliability"], _style(methods.index(row["method"])))
+        axes.set_title(light_name(budget), fontsize=9)
+        axes.set_xlim(-0.02, 1.02)
+        _frame(axes)
+    for axes in panels.flat[len(budgets) :]:
+        axes.set_axis_off()
+    for axes in panels[-1]:
+        axes.set_xlabel("confidence")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("share within 1 px")
+    shown = [method for method in methods if any(row["method"] == method for row in found)]
+    handles = [Line2D([], [], markersize=5, **_style(methods.index(method))) for method in shown]
+    names = [_legend(method) for method in shown]
+    figure.legend(handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
+    return _data_uri(figure)
+
+
+def _draw_bins(axes: "Axes", reliability: Mapping[str, Any], style: Mapping[str, Any]) -> None:
+    """Draw the bins that have pixels."""
+    bins = [one for one in reliability.values() if one["confidence"] is not None]
+    stated, correct, shares = (
+        [one[name]["mean"] for one in bins] for name in ("confidence", "correct", "share")
+    )
+    areas = [LEAST_AREA + WHOLE_AREA * share for share in shares]
+    marks = {"color": style["color"], "marker": style["marker"], "alpha": 0.8, "linewidth": 0}
+    axes.scatter(stated, correct, areas, clip_on=False, zorder=3, **marks)
+    axes.plot(stated, correct, linewidth=1.0, color=style["color"], linestyle=style["linestyle"])
+
+
+def _style(number: int) -> dict[str, Any]:
+    """Colour, marker and line of a method by its number."""
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "marker": MARKERS[number % len(MARKERS)],
+        "linestyle": "-" if number < len(COLOURS) else "--",
+    }
+
+
+def _figure(height: float, width: float = 10.5) -> "Figure":
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _frame(axes: "Axes") -> None:
+    """A vertical axis of shares, and a grid without a box."""
+    axes.set_ylim(-0.02, 1.02)
+    axes.grid(True, color="#d9dde5", linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _data_uri(figure: "Figure") -> str:
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
     return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"

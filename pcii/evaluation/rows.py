@@ -1,7 +1,7 @@
 """rows.jsonl: one JSON object per measured score, written safely by several processes at once.
 
-A row belongs to a dataset (by its identity), a photon budget and a method; none is measured twice. It ends in
-a checksum of its line (see `pcii.io.sealed_json`).
+A row belongs to a dataset (by its identity), a photon budget or full light, and a method; none is measured
+twice. It ends in a checksum of its line (see `pcii.io.sealed_json`).
 """
 
 import hashlib
@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
@@ -18,10 +18,37 @@ from pcii.io.dataset import Dataset
 from pcii.io.evaluation_layout import ROWS
 from pcii.io.sealed_json import check_seal, sealed
 
-DEPTH = "depth"
-"""Name of the depth map among the methods."""
+FULL_LIGHT: Final = "full-light"
+"""Stands for the photon budget in rows of methods that were given the radiance."""
+Budget = float | Literal["full-light"] | None
+"""Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
 Row = dict[str, Any]
-Key = tuple[str, float | None, str]
+Key = tuple[str, Budget, str]
+
+
+def budget_of(text: str) -> float | Literal["full-light"]:
+    """A budget as people write it; raises `InputError` for what is neither a number nor `FULL_LIGHT`.
+
+    >>> budget_of("300"), budget_of("full-light")
+    (300.0, 'full-light')
+    """
+    if text == FULL_LIGHT:
+        return FULL_LIGHT
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"budget: expected a number of photons or {FULL_LIGHT!r}, got {text!r}") from None
+
+
+def by_light(budget: Budget) -> tuple[int, float]:
+    """Key that sorts budgets by light: numbers of photons, then an exposure, then full light.
+
+    >>> sorted([FULL_LIGHT, None, 300.0, 30.0], key=by_light)
+    [30.0, 300.0, None, 'full-light']
+    """
+    if budget == FULL_LIGHT:
+        return 2, 0.0
+    return (1, 0.0) if budget is None else (0, float(budget))
 
 
 def identity_of(manifest: Mapping[str, Any]) -> str:

@@ -2,13 +2,14 @@
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from itertools import combinations, pairwise
 from typing import Any
 
 from pcii.evaluation.paired_tests import Mean, mean_interval, paired_difference, positive_mean_interval
-from pcii.evaluation.rows import DEPTH, Row
+from pcii.evaluation.rows import Budget, Row, by_light
 
 INTERVALS = (
     "95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the logarithm "
@@ -19,6 +20,9 @@ TRUTHS = ("object", "pixel")
 SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", "photon_recall"}
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage", "answered"}
 SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
+SHARES |= {"ece", "share", "confidence", "correct"}
+Cells = Mapping[tuple[Budget, str], Mapping[str, Row]]
+"""Rows by budget and method, and then by the identity of their dataset."""
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
@@ -26,10 +30,12 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
 
     A group's `label` is its title, with the settings that differ between groups of the same title. Its
     `results` have a row for each budget and method: means over seeds with their intervals, by kind of truth,
-    as the mean over the planes and plane by plane; for the depth map the errors of `Score.depth`. `paired`
-    compares methods by the mean object IoU of the same datasets, `monotonic` lists significant falls of it
-    from one budget to the next larger one, and `table1` has in how many seeds each object's entropy is lowest
-    at the plane that the object belongs to.
+    as the mean over the planes and plane by plane; of depth maps the errors of `Score.depth` in `depth`, and
+    in `bounds`, where there is radiance, `depth_sigma_px` of each object. `paired` compares methods on the
+    same datasets, by their `measure`: those of removal by "iou", the mean object IoU, where more is better,
+    those of depth by "bad_1px", where less is. `monotonic` lists where it is significantly worse at one
+    budget than at the next smaller one: its `difference` is negative for "iou" and positive for "bad_1px".
+    `table1` has in how many seeds each object's entropy is lowest at the plane that the object belongs to.
     """
     groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
     for row in rows:
@@ -68,12 +74,28 @@ def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     return plane_of
 
 
+@dataclass(frozen=True)
+class _Measure:
+    """What methods of one kind are compared by: the value of a row, and the sign that makes more better."""
+
+    name: str
+    of: Callable[[Row], float | None]
+    sign: int
+
+
+_IOU = _Measure("iou", lambda row: over_planes(row, "object").get("iou"), 1)
+_BAD_1PX = _Measure("bad_1px", lambda row: row["depth"].get("bad_1px"), -1)
+
+
 def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
-    cells: dict[tuple[float | None, str], dict[str, Row]] = defaultdict(dict)
+    cells: dict[tuple[Budget, str], dict[str, Row]] = defaultdict(dict)
     for row in sorted(rows, key=lambda row: (row["seed"] or 0, row["identity"])):
         cells[row["budget"], row["method"]][row["identity"]] = row
-    order = sorted(cells, key=lambda cell: (_rank(cell[0]), cell[1]))
-    removal = {cell: cells[cell] for cell in order if cell[1] != DEPTH}
+    order = sorted(cells, key=lambda cell: (by_light(cell[0]), cell[1]))
+    # All rows of a cell are of the same method.
+    is_depth = {cell: "depth" in next(iter(cells[cell].values())) for cell in order}
+    removal = {cell: cells[cell] for cell in order if not is_depth[cell]}
+    depth = {cell: cells[cell] for cell in order if is_depth[cell]}
     names = {row["identity"]: row["dataset"] for row in rows}
     return {
         "recipe": recipe,
@@ -81,8 +103,8 @@ def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
         "scene": rows[0]["scene"],
         "datasets": len(names),
         "results": [_result(*cell, list(cells[cell].values())) for cell in order],
-        "paired": _paired(removal),
-        "monotonic": _falls(removal),
+        "paired": [*_paired(removal, _IOU), *_paired(depth, _BAD_1PX)],
+        "monotonic": [*_losses(removal, _IOU), *_losses(depth, _BAD_1PX)],
         "table1": [
             entry
             for (budget, method), by_dataset in removal.items()
@@ -92,20 +114,17 @@ def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _rank(budget: float | None) -> float:
-    return float("inf") if budget is None else budget
-
-
-def _result(budget: float | None, method: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _result(budget: Budget, method: str, rows: Sequence[Row]) -> dict[str, Any]:
+    photons = [row["photons_per_view"] for row in rows if row["photons_per_view"] is not None]
     result: dict[str, Any] = {
         "budget": budget,
         "method": method,
         "seeds": len(rows),
-        "photons_per_view": sum(row["photons_per_view"] for row in rows) / len(rows),
+        "photons_per_view": sum(photons) / len(photons) if photons else None,
         "seconds": _with_interval(positive_mean_interval([row["seconds"] for row in rows])),
     }
-    if method == DEPTH:
-        return result | {"depth": _means([row["depth"] for row in rows])}
+    if "depth" in rows[0]:
+        return result | {"depth": _means([row["depth"] for row in rows])} | _bounds(rows)
     depths = sorted({plane["z_mm"] for row in rows for plane in row["planes"]})
     for kind in TRUTHS:
         result[kind] = _means([over_planes(row, kind) for row in rows])
@@ -114,6 +133,16 @@ def _result(budget: float | None, method: str, rows: Sequence[Row]) -> dict[str,
         for z in depths
     ]
     return result
+
+
+def _bounds(rows: Sequence[Row]) -> dict[str, Any]:
+    """`bounds`: means over seeds of each object's bound on depth and what it follows from."""
+    by_object: dict[str, list[dict[str, float | None]]] = defaultdict(list)
+    for row in rows:
+        for entry in row.get("bounds", {}).get("objects", ()):
+            by_object[entry["name"]].append({name: entry[name] for name in entry if name != "name"})
+    found = [{"name": name, **_means(entries)} for name, entries in by_object.items()]
+    return {"bounds": {"objects": found}} if found else {}
 
 
 def over_planes(row: Row, kind: str) -> dict[str, float | None]:
@@ -158,43 +187,48 @@ def _with_interval(mean: Mean) -> dict[str, Any]:
     return {"n": mean.n, "mean": mean.mean, "interval": interval}
 
 
-def _compared(first: Mapping[str, Row], second: Mapping[str, Row]) -> dict[str, Any] | None:
-    """Mean object IoU of the first rows minus that of the second, on the datasets of both."""
+def _compared(
+    first: Mapping[str, Row], second: Mapping[str, Row], measure: _Measure
+) -> dict[str, Any] | None:
+    """The measure of the first rows minus that of the second, on the datasets of both."""
     pairs: list[tuple[float, float]] = []
     for identity in first:
         if identity in second:
-            a, b = (over_planes(rows[identity], "object").get("iou") for rows in (first, second))
+            a, b = (measure.of(rows[identity]) for rows in (first, second))
             if a is not None and b is not None:
                 pairs.append((a, b))
     if not pairs:
         return None
     test = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
-    return {"difference": _with_interval(test.difference), "p": test.p, "exact": test.exact}
+    difference = _with_interval(test.difference)
+    return {"measure": measure.name, "difference": difference, "p": test.p, "exact": test.exact}
 
 
-def _paired(cells: Mapping[tuple[float | None, str], Mapping[str, Row]]) -> list[dict[str, Any]]:
+def _paired(cells: Cells, measure: _Measure) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
     for (budget, method), (other_budget, other_method) in combinations(cells, 2):
         if budget != other_budget:
             continue
-        comparison = _compared(cells[budget, method], cells[other_budget, other_method])
+        comparison = _compared(cells[budget, method], cells[other_budget, other_method], measure)
         if comparison is not None:
             entries.append({"budget": budget, "methods": [method, other_method], **comparison})
     return entries
 
 
-def _falls(cells: Mapping[tuple[float | None, str], Mapping[str, Row]]) -> list[dict[str, Any]]:
+def _losses(cells: Cells, measure: _Measure) -> list[dict[str, Any]]:
+    """Where the whole interval of the change from one budget to the next larger one is for the worse."""
     entries: list[dict[str, Any]] = []
     for method in sorted({method for _, method in cells}):
         for fewer, more in pairwise(cell for cell in cells if cell[1] == method):
-            comparison = _compared(cells[more], cells[fewer])
+            comparison = _compared(cells[more], cells[fewer], measure)
             interval = None if comparison is None else comparison["difference"]["interval"]
-            if comparison is not None and interval is not None and interval[1] < 0:
+            if interval is not None and max(measure.sign * end for end in interval) < 0:
+                assert comparison is not None
                 entries.append({"method": method, "from": fewer[0], "to": more[0], **comparison})
     return entries
 
 
-def _table1(budget: float | None, rows: Sequence[Row]) -> list[dict[str, Any]]:
+def _table1(budget: Budget, rows: Sequence[Row]) -> list[dict[str, Any]]:
     """In how many seeds each object's entropy is lowest at the object's plane, and by how many bits."""
     gaps: dict[tuple[str, str], list[float]] = defaultdict(list)
     for row in rows:

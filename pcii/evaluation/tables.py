@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from pcii.base.plain_text import in_markdown
+from pcii.evaluation.rows import FULL_LIGHT, Budget, by_light
 
 COLUMNS = (
     ("IoU", "object", "iou"),
@@ -15,8 +16,17 @@ COLUMNS = (
     ("photon precision", "object", "photon_precision"),
     ("photon recall", "object", "photon_recall"),
 )
-DEPTH_COLUMNS = ("median_px", "median_mm", "mae_mm", "bad_1px", "bad_3px", "coverage")
-DIGITS = {"median_px": 2, "median_mm": 2, "mae_mm": 2}
+DEPTH_COLUMNS = (
+    ("median, px", "median_px"),
+    ("bad_1px", "bad_1px"),
+    ("bad_3px", "bad_3px"),
+    ("BadPix(0.07)", "hci_objects", "badpix_007"),
+    ("BadPix(0.07), all pixels", "hci", "badpix_007"),
+    ("answered", "coverage"),
+    ("ECE", "ece"),
+)
+ALL_PIXELS = "BadPix(0.07), all pixels"
+"""The column that stands for those of objects where surfaces have no names, as in other people's data."""
 EXPOSURE = "by exposure"
 """Name of the photon budget of datasets whose recipe has an exposure instead."""
 
@@ -33,24 +43,38 @@ class Table:
 
 def tables_of(group: Mapping[str, Any]) -> list[Table]:
     """The tables of one group, without empty ones."""
-    tables = [_removal(group), _depth(group), _paired(group), _table1(group)]
+    tables = [_removal(group), _depth(group), _bounds(group)]
+    tables += [_paired(group, "iou", "IoU"), _paired(group, "bad_1px", "bad_1px"), _table1(group)]
     return [table for table in tables if table.rows]
+
+
+def overviews(groups: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """`overview` and `depth_overview`, without empty ones."""
+    return [table for table in (overview(groups), depth_overview(groups)) if table.rows]
 
 
 def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
     """Mean object IoU of every group and method by photon budget; labels of groups differ."""
-    budgets: dict[str, None] = {}
-    cells: dict[tuple[str, str], dict[str, str]] = {}
+    return _by_budget(groups, "IoU by photon budget", "object", "iou")
+
+
+def depth_overview(groups: Sequence[Mapping[str, Any]]) -> Table:
+    """Share of errors of depth above 1 px of every group and method by photon budget."""
+    return _by_budget(groups, "Errors of depth above 1 px by photon budget", "depth", "bad_1px")
+
+
+def _by_budget(groups: Sequence[Mapping[str, Any]], title: str, part: str, measure: str) -> Table:
+    budgets: dict[Budget, None] = {}
+    cells: dict[tuple[str, str], dict[Budget, str]] = {}
     for group in groups:
         for row in group["results"]:
-            if "object" in row:
-                name = budget_name(row["budget"])
-                budgets[name] = None
-                iou = with_interval(row["object"].get("iou"))
-                cells.setdefault((group["label"], row["method"]), {})[name] = iou
-    order = sorted(budgets, key=lambda name: float("inf") if name == EXPOSURE else float(name))
+            if part in row:
+                budgets[row["budget"]] = None
+                mean = with_interval(row[part].get(measure))
+                cells.setdefault((group["label"], row["method"]), {})[row["budget"]] = mean
+    order = sorted(budgets, key=by_light)
     rows = [(*names, *(by_budget.get(budget, "–") for budget in order)) for names, by_budget in cells.items()]
-    return Table("IoU by photon budget", ("scene", "method", *order), tuple(rows), words=2)
+    return Table(title, ("scene", "method", *map(budget_name, order)), tuple(rows), words=2)
 
 
 def markdown(table: Table) -> str:
@@ -75,9 +99,22 @@ def with_interval(mean: Mapping[str, Any] | None, digits: int = 3) -> str:
     return f"{text} ({low:.{digits}f} to {high:.{digits}f})"
 
 
-def budget_name(budget: float | None) -> str:
+def budget_name(budget: Budget) -> str:
     """A photon budget as text; `EXPOSURE` where the recipe has an exposure time instead."""
+    if budget == FULL_LIGHT:
+        return "full light"
     return EXPOSURE if budget is None else f"{budget:g}"
+
+
+def light_name(budget: Budget) -> str:
+    """Photons of a budget, or full light, in words.
+
+    >>> light_name(300.0), light_name("full-light"), light_name(None)
+    ('300 photons', 'full light', 'photons by exposure')
+    """
+    if budget is None:
+        return f"photons {EXPOSURE}"
+    return budget_name(budget) if budget == FULL_LIGHT else f"{budget_name(budget)} photons"
 
 
 def _removal(group: Mapping[str, Any]) -> Table:
@@ -99,20 +136,48 @@ def _removal(group: Mapping[str, Any]) -> Table:
 
 def _depth(group: Mapping[str, Any]) -> Table:
     results = [row for row in group["results"] if "depth" in row]
-    shown = [name for name in DEPTH_COLUMNS if any(row["depth"].get(name) for row in results)]
+    means = [{name: _mean(row["depth"], *path) for name, *path in DEPTH_COLUMNS} for row in results]
+    shown = [name for name, *_ in DEPTH_COLUMNS if any(mean[name] for mean in means)]
+    if "BadPix(0.07)" in shown and ALL_PIXELS in shown:
+        shown.remove(ALL_PIXELS)
     rows = tuple(
         (
+            row["method"],
             budget_name(row["budget"]),
             str(row["seeds"]),
-            *(with_interval(row["depth"].get(name), DIGITS.get(name, 3)) for name in shown),
+            *(with_interval(mean[name], 2 if name == "median, px" else 3) for name in shown),
             with_interval(row["seconds"], 2),
         )
-        for row in results
+        for row, mean in zip(results, means, strict=True)
     )
-    return Table("Depth", ("photons", "seeds", *shown, "seconds"), rows, words=0)
+    return Table("Depth", ("method", "photons", "seeds", *shown, "seconds"), rows)
 
 
-def _paired(group: Mapping[str, Any]) -> Table:
+def _mean(scores: Mapping[str, Any], *path: str) -> Mapping[str, Any] | None:
+    """A mean by its name, or by the names of the mappings that it is in; None if it is not there."""
+    found: Any = scores
+    for name in path:
+        found = None if found is None else found.get(name)
+    return found
+
+
+def _bounds(group: Mapping[str, Any]) -> Table:
+    """Bounds of each object and budget; they are the same for all methods that saw the same photons."""
+    cells = {
+        (bound["name"], row["budget"]): (bound["photons"], bound["depth_sigma_px"])
+        for row in group["results"]
+        for bound in row.get("bounds", {}).get("objects", ())
+        if bound["depth_sigma_px"] is not None
+    }
+    rows = tuple(
+        (name, budget_name(budget), with_interval(photons, 0), with_interval(sigma))
+        for (name, budget), (photons, sigma) in cells.items()
+    )
+    header = ("object", "photons", "photons of the object", "standard deviation, px")
+    return Table("Least error of an object's depth (Cramér-Rao bound)", header, rows)
+
+
+def _paired(group: Mapping[str, Any], measure: str, name: str) -> Table:
     rows = tuple(
         (
             " minus ".join(entry["methods"]),
@@ -122,9 +187,11 @@ def _paired(group: Mapping[str, Any]) -> Table:
             f"{entry['p']:.2g}" + ("" if entry["exact"] else " (sampled)"),
         )
         for entry in group["paired"]
+        if entry["measure"] == measure
     )
-    header = ("methods", "photons", "seeds", "difference of IoU", "p")
-    return Table("Pairs of methods on the same datasets", header, rows)
+    header = ("methods", "photons", "seeds", f"difference of {name}", "p")
+    kind = "methods" if measure == "iou" else "methods of depth"
+    return Table(f"Pairs of {kind} on the same datasets", header, rows)
 
 
 def _table1(group: Mapping[str, Any]) -> Table:

@@ -242,9 +242,11 @@ def test_a_depth_map_without_estimates_is_reported_as_such(
     series: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing = DepthMap(np.full((8, 12), np.nan), np.zeros((8, 12)))
-    monkeypatch.setattr(import_module("pcii.evaluation.comparison"), "estimate_depth", lambda *_: nothing)
+    comparison = import_module("pcii.evaluation.comparison")
+    monkeypatch.setattr(comparison, "estimate_depth", lambda *_, **__: nothing)
     evaluation = evaluate([series], tmp_path / "out", methods=["depth"])
-    row = result_of(evaluation, OWN, "depth")
+    row = result_of(evaluation, OWN, "depth:focus")
+    assert row["depth"]["ece"] is row["depth"]["reliability"] is None
     assert row["depth"]["coverage"] == {"n": 3, "mean": 0.0, "interval": [0.0, 0.0]}
     assert row["depth"]["mae_mm"] is None
     assert row["depth"]["bad_1px"]["mean"] == 1.0

@@ -81,7 +81,8 @@ def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     evaluation = summarise([row for name in NAMES for row in rows_of(name)])
     drawn = accuracy_plots(evaluation["groups"][0], NAMES[-2:])  # for all: a plot takes half a second
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("pcii.evaluation.evaluation_pages.accuracy_plots", lambda *_: drawn)
+        for plots in ("accuracy_plots", "reliability_plots"):
+            patch.setattr(f"pcii.evaluation.evaluation_pages.{plots}", lambda *_: drawn)
         write_evaluation(out, evaluation)
     files = ("report.html", "evaluation.html", "evaluation.md")
     return {name: (out / name).read_bytes().decode() for name in files}
@@ -91,7 +92,13 @@ def rows_of(name: str) -> list[dict[str, Any]]:
     """Two groups that share this title; more photons are worse."""
     head = {"dataset": name, "title": name, "photons_per_view": 1.0, "seconds": 1.0}
     entropy = [{"name": name, "entropy": {"1": 0.5, "2": 1.0}}]
-    return [
+    bound = {"name": name, "photons": 9, "log_gradient_per_px": 0.1, "depth_sigma_px": 0.5}
+    reliability = {"0.9-1.0": {"share": 1.0, "confidence": 1.0, "correct": 0.5}}
+    depth = {
+        "depth": {"bad_1px": 0.5, "ece": 0.5, "reliability": reliability},
+        "bounds": {"objects": [bound]},
+    }
+    removal = [
         head
         | {"recipe": f"{scene}{name}", "scene": scene, "settings": {"scene": scene, "x": 1}}
         | {"identity": f"{scene}{seed}{name}", "seed": seed, "budget": budget, "method": method}
@@ -101,6 +108,9 @@ def rows_of(name: str) -> list[dict[str, Any]]:
         for method in (name, "three-step")
         for budget, iou in ((NESTED, 0.9), (OWN, 0.5))
     ]
+    taken = ("planes", "objects", "method")
+    shown = [{key: row[key] for key in row if key not in taken} for row in removal if row["method"] == name]
+    return removal + [row | {"method": "depth:focus"} | depth for row in shown]
 
 
 @pytest.mark.parametrize("which", ["report.html", "evaluation.html"])
@@ -133,15 +143,15 @@ def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None
         shown = visible(name)
         assert shown in texts  # method, object
         for scene in (shown, "other"):
-            assert texts.count(f"{shown} (scene={scene})") == 1 + 2  # heading, and by method in the overview
+            # The heading, and by method in both overviews.
+            assert texts.count(f"{shown} (scene={scene})") == 1 + 2 + 1
         assert f"IoU of {shown} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_a_title_of_each_kind_stays_in_its_place(name: str) -> None:
-    group = {"label": name, "datasets": 1, "recipe": name, "plot": "", "tables": [], "falls": [name]}
-    overview = {"rows": [], "title": ""}
-    content = {"version": name, "notes": [name], "overview": overview, "groups": [group]}
+    group = {"label": name, "datasets": 1, "recipe": name, "plots": [], "tables": [], "losses": [name]}
+    content = {"version": name, "notes": [name], "overviews": [], "groups": [group]}
     read = Read(page("evaluation.html.j2", content).decode())
     assert {tag for tag, _ in read.elements} <= ELEMENTS
     assert read.texts.count(visible(name)) == 4  # the note, the heading, the recipe and the sentence
@@ -163,7 +173,7 @@ def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) ->
         read = html.unescape(re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", in_markdown(name)))
         assert read == visible(name)
     lines = [line for line in text.splitlines() if line]
-    assert all(re.match(r"\||#+ |IoU of |Scores |p: ", line) for line in lines)
+    assert all(re.match(r"\||#+ |IoU of |Scores |p: |Depth: ", line) for line in lines)
 
 
 def test_what_a_page_lacks_is_no_empty_place() -> None:

@@ -1,0 +1,111 @@
+"""What an evaluation measures: every dataset at every light by every method, checked before any work."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pcii.base.errors import InputError
+from pcii.depth.depth_planes import check_range_mm
+from pcii.evaluation.method_names import check_method, estimator_of, full_name, methods_for
+from pcii.evaluation.rows import FULL_LIGHT, Budget, Key, budget_of, identity_of
+from pcii.io.dataset import Dataset
+from pcii.io.dataset_layout import RADIANCE, TRUTH
+from pcii.io.suggested_depths import depth_range_of, planes_of
+
+
+@dataclass(frozen=True)
+class Task:
+    """A dataset, photon budget or full light, and method (its full name) to score."""
+
+    dataset: Dataset
+    budget: Budget
+    method: str
+
+    @property
+    def key(self) -> Key:
+        """Key of its row."""
+        return identity_of(self.dataset.manifest), self.budget, self.method
+
+    @property
+    def data(self) -> Dataset:
+        """The dataset with the photons of the budget, read anew, so that tasks keep nothing in memory."""
+        # Of full light the budget does not matter.
+        budget = self.dataset.budgets[-1] if isinstance(self.budget, str) else self.budget
+        return self.dataset.at_budget(budget)
+
+
+def tasks_of(
+    datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float | str]
+) -> list[Task]:
+    """The tasks, dataset by dataset, each dataset once.
+
+    Without `methods` all that can take the data; without `budgets` all that a dataset has, and full light if
+    it has radiance. Raises `InputError` for an unknown method, for a dataset without truth, two views, depths
+    or a named budget, and for a named method that can take none of its data.
+    """
+    for method in methods:
+        check_method(method)
+    tasks: dict[str, list[Task]] = {}
+    for dataset in datasets:
+        if not dataset.has(TRUTH):
+            raise InputError(f"{dataset.path}: has no truth to score with; its recipe left it out")
+        if dataset.grid.view_count < 2:
+            raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
+        lights = _lights(dataset, budgets)
+        by_light = {light: _names(dataset, methods, light) for light in lights}
+        if methods:
+            _check_use(dataset, methods, lights)
+        names = [name for each in by_light.values() for name in each]
+        if any(estimator_of(name) is None for name in names):
+            planes_of(dataset, ())
+        if any(estimator_of(name) is not None for name in names):
+            z_range_mm = depth_range_of(dataset)
+            try:
+                check_range_mm(dataset.grid, z_range_mm)
+            except InputError as fault:
+                raise InputError(f"{dataset.path}: {fault}") from None
+        each = [Task(dataset, light, name) for light in lights for name in by_light[light]]
+        tasks.setdefault(identity_of(dataset.manifest), each)
+    return [task for each in tasks.values() for task in each]
+
+
+def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
+    """The budgets to score at, with `FULL_LIGHT` for the radiance; `InputError` for one that is not there."""
+    own: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
+    if dataset.has(RADIANCE):
+        own.append(FULL_LIGHT)
+    if not own:
+        raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
+    chosen: list[Budget] = []
+    for budget in budgets:
+        named = budget_of(budget) if isinstance(budget, str) else budget
+        if named != FULL_LIGHT:
+            dataset.at_budget(named)
+        elif FULL_LIGHT not in own:
+            raise InputError(f"{dataset.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
+        chosen.append(named)
+    return list(dict.fromkeys(chosen or own))
+
+
+def _names(dataset: Dataset, methods: Sequence[str], light: Budget) -> list[str]:
+    """Full names of the methods to apply at a light, each once."""
+    full_light = light == FULL_LIGHT
+    if methods:
+        found = (full_name(method, full_light=full_light) for method in methods)
+        return list(dict.fromkeys(name for name in found if name is not None))
+    # Removal is of sections at depths that the dataset names.
+    has_planes = bool(dataset.analysis.get("z_mm"))
+    return [name for name in methods_for(full_light=full_light) if has_planes or estimator_of(name)]
+
+
+def _check_use(dataset: Dataset, methods: Sequence[str], lights: Sequence[Budget]) -> None:
+    """Raise `InputError` for a named method that takes neither kind of data that is scored."""
+    kinds = {light == FULL_LIGHT for light in lights}
+    for method in methods:
+        if not any(full_name(method, full_light=kind) for kind in kinds):
+            (full_light,) = kinds
+            lacking = "photon counts" if full_light else "radiance"
+            taken = "radiance" if full_light else "photon counts"
+            raise InputError(
+                f"method: {method!r} needs {lacking}, and of {dataset.path} {taken} would be scored; use "
+                f"{', '.join(methods_for(full_light=full_light))}"
+            )
