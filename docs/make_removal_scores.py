@@ -19,7 +19,8 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.ticker import LogLocator, NullLocator
 
-from benchmarks.removal import Entry, load_corpus
+from benchmarks.corpus import Entry, load_corpus
+from pcii.evaluation.method_names import DEPTH, full_name
 from pcii.evaluation.plots import COLOURS, MARKERS
 from pcii.evaluation.tables import Table, markdown
 
@@ -151,9 +152,10 @@ def times(groups: list[Group]) -> Table:
 
 
 def depths(groups: list[Group]) -> Table:
-    """Depth maps by photons per view."""
+    """Depth maps of the default method by photons per view."""
+    default = full_name(DEPTH, full_light=False)
     found = {
-        group["title"]: {row["budget"]: _depth(row) for row in group["results"] if row.get("depth")}
+        group["title"]: {row["budget"]: _depth(row) for row in group["results"] if row["method"] == default}
         for group in groups
     }
     budgets = sorted({budget for own in found.values() for budget in own})

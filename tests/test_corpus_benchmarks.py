@@ -1,12 +1,14 @@
-"""The benchmark of removal, but for its size: what it would make, and how it sums up."""
+"""The benchmarks of removal and depth, but for their size: what they would make, and how they sum up."""
 
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from benchmarks import depth
+from benchmarks.corpus import Entry, drawn_corpus, load_corpus, named_scenes, work_list
 from benchmarks.drawn import KINDS, write_recipe
-from benchmarks.removal import Entry, by_half_and_kind, drawn_corpus, load_corpus, report, work_list
+from benchmarks.removal import mean_iou, report
 from pcii.base.errors import InputError
 from simgen.dataset.prepared import prepare
 from simgen.drawn import GENERATORS
@@ -55,6 +57,14 @@ def test_drawn_scenes_are_a_corpus(tmp_path: Path) -> None:
         drawn_corpus("some", tmp_path)
 
 
+def test_a_few_scenes_are_taken_by_name() -> None:
+    entries = load_corpus()
+    assert named_scenes(entries, []) == entries
+    assert [entry.name for entry in named_scenes(entries, ["slats", "paper"])] == ["paper", "slats"]
+    with pytest.raises(InputError, match="BENCH_SCENES: there is no scene named 'nothing'; use paper, "):
+        named_scenes(entries, ["nothing"])
+
+
 def group(recipe: str, title: str, ious: dict[tuple[float, str], float]) -> dict[str, Any]:
     results = [
         {
@@ -82,11 +92,12 @@ ENTRIES = {
     "a": Entry(recipe="balls", half="train", kind="textured"),
     "b": Entry(recipe="slats", half="train", kind="cluttered"),
     "c": Entry(recipe="stones", half="test", kind="textured"),
+    "e": Entry(recipe="blank", half="test", kind="empty"),
 }
 
 
 def test_means_by_half_and_kind_are_counted_by_hand() -> None:
-    table = by_half_and_kind(GROUPS, ENTRIES)
+    table = mean_iou(GROUPS, ENTRIES)
     assert table.header == ("half", "kind", "method", "scenes", "30", "100")
     assert table.rows == (
         ("test", "all", "m", "1", "0.500", "–"),
@@ -103,3 +114,46 @@ def test_the_report_tells_every_scene() -> None:
     for title in ("balls", "slats", "stones"):
         assert f"| {title} | m |" in text
     assert "0.250 (0.000 to 0.500)" in text
+
+
+def errors(recipe: str, bad_1px: dict[tuple[float, str], float | None]) -> dict[str, Any]:
+    results = [
+        {"budget": budget, "method": f"depth:{method}", "depth": {"bad_1px": bad and {"mean": bad}}}
+        for (budget, method), bad in bad_1px.items()
+    ]
+    return {"recipe": recipe, "datasets": 2, "results": results}
+
+
+DEPTHS = [
+    errors(
+        "a",
+        {
+            (30.0, "focus"): 0.25, (30.0, "likelihood-sweep"): 0.5, (30.0, "variance-sweep"): 0.75,
+            (100.0, "focus"): 0.25, (100.0, "variance-sweep"): 0.125,
+        },
+    ),
+    errors("b", {(30.0, "focus"): 0.75, (30.0, "likelihood-sweep"): 0.5, (30.0, "variance-sweep"): 0.25}),
+    errors("c", {(30.0, "focus"): 0.5}),
+    errors("d", {(30.0, "focus"): 0.5}),
+    errors("e", {(30.0, "focus"): None}),  # a scene without objects
+]  # fmt: skip
+
+
+def test_errors_of_depth_stand_beside_the_better_sweep_of_the_same_scene_and_budget() -> None:
+    table = depth.by_scene(DEPTHS, ENTRIES)
+    assert table.header == ("half", "kind", "scene", "method", "30", "100")
+    assert table.rows == (
+        ("test", "textured", "stones", "depth:focus", "0.500", "–"),
+        ("train", "cluttered", "slats", "depth:focus", "0.750 (3.00)", "–"),
+        ("train", "cluttered", "slats", "depth:likelihood-sweep", "0.500 (2.00)", "–"),
+        ("train", "cluttered", "slats", "depth:variance-sweep", "0.250 (1.00)", "–"),
+        ("train", "textured", "balls", "depth:focus", "0.250 (0.50)", "0.250 (2.00)"),
+        ("train", "textured", "balls", "depth:likelihood-sweep", "0.500 (1.00)", "–"),
+        ("train", "textured", "balls", "depth:variance-sweep", "0.750 (1.50)", "0.125 (1.00)"),
+    )
+    means = {row[:3]: row[3:] for row in depth.mean_errors(DEPTHS, ENTRIES).rows}
+    # (0.25 + 0.75) / 2, and of the better sweeps (0.5 + 0.25) / 2.
+    assert means["train", "all", "depth:focus"] == ("2", "0.500 (1.33)", "0.250 (2.00)")
+    text = "\n".join(depth.report({"groups": DEPTHS}, ENTRIES))
+    assert "10 datasets" in text
+    assert "| train | textured | balls | depth:focus | 0.250 (0.50) |" in text

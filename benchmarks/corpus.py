@@ -1,0 +1,172 @@
+"""Scenes that methods are compared on: those of corpus.toml or drawn ones, many seeds, many photon budgets.
+
+At full size a table takes a day or two. Environment variables make it smaller or share it:
+
+BENCH_SEEDS    datasets of each scene, 20
+BENCH_BUDGETS  photons per view, "30 100 300 1000 3000 10000 300000", the last of which stands for full light;
+               the most are drawn, and of those the others
+BENCH_METHODS  methods by name, as `pcii evaluate --method` has them, with commas between them; all
+BENCH_SCENES   scenes by name, with commas between them; all
+BENCH_WORKERS  processes that share the scoring (1); each is slower than one alone
+BENCH_DRAWN    a-b: instead of the corpus the drawn scenes of these numbers, of every kind (drawn.py)
+BENCH_OUT      where datasets and scores are kept, out/benchmark; what is there is not made again
+"""
+
+import os
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from benchmarks.drawn import KINDS, TUNING, write_recipe
+from pcii.base.crew import Crew
+from pcii.base.errors import InputError
+from pcii.base.progress import Stages
+from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.rows import recipe_of
+from pcii.evaluation.tables import Table
+from pcii.io.dataset_layout import read_manifest
+from simgen.base.strict_models import Strict, read_toml, validate
+from simgen.dataset.generation import generate
+from simgen.spec.recipe import Recipe
+from simgen.spec.sweeps import load_sweep
+
+CORPUS = Path(__file__).with_name("corpus.toml")
+BUDGETS = "30 100 300 1000 3000 10000 300000"
+Group = Mapping[str, Any]
+Figure = TypeVar("Figure")
+
+
+class Entry(Strict):
+    """One scene of the corpus: the name or path of a recipe, and what the scene is for."""
+
+    recipe: str
+    half: Literal["train", "test"]
+    """Methods may be tuned on the one; figures that are told are of the other."""
+    kind: Literal["textured", "untextured", "cluttered", "depth", "empty", "paper"]
+
+    @property
+    def name(self) -> str:
+        """What datasets and tables call it; `recipe` may be a path."""
+        return Path(self.recipe).stem
+
+
+class Corpus(Strict):
+    """The scenes that methods are measured on."""
+
+    scene: tuple[Entry, ...]
+
+
+@dataclass(frozen=True)
+class Work:
+    """One dataset to make and score."""
+
+    entry: Entry
+    recipe: Recipe
+    near: Path
+    folder: Path
+
+
+def load_corpus(path: Path = CORPUS) -> tuple[Entry, ...]:
+    """The scenes of a corpus file; `InputError` for one that is told wrongly."""
+    return validate(Corpus, read_toml(path), str(path)).scene
+
+
+def drawn_corpus(numbers: str, folder: Path) -> tuple[Entry, ...]:
+    """Drawn scenes of every kind, of the numbers "a-b", with recipes in a folder; else `InputError`."""
+    first, _, last = numbers.partition("-")
+    if not (first.isdecimal() and (last or first).isdecimal()):
+        raise InputError(f"BENCH_DRAWN: expected numbers of scenes such as 100-103, got {numbers!r}")
+    return tuple(
+        Entry(
+            recipe=str(write_recipe(folder, kind, number)),
+            half="train" if number < TUNING else "test",
+            kind=hard,
+        )
+        for kind, hard in KINDS.items()
+        for number in range(int(first), int(last or first) + 1)
+    )
+
+
+def named_scenes(entries: Sequence[Entry], names: Sequence[str]) -> tuple[Entry, ...]:
+    """The scenes of these names, or all without names; `InputError` for a name that none has."""
+    known = [entry.name for entry in entries]
+    for name in names:
+        if name not in known:
+            raise InputError(f"BENCH_SCENES: there is no scene named {name!r}; use {', '.join(known)}")
+    return tuple(entry for entry in entries if not names or entry.name in names)
+
+
+def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int]) -> list[Work]:
+    """Every dataset, seed by seed, so that what is done early tells of all scenes."""
+    *fewer, most = sorted(set(budgets))
+    light = [f"photons.budget={most}", f"photons.nested={fewer}"]
+    nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
+    series: list[list[Work]] = []
+    for entry in entries:
+        sweep = load_sweep(entry.recipe, [*light, *nothing_more, f"title={entry.name}"], seeds=seeds)
+        folder = out / "data" / entry.name
+        series.append(
+            [
+                Work(entry, sweep.recipe(number), sweep.near, folder / sweep.folder(number))
+                for number in range(len(sweep))
+            ]
+        )
+    return [work for step in zip(*series, strict=True) for work in step]
+
+
+def evaluated(folder: str, methods: Sequence[str]) -> tuple[dict[str, Any], dict[str, Entry]]:
+    """Make and score what is missing; gives the figures of the evaluation, and the scene of each recipe.
+
+    The variables of this module's docstring say of what. `methods` are those without BENCH_METHODS, and
+    `folder`, in BENCH_OUT, is for their scores; the datasets are the same for all tables.
+    """
+    setting = os.environ.get
+    budgets = [int(text) for text in setting("BENCH_BUDGETS", BUDGETS).split()]
+    out = Path(setting("BENCH_OUT", "out/benchmark"))
+    crew = Crew(int(setting("BENCH_WORKERS", "1")))
+    drawn = setting("BENCH_DRAWN", "")
+    corpus = drawn_corpus(drawn, out / "drawn") if drawn else load_corpus()
+    entries = named_scenes(corpus, _names(setting("BENCH_SCENES", "")))
+    works = work_list(entries, out, int(setting("BENCH_SEEDS", "20")), budgets)
+    asked = _names(setting("BENCH_METHODS", "")) or methods
+    with Stages() as progress:
+        for done, work in enumerate(works, start=1):
+            generate(work.recipe, work.near, work.folder)
+            progress("datasets", done, len(works))
+        folders = [work.folder for work in works]
+        evaluation = evaluate(folders, out / folder, methods=asked, crew=crew, report=progress)
+    return evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in works}
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def by_half_and_kind(
+    title: str,
+    groups: Sequence[Group],
+    entry_of: Mapping[str, Entry],
+    figure: Callable[[Group, Group], Figure | None],
+    told: Callable[[Sequence[Figure]], str],
+) -> Table:
+    """A table of figures over the scenes of a half and kind, by method; a column for each budget.
+
+    `figure` (group, row of its results) is that of a scene, and `told` says in words what scenes have.
+    """
+    found: dict[tuple[str, str, str], dict[float, list[Figure]]] = defaultdict(lambda: defaultdict(list))
+    for group in groups:
+        entry = entry_of.get(group["recipe"])
+        for row in group["results"] if entry is not None else ():
+            value = figure(group, row)
+            if entry is not None and value is not None:
+                for kind in (entry.kind, "all"):
+                    found[entry.half, kind, row["method"]][row["budget"]].append(value)
+    budgets = sorted({budget for cells in found.values() for budget in cells})
+    rows: list[tuple[str, ...]] = []
+    for names, cells in sorted(found.items()):
+        shown = [told(cells[budget]) if cells[budget] else "–" for budget in budgets]
+        rows.append((*names, str(max(len(values) for values in cells.values())), *shown))
+    header = ("half", "kind", "method", "scenes", *(f"{budget:g}" for budget in budgets))
+    return Table(title, header, tuple(rows), words=3)
