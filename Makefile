@@ -1,7 +1,7 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
 # make bench  run time against error; TABLES="sections" for one table, TABLES=removal BENCH_SEEDS=3 to
-#             compare methods over scenes and seeds
+#             compare methods over scenes and seeds, TABLES=depth those of depth
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
 PYTHON ?= python3
