@@ -1,5 +1,7 @@
 """Estimators of depth.
 
+chain_kernels    Compiled: posterior probabilities along chains of blocks, by passing messages forward and
+                 backward.
 depth_planes     Planes that a search of depth compares, and the depth between planes where a measure is
                  largest.
 epipolar_slopes  Depth from the slope of lines in epipolar images, by the structure tensor: a textbook
@@ -9,5 +11,7 @@ focus_labels     Depth by focus evidence: a plane for each cell, with a cost of 
 methods          Estimators of depth by name: a depth for each pixel of the virtual centre.
 plane_sweeps     Textbook estimators of depth to compare others with: plane sweeps with windows of one
                  size.
-texture_depth    Depth by texture, each pixel in the smallest window that is sure of it.
+posterior_depth  Depth from the posterior probability of a piecewise smooth surface, by the evidence of
+                 texture.
+smooth_surface   The posterior probability of depth of a piecewise smooth surface.
 """

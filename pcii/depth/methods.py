@@ -20,18 +20,22 @@ from pcii.depth.depth_planes import check_range_mm
 from pcii.depth.epipolar_slopes import structure_tensor
 from pcii.depth.focus_labels import focus_depth
 from pcii.depth.plane_sweeps import likelihood_sweep, variance_sweep
-from pcii.depth.texture_depth import TextureDepth
+from pcii.depth.posterior_depth import PosteriorDepth
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]
 
 FOR_COUNTS: dict[str, Method] = {
+    "posterior": PosteriorDepth(),
     "focus": focus_depth,
-    "texture": TextureDepth(),
     "likelihood-sweep": likelihood_sweep,
     "variance-sweep": variance_sweep,
 }
-FOR_VIEWS: dict[str, Method] = {"variance-sweep": variance_sweep, "structure-tensor": structure_tensor}
+FOR_VIEWS: dict[str, Method] = {
+    "posterior": FOR_COUNTS["posterior"],
+    "variance-sweep": variance_sweep,
+    "structure-tensor": structure_tensor,
+}
 """The built-in methods by what they take; the first is the default."""
 BUILT_IN = FOR_COUNTS | FOR_VIEWS
 
@@ -42,12 +46,11 @@ def estimate_depth(
     """Depth per pixel, (H, W) float64 in mm within `z_range_mm`, NaN where the method abstains.
 
     `method` is one of `pcii.depth_methods()`, or a function that returns a `DepthMap` for the data and the
-    range. Of photon counts "focus", the default, compares how well planes predict the photons, and abstains
-    where they do not tell; "texture" compares the contrast of sections, in windows as small as the light
-    allows, and is the better one where there is much light and texture (docs/experiments/depth.md);
-    "likelihood-sweep" and "variance-sweep" are simple ones to compare it with, which
-    answer wherever there are samples. Of radiance there are "variance-sweep", the default, and
-    "structure-tensor".
+    range. "posterior", the default, is the posterior probability of a piecewise smooth surface by the texture
+    that sections show (docs/theory.md); its `confidence` is honest where surfaces have texture, and too high
+    on plain ones (docs/experiments/depth.md). "focus", of photon counts, compares how well planes predict the
+    photons, and abstains more. "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance,
+    "structure-tensor" are textbook methods to compare with, which answer wherever there are samples.
 
     Raises `InputError` for a range that is not 0 < near < far, a single view, or a method that is not known
     or cannot take the data.
@@ -79,7 +82,7 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     Raises `InputError` for a registered name that is already taken or no file name.
 
     >>> depth_methods()
-    ('focus', 'texture', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
+    ('posterior', 'focus', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
     """
     return (*_built_in(data), *registered(GROUP, BUILT_IN))
 

@@ -12,8 +12,8 @@ _PREFIX = f"{DEPTH}:"
 def depth_name(estimator: str) -> str:
     """Name of an estimator of depth among all methods.
 
-    >>> depth_name("texture")
-    'depth:texture'
+    >>> depth_name("posterior")
+    'depth:posterior'
     """
     return _PREFIX + estimator
 
@@ -21,8 +21,8 @@ def depth_name(estimator: str) -> str:
 def estimator_of(method: str) -> str | None:
     """The estimator of depth that a method's full name means; None for a removal.
 
-    >>> estimator_of("depth:texture"), estimator_of("likelihood")
-    ('texture', None)
+    >>> estimator_of("depth:posterior"), estimator_of("likelihood")
+    ('posterior', None)
     """
     return method.removeprefix(_PREFIX) if method.startswith(_PREFIX) else None
 
@@ -31,7 +31,7 @@ def methods_for(*, full_light: bool) -> tuple[str, ...]:
     """Full names of the methods that take radiance (`full_light`) or photon counts: removal, then depth.
 
     >>> methods_for(full_light=True)
-    ('depth:variance-sweep', 'depth:structure-tensor')
+    ('depth:posterior', 'depth:variance-sweep', 'depth:structure-tensor')
     """
     others = [name for name in depth_methods() if name not in BUILT_IN]
     estimators = [*(FOR_VIEWS if full_light else FOR_COUNTS), *others]
@@ -43,7 +43,7 @@ def full_name(method: str, *, full_light: bool) -> str | None:
     """Full name of a method that takes radiance (`full_light`) or photon counts; None if it does not.
 
     >>> full_name("depth", full_light=False), full_name("depth", full_light=True)
-    ('depth:focus', 'depth:variance-sweep')
+    ('depth:posterior', 'depth:posterior')
     >>> full_name("likelihood", full_light=True) is None
     True
     """

@@ -19,6 +19,6 @@ projection_kernels  Compiled: the cells of a section that events fall into, and 
                     block of pixels.
 smoothing_kernels   Compiled: sums of photons at coarser and coarser scales, interpolated between the
                     centres of cells.
-texture_evidence    Evidence of depth from texture: how likely is the contrast that a section shows, scale
-                    by scale?
+texture_evidence    Evidence of depth from texture: at which plane does a section show more contrast than
+                    its noise explains?
 """

@@ -1,130 +1,189 @@
-"""Evidence of depth from texture: how likely is the contrast that a section shows, scale by scale?
+"""Evidence of depth from texture: at which plane does a section show more contrast than its noise explains?
 
 In focus a section shows the texture of the surface; out of focus the views average it away, and what is left
-is photon noise. The section is divided into octaves (the Laplacian pyramid of Burt and Adelson 1983). A
-coefficient y of an octave, where the mean rate around is b, is normal with variance
+is noise. The section is divided into octaves, differences of Gaussian means. With y a coefficient of an
+octave, b the mean around it, v the variance of its noise and c the contrast that texture has in an octave,
 
-    m = e b / n + (eta b)^2         if the plane is out of focus: photon noise, and imperfect averaging,
-    m + (c b)^2                     if it is in focus: texture of contrast c in each octave,
+    r = (c b)^2 / v,        e = r / (1 + r) (y^2 / v - 1) / 2
 
-n the samples of a block and e the energy of the octave's kernel. With r = (c b)^2 / m and
-t = y^2 / (m + (c b)^2) the logarithm of the ratio of likelihoods is
+is the logarithm, but for a constant, of how much likelier y is with texture than without; without texture its
+mean is 0. Where there is little light r is small in fine octaves and coarse ones decide; where there is much,
+fine ones do: the scale follows the light.
 
-    (r t - log(1 + r)) / 2,    with k t / (k + t) in place of t:
+An outline has far more contrast than texture, and would decide on the depth of all that is around it. So a
+coefficient gives at most `saturation_nats` = S, with m its largest e at any plane, above 0:
 
-outlines have far more contrast than texture, and would otherwise decide on the depth of all that is around
-them. Where there is little light r is small in fine octaves and coarse ones decide; where there is much, fine
-ones do. So the scale follows the light.
+    e / (1 + m / S),
+
+which keeps how the planes compare. An octave's coefficients are evaluated at twice the density that they
+need, and count by the area that each stands for.
+
+Noise of photon counts is Poisson: v = w b / n + (a b)^2, n the samples of a block, w the sum of the squared
+weights of the coefficient and a what is left of contrasts that are averaged away by some views. That of
+radiance has the variance of the views' samples in place of b, so that a plane at which the views differ has
+little evidence.
 """
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.photon_statistics import cell_sums
 from pcii.sections.reconstruction import reconstruct
 
-BLOCK_PX = 2
-"""Sections are summed over blocks of 2 x 2 pixels, in which a mosaic has all colours for any shift."""
-
 
 @dataclass(frozen=True)
 class TextureModel:
-    """Constants of the model: c, eta and k of the equations above."""
+    """Constants of the model: c, a and S of the equations above, and the number of octaves."""
 
     contrast: float = 0.1
     averaging_error: float = 0.02
-    saturation: float = 4.0
+    saturation_nats: float = 5.0
     octaves: int = 4
-    """The finest is that of blocks of 2 px, the coarsest of 16 px."""
+    """The finest is of single blocks; in the coarsest, means are Gaussian of 4 and 8 blocks."""
+
+
+class TextureEvidence(NamedTuple):
+    """Evidence at Z planes: `nats` (Z, h, w) float32 for each block of pixels.
+
+    `photons` (Z, h / 4, w / 4, rounded up) is the number of photons in 4 x 4 blocks; of radiance, the square
+    of its mean over the variance of the mean, as it is of photons.
+    """
+
+    nats: np.ndarray
+    photons: np.ndarray
+
+
+CELL_BLOCKS = 4
+LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
+"""What is divided by where there are no samples, or no light."""
+LEAST_COVERAGE = 0.3
+"""Coefficients with a smaller share of the samples of a whole film are left out: they lie at its borders."""
 
 
 def evidence_of_texture(
-    counts: PhotonCounts, planes: FocalPlanes, model: TextureModel | None = None
-) -> np.ndarray:
-    """Evidence (Z, ceil(H / 2), ceil(W / 2)) float32, in nats for each block of 2 x 2 pixels.
+    data: PhotonCounts | Views, planes: FocalPlanes, block_px: int = 2, model: TextureModel | None = None
+) -> TextureEvidence:
+    """Evidence of blocks of `block_px` x `block_px` pixels at each of the Z planes, h x w blocks.
 
-    The sum over a window is the logarithm of how much likelier its photons are if the surface is at this
-    plane than if it is at none.
+    The sum over a window is the logarithm, but for a constant, of how likely its samples are if the surface
+    is at this plane. A mosaic has all colours in a block of 2 pixels or more, for any shift.
     """
     from pcii.base.compiled_loops import threads
 
     chosen = model or TextureModel()
+    colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
+    least_samples = LEAST_COVERAGE * data.grid.view_count * colours * block_px**2
 
-    def of_plane(plane: int) -> np.ndarray:
-        section = reconstruct(counts, planes.take([plane]))
-        photons, samples = (
-            cell_sums(sums[0].sum(axis=-1), BLOCK_PX, np.float32)
-            for sums in (section.counts, section.coverage)
-        )
-        return _of_section(photons, samples, chosen)
+    def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
+        blocks = _block_sums(data, planes.take([plane]), block_px)
+        sums, _, spread = (cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks)
+        return _of_section(*blocks, chosen, least_samples), sums**2 / np.maximum(spread, LEAST_RATE)
 
     with ThreadPoolExecutor(threads()) as pool:
-        return np.stack(list(pool.map(of_plane, range(len(planes)))))
+        octaves, photons = zip(*pool.map(of_plane, range(len(planes))), strict=True)
+        largest = [np.maximum(np.max(each, axis=0), 0) for each in zip(*octaves, strict=True)]
+        nats = pool.map(lambda excess: _summed(_saturated(excess, largest, chosen)), octaves)
+        h, w = -(-data.grid.height // block_px), -(-data.grid.width // block_px)
+        return TextureEvidence(np.stack([each[:h, :w] for each in nats]), np.stack(photons))
 
 
-def _of_section(photons: np.ndarray, samples: np.ndarray, model: TextureModel) -> np.ndarray:
-    """Evidence (h, w) of one section, from photons and samples of its blocks (h, w)."""
-    h, w = photons.shape
-    step = 1 << model.octaves
-    margin = (0, -h % step), (0, -w % step)
-    levels = [(np.pad(photons, margin), np.pad(samples, margin))]
-    for _ in range(model.octaves):
-        levels.append((_reduced(levels[-1][0]), _reduced(levels[-1][1])))
-    rates = [photons / np.maximum(samples, LEAST_SAMPLES) for photons, samples in levels]
-    evidence, around = np.zeros_like(rates[-1]), np.maximum(rates[-1], LEAST_RATE)
-    for octave in reversed(range(model.octaves)):
-        around = expanded(around)
-        band = rates[octave] - expanded(rates[octave + 1])
-        noise = _energy(octave) * around / np.maximum(levels[octave][1], LEAST_SAMPLES)
-        blur = noise + (model.averaging_error * around) ** 2
+def _block_sums(
+    data: PhotonCounts | Views, plane: FocalPlanes, block_px: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sum of the samples, their number and the variance of the sum (h, w) in the blocks of one section.
+
+    Sizes are rounded up to multiples of a cell, with empty blocks.
+    """
+    is_counted = isinstance(data, PhotonCounts)
+    section = reconstruct(data, plane, variance=not is_counted)
+
+    def in_blocks(values: np.ndarray) -> np.ndarray:
+        blocks = cell_sums(values.sum(axis=-1), block_px, np.float32)
+        return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
+
+    sums, samples = in_blocks(section.counts[0]), in_blocks(section.coverage[0])
+    if section.variance is None:  # that of a Poisson variable is its mean
+        return sums, samples, sums
+    return sums, samples, in_blocks(section.variance[0] * section.coverage[0])
+
+
+def _of_section(
+    sums: np.ndarray, samples: np.ndarray, spread: np.ndarray, model: TextureModel, least_samples: float
+) -> list[np.ndarray]:
+    """The e of each octave on its own grid, from the values of the blocks (h, w)."""
+    parts, excess = [sums, samples, spread], list[np.ndarray]()
+    for octave in range(model.octaves):
+        if octave > 1:
+            parts = [cell_sums(part, 2, np.float32) / 4 for part in parts]
+        finer, parts = parts, [_smoothed(part, octave) for part in parts]
+        mean, around = (part[0] / np.maximum(part[1], LEAST_SAMPLES) for part in (finer, parts))
+        number = np.maximum(parts[1], LEAST_SAMPLES)
+        noise = _noise_weight(octave) * np.maximum(parts[2], 0) / number**2
+        noise = np.maximum(noise, LEAST_RATE**2) + (model.averaging_error * around) ** 2
         texture = (model.contrast * around) ** 2
-        ratio, excess = texture / blur, band * band / (blur + texture)
-        excess = excess * (model.saturation / (model.saturation + excess))
-        nats = np.where(levels[octave][1] > 0, (ratio * excess - np.log1p(ratio)) / 2, 0)
-        # A coefficient of the next coarser octave stands for four of this one.
-        evidence = nats + expanded(evidence) / 4
-    return evidence[:h, :w]
+        share = np.where(parts[1] >= least_samples, texture / (noise + texture), 0)
+        excess.append(share * ((mean - around) ** 2 / noise - 1) / 2)
+    return excess
 
 
-LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
-"""What is divided by where there are no samples, or no light."""
+def _saturated(
+    excess: Sequence[np.ndarray], largest: Sequence[np.ndarray], model: TextureModel
+) -> list[np.ndarray]:
+    """The e of each octave, reduced by how large it is at any plane; what is below 0 is left as it is."""
+    return [
+        np.where(each > 0, each / (1 + most / model.saturation_nats), each)
+        for each, most in zip(excess, largest, strict=True)
+    ]
 
 
-def _reduced(values: np.ndarray) -> np.ndarray:
-    """Half the size in both axes, which are even, smoothed by weights 1, 3, 3, 1; zero beyond the borders."""
-    return _reduced_rows(_reduced_rows(values).T).T
+def _summed(octaves: Sequence[np.ndarray]) -> np.ndarray:
+    """Sum of values of octaves per block (h, w): a coefficient of an octave stands for 4^octave blocks."""
+    total = octaves[-1]
+    for octave in reversed(range(len(octaves) - 1)):
+        # The first two octaves have the same grid.
+        total = octaves[octave] + (total if octave == 0 else expanded(total)) / 4
+    return total
+
+
+def _smoothed(values: np.ndarray, octave: int) -> np.ndarray:
+    """Along all axes of more than one block: by 1 block in the finest octave, then from 1 block to 2."""
+    from scipy.ndimage import gaussian_filter
+
+    return gaussian_filter(values, 1.0 if octave == 0 else np.sqrt(3.0), mode="constant")
+
+
+@cache
+def _noise_weight(octave: int) -> float:
+    """Sum of the squared weights with which blocks enter a coefficient of an octave.
+
+    Both terms of the coefficient are products of weights by row and by column.
+    """
+    from scipy.ndimage import gaussian_filter1d
+
+    own = np.eye(64 << octave)
+    for finer in range(octave):
+        own = gaussian_filter1d(own, 1.0 if finer == 0 else np.sqrt(3.0), axis=0, mode="constant")
+        if finer > 0:
+            own = (own[::2] + own[1::2]) / 2
+    around = gaussian_filter1d(own, 1.0 if octave == 0 else np.sqrt(3.0), axis=0, mode="constant")
+    a, b = own[own.shape[0] // 2], around[own.shape[0] // 2]
+    return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)
 
 
 def expanded(values: np.ndarray) -> np.ndarray:
-    """Twice the size in both axes, interpolated between centres; continued beyond the borders."""
+    """Twice the size in both axes (h, w), interpolated between centres; continued beyond the borders."""
     return _expanded_rows(_expanded_rows(values).T).T
-
-
-def _reduced_rows(values: np.ndarray) -> np.ndarray:
-    padded = np.pad(values, ((1, 1), (0, 0)))
-    return (3 * (padded[1:-2:2] + padded[2:-1:2]) + (padded[0:-3:2] + padded[3::2])) / 8
 
 
 def _expanded_rows(values: np.ndarray) -> np.ndarray:
     padded = np.pad(values, ((1, 1), (0, 0)), mode="edge")
     sides = np.stack([padded[:-2], padded[2:]], axis=1)
     return ((3 * values[:, None] + sides) / 4).reshape(2 * values.shape[0], -1)
-
-
-@cache
-def _energy(octave: int) -> float:
-    """Sum of the squared weights with which blocks enter a coefficient of an octave.
-
-    Both terms of the coefficient are products of weights by row and by column.
-    """
-    own = np.eye(16 << octave)
-    for _ in range(octave):
-        own = _reduced_rows(own)
-    middle = own.shape[0] // 2
-    a, b = own[middle], _expanded_rows(_reduced_rows(own))[middle]
-    return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)

@@ -53,33 +53,37 @@ def test_cameras_in_the_wrong_order_do_not_pass(two_squares, plane):
 
 
 def test_the_dark_has_no_depth(depth, two_squares):
-    # No photon of a plane in the range comes within the reach of the window (4 x 14 px) of this corner.
+    # No photon of a plane in the range comes within 8 px, the deviation of the window, of this corner.
     corner = (slice(0, 24), slice(-24, None))
     assert np.isnan(depth.z_mm[corner]).all()
-    # Elsewhere a window that reaches a square may answer.
+    # Elsewhere a square may be near enough, or its blur at another plane.
     dark = ~(two_squares.masks[0] | two_squares.masks[1])
-    assert np.isnan(depth.z_mm[dark]).mean() > 0.8
+    assert np.isnan(depth.z_mm[dark]).mean() > 0.7
 
 
 def test_confidence_is_zero_exactly_where_the_method_abstains(depth):
     np.testing.assert_array_equal(np.isnan(depth.z_mm), depth.confidence == 0)
     assert depth.confidence.min() == 0
-    # A share of a sum: one rounding above 1 at most.
-    assert 0.5 <= depth.confidence[depth.confidence > 0].min() <= depth.confidence.max() <= 1 + 1e-12
+    assert depth.confidence.max() <= 1
 
 
-def test_what_less_than_half_of_the_evidence_is_for_is_not_answered():
+def test_depths_that_look_alike_share_the_probability():
     # A pattern that repeats every 3 px looks alike at the disparities 2, 5 and 8.
     tile = np.random.default_rng(2).choice([0.1, 1.0], size=(3, 3))
     views = [
         [np.roll(np.tile(tile, (32, 32)), (-2 * (k - 3), -2 * (l - 3)), (0, 1)) for l in range(7)]
         for k in range(7)
     ]
+    medians = []
     for seed in (3, 4, 5):
         film = np.random.default_rng(seed).poisson(0.1 * np.array(views))
         counts = PhotonCounts.from_dense(film, unit_grid(7, 7, 96, 96))
-        confidence = estimate_depth(counts, RANGE_MM).confidence
-        assert confidence[confidence > 0].min() >= 0.5
+        alike = estimate_depth(counts, RANGE_MM)
+        one = estimate_depth(counts, (1 / 3.4, 1))  # only one of them is in the range
+        medians.append([np.median(depth.confidence[depth.confidence > 0]) for depth in (one, alike)])
+    sure, unsure = np.mean(medians, axis=0)
+    assert sure > 0.9
+    assert unsure < 0.8  # each of the three has a third, if neighbours were independent of each other
 
 
 def flat_share(rate: float, films: int) -> float:

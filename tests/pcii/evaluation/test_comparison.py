@@ -245,7 +245,7 @@ def test_a_depth_map_without_estimates_is_reported_as_such(
     comparison = import_module("pcii.evaluation.comparison")
     monkeypatch.setattr(comparison, "estimate_depth", lambda *_, **__: nothing)
     evaluation = evaluate([series], tmp_path / "out", methods=["depth"])
-    row = result_of(evaluation, OWN, "depth:focus")
+    row = result_of(evaluation, OWN, "depth:posterior")
     assert row["depth"]["ece"] is row["depth"]["reliability"] is None
     assert row["depth"]["coverage"] == {"n": 3, "mean": 0.0, "interval": [0.0, 0.0]}
     assert row["depth"]["mae_mm"] is None

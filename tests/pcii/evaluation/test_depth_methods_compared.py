@@ -36,8 +36,8 @@ LIGHT = Views(np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.f
 IDS = np.zeros((40, 48), np.int16)
 IDS[8:32, 8:32] = 1
 TRUTH = Truth(np.where(IDS > 0, 500.0, np.inf), IDS, {1: "card"})
-OF_COUNTS = ["depth:focus", "depth:texture", "depth:likelihood-sweep", "depth:variance-sweep"]
-OF_VIEWS = ["depth:variance-sweep", "depth:structure-tensor"]
+OF_COUNTS = ["depth:posterior", "depth:focus", "depth:likelihood-sweep", "depth:variance-sweep"]
+OF_VIEWS = ["depth:posterior", "depth:variance-sweep", "depth:structure-tensor"]
 
 
 def saved(path: Path, images: Any, **depths: Any) -> Dataset:
@@ -79,15 +79,15 @@ def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Pat
             for name in ("depth:variance-sweep", "variance")
         ),
     ]
-    assert chosen([nested], "depth", budgets=["20"]) == [("nested", NESTED, "depth:focus")]
+    assert chosen([nested], "depth", budgets=["20"]) == [("nested", NESTED, "depth:posterior")]
 
 
-def test_depth_means_the_default_of_each_kind_of_data_under_its_own_name(tmp_path: Path) -> None:
+def test_depth_means_the_default_under_its_own_name(tmp_path: Path) -> None:
     both = saved(tmp_path / "both", (COUNTS, LIGHT))
-    evaluate([both.path], tmp_path / "out", methods=["depth", "depth:focus"])
-    assert named(tmp_path / "out") == {(None, "depth:focus"), (FULL_LIGHT, "depth:variance-sweep")}
+    evaluate([both.path], tmp_path / "out", methods=["depth", "depth:posterior"])
+    assert named(tmp_path / "out") == {(None, "depth:posterior"), (FULL_LIGHT, "depth:posterior")}
     assert len(rows_of(tmp_path / "out")) == 2
-    (group,) = evaluate([both.path], tmp_path / "out", methods=["depth:focus"])["groups"]
+    (group,) = evaluate([both.path], tmp_path / "out", methods=["depth:posterior"])["groups"]
     assert [row["photons_per_view"] is None for row in group["results"]] == [False, True]
     assert depth_overview([group]).header == ("scene", "method", "by exposure", "full light")
 
@@ -96,7 +96,7 @@ def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFi
     both, out = saved(tmp_path / "both", (COUNTS, LIGHT)), tmp_path / "out"
     command = ["evaluate", str(both.path), "-o", str(out), "--method", "depth"]
     assert command_line.run(cli.app, [*command, "--budget", FULL_LIGHT]) == 0
-    assert named(out) == {(FULL_LIGHT, "depth:variance-sweep")}
+    assert named(out) == {(FULL_LIGHT, "depth:posterior")}
     page = (out / "evaluation.html").read_text()
     assert "<td>full light</td>" in page
     assert page.count("data:image/png;base64,") == 2  # errors, and reliability
@@ -111,9 +111,9 @@ def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFi
         ("both", ["depth:structure-tensor"], [OWN], "no photons of budget 50"),
         ("views", ["likelihood"], [], "'likelihood' needs photon counts, and of .*alone radiance would"),
         ("both", ["depth", "variance"], [FULL_LIGHT], "'variance' needs photon counts"),
-        ("views", ["depth:texture"], [], "use depth:variance-sweep, depth:structure-tensor$"),
+        ("views", ["depth:focus"], [], "use depth:posterior, depth:variance-sweep, depth:structure-tensor$"),
         ("counts", [], [FULL_LIGHT], "has no radiance, and budget 'full-light' is of that"),
-        ("both", ["texture"], [], "no method named 'texture'; use depth, .*, depth:texture"),
+        ("both", ["posterior"], [], "no method named 'posterior'; use depth, .*, depth:posterior"),
         ("views", [], [300], "no photons of budget 300 here"),
     ],
 )
@@ -150,11 +150,12 @@ def test_the_bound_of_an_objects_depth_stands_beside_it_where_there_is_radiance(
     }
     z_mm = [500, 700]
     (expected,) = object_bounds(TRUTH, reconstruct(LIGHT, z_mm), reconstruct(COUNTS, z_mm))
-    rows = {(row["dataset"], row["method"]): row for row in rows_of(tmp_path / "out")}
+    rows = {(row["dataset"], row["budget"], row["method"]): row for row in rows_of(tmp_path / "out")}
     assert expected["depth_sigma_px"] > 0
-    assert rows["both", "depth:focus"]["bounds"] == {"objects": [expected]}
-    for without in (("both", "variance"), ("both", "depth:variance-sweep"), ("dark", "depth:focus")):
-        assert "bounds" not in rows[without]
+    assert rows["both", None, "depth:posterior"]["bounds"] == {"objects": [expected]}
+    assert "bounds" not in rows["both", None, "variance"]
+    assert "bounds" not in rows["both", FULL_LIGHT, "depth:posterior"]
+    assert "bounds" not in rows["dark", None, "depth:posterior"]
     (bound,) = group_of["both"]["results"][0]["bounds"]["objects"]
     assert (bound["name"], bound["photons"]["mean"]) == ("card", expected["photons"])
     assert bound["depth_sigma_px"]["mean"] == expected["depth_sigma_px"]

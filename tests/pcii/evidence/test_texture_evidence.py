@@ -1,0 +1,57 @@
+"""Evidence of texture: none of noise on average, and largest where texture is in focus."""
+
+import numpy as np
+import pytest
+from twins import even_light, unit_grid
+
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
+from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
+
+UNBOUNDED = TextureModel(averaging_error=0.0, saturation_nats=1e12)
+
+
+@pytest.mark.parametrize("octaves", [1, 2, 3, 4])
+@pytest.mark.parametrize("rate", [0.05, 1.0, 100.0])
+@pytest.mark.parametrize("cfa", ["GRBG", None])
+def test_noise_has_none_on_average(cfa: str | None, rate: float, octaves: int) -> None:
+    grid = unit_grid(4, 4, 256, 256)
+    # Where texture would stand far above the noise a coefficient has (y^2 / v - 1) / 2, of variance 1 / 2.
+    model = TextureModel(contrast=1e3, averaging_error=0.0, saturation_nats=1e12, octaves=octaves)
+    nats = evidence_of_texture(
+        even_light(grid, rate, 3, cfa), FocalPlanes.at_depths(grid, [0.5]), model=model
+    ).nats
+    inner = nats[0, 16:-16, 16:-16]
+    # The first octaves have as many independent coefficients as blocks, the others fewer.
+    deviation = np.sqrt(sum(4.0**-octave / 2 for octave in range(octaves)) / inner.size)
+    assert abs(inner.mean()) < 4 * deviation
+
+
+def test_it_is_largest_in_focus_and_bounded(two_squares) -> None:
+    planes = FocalPlanes.at_depths(two_squares.grid, [1 / d for d in (2.0, 2.5, 3.0, 3.5, 4.0)])
+    nats = evidence_of_texture(two_squares.counts, planes).nats
+    at_third = two_squares.masks[list(two_squares.z_mm).index(1 / 3)][::2, ::2]
+    assert nats[:, at_third].sum(axis=1).argmax() == 2
+    octaves = sum(4.0**-octave for octave in range(TextureModel().octaves))
+    assert nats.max() <= TextureModel().saturation_nats * octaves
+
+
+def test_the_bound_keeps_how_planes_compare() -> None:
+    grid = unit_grid(3, 3, 64, 64)
+    rng = np.random.default_rng(0)
+    counts = even_light(grid, 2.0, 0, None)
+    planes = FocalPlanes.at_depths(grid, rng.uniform(0.1, 1, 5))
+    one = TextureModel(octaves=1)
+    free = evidence_of_texture(counts, planes, model=TextureModel(octaves=1, saturation_nats=1e12)).nats
+    bounded = evidence_of_texture(counts, planes, model=one).nats
+    most = np.maximum(free.max(axis=0), 0)
+    expected = np.where(free > 0, free / (1 + most / one.saturation_nats), free)
+    np.testing.assert_allclose(bounded, expected, rtol=1e-4, atol=1e-6)
+
+
+def test_views_that_differ_are_no_texture() -> None:
+    # Each view has noise of its own, which the mean of the views keeps in part.
+    grid = unit_grid(5, 5, 128, 128)
+    noisy = Views(1 + 0.2 * np.random.default_rng(1).standard_normal((*grid.shape_KLHW, 1)), grid)
+    nats = evidence_of_texture(noisy, FocalPlanes.at_depths(grid, [0.5]), model=UNBOUNDED).nats
+    assert abs(nats[0, 16:-16, 16:-16].mean()) < 0.02
