@@ -22,7 +22,7 @@ from typing import Any, Literal, TypeVar
 from benchmarks.drawn import KINDS, TUNING, write_recipe
 from pcii.base.crew import Crew
 from pcii.base.errors import InputError
-from pcii.base.progress import Stages
+from pcii.base.progress import Report, Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.rows import recipe_of
 from pcii.evaluation.tables import Table
@@ -116,27 +116,41 @@ def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int
     return [work for step in zip(*series, strict=True) for work in step]
 
 
+def chosen_works() -> tuple[list[Work], list[int]]:
+    """The datasets that the variables of this module's docstring ask for, and their budgets."""
+    setting = os.environ.get
+    budgets = [int(text) for text in setting("BENCH_BUDGETS", BUDGETS).split()]
+    drawn = setting("BENCH_DRAWN", "")
+    corpus = drawn_corpus(drawn, output() / "drawn") if drawn else load_corpus()
+    entries = named_scenes(corpus, _names(setting("BENCH_SCENES", "")))
+    return work_list(entries, output(), int(setting("BENCH_SEEDS", "20")), budgets), budgets
+
+
+def output() -> Path:
+    """Folder of datasets and scores."""
+    return Path(os.environ.get("BENCH_OUT", "out/benchmark"))
+
+
+def make(works: Sequence[Work], report: Report) -> None:
+    """Make the datasets that are missing."""
+    for done, work in enumerate(works, start=1):
+        generate(work.recipe, work.near, work.folder)
+        report("datasets", done, len(works))
+
+
 def evaluated(folder: str, methods: Sequence[str]) -> tuple[dict[str, Any], dict[str, Entry]]:
     """Make and score what is missing; gives the figures of the evaluation, and the scene of each recipe.
 
     The variables of this module's docstring say of what. `methods` are those without BENCH_METHODS, and
     `folder`, in BENCH_OUT, is for their scores; the datasets are the same for all tables.
     """
-    setting = os.environ.get
-    budgets = [int(text) for text in setting("BENCH_BUDGETS", BUDGETS).split()]
-    out = Path(setting("BENCH_OUT", "out/benchmark"))
-    crew = Crew(int(setting("BENCH_WORKERS", "1")))
-    drawn = setting("BENCH_DRAWN", "")
-    corpus = drawn_corpus(drawn, out / "drawn") if drawn else load_corpus()
-    entries = named_scenes(corpus, _names(setting("BENCH_SCENES", "")))
-    works = work_list(entries, out, int(setting("BENCH_SEEDS", "20")), budgets)
-    asked = _names(setting("BENCH_METHODS", "")) or methods
+    works, _ = chosen_works()
+    crew = Crew(int(os.environ.get("BENCH_WORKERS", "1")))
+    asked = _names(os.environ.get("BENCH_METHODS", "")) or methods
     with Stages() as progress:
-        for done, work in enumerate(works, start=1):
-            generate(work.recipe, work.near, work.folder)
-            progress("datasets", done, len(works))
+        make(works, progress)
         folders = [work.folder for work in works]
-        evaluation = evaluate(folders, out / folder, methods=asked, crew=crew, report=progress)
+        evaluation = evaluate(folders, output() / folder, methods=asked, crew=crew, report=progress)
     return evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in works}
 
 

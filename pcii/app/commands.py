@@ -114,7 +114,7 @@ def reconstruct(
 def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget = None) -> None:
     """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
-    Example:  pcii depth out/paper --method texture -o out/depth
+    Example:  pcii depth out/paper --method focus -o out/depth
 
     Parameters
     ----------
@@ -123,8 +123,8 @@ def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget 
     out
         Folder for the results.
     method
-        Of counts: focus (default), texture (better in much light), likelihood-sweep or variance-sweep. Of
-        radiance: variance-sweep (default) or structure-tensor. Or one that a package registers.
+        posterior (default) or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
+        structure-tensor; or one that a package registers.
     """
     from pcii.depth.methods import estimate_depth
     from pcii.imaging.pictures import depth_image, write_png
@@ -136,8 +136,8 @@ def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget 
     with Results(out, data).writing() as results:
         say(f"{results.save_depth(depth_map)}")
         with results.replacing("depth.png") as path:
-            write_png(path, depth_image(depth_map.z_mm, *z_range))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, black without estimate")
+            write_png(path, depth_image(depth_map.z_mm, *z_range, depth_map.confidence))
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, darker where less sure")
 
 
 @app.command

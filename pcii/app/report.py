@@ -202,7 +202,8 @@ def _figure7(outcome: Outcome, box: tuple[slice, slice]) -> list[list[dict[str, 
 def _depth_panels(outcome: Outcome, box: tuple[slice, slice]) -> list[dict[str, str]]:
     truth, depth = outcome.dataset.truth, outcome.depth
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
-    panels = [_panel(picture.depth_image(depth.z_mm, near, far), box, "estimated depth")]
+    estimated = picture.depth_image(depth.z_mm, near, far, depth.confidence)
+    panels = [_panel(estimated, box, "estimated depth, darker where less sure")]
     if truth is not None:
         image = picture.depth_image(_object_depth(truth), near, far)
         panels.append(_panel(image, box, "true depth of the objects"))

@@ -50,15 +50,20 @@ def agreement_image(claimed: np.ndarray, true: np.ndarray) -> np.ndarray:
     return image
 
 
-def depth_image(z_mm: np.ndarray, near_mm: float, far_mm: float) -> np.ndarray:
-    """Depth in viridis from near (bright) to far (dark), 8-bit RGB (H, W, 3); black where not finite."""
+def depth_image(
+    z_mm: np.ndarray, near_mm: float, far_mm: float, confidence: np.ndarray | None = None
+) -> np.ndarray:
+    """Depth in viridis from near (bright) to far (dark), 8-bit RGB (H, W, 3); black where not finite.
+
+    With `confidence` (H, W), from 0 to 1, colours are the darker the less sure a depth is.
+    """
     from matplotlib import colormaps
 
     known = np.isfinite(z_mm)
     nearness = (far_mm - np.where(known, z_mm, far_mm)) / max(far_mm - near_mm, 1e-9)
-    image = (colormaps["viridis"](np.clip(nearness, 0, 1))[..., :3] * 255).astype(np.uint8)
-    image[~known] = 0
-    return image
+    weight = known if confidence is None else np.where(known, confidence, 0)
+    image = colormaps["viridis"](np.clip(nearness, 0, 1))[..., :3] * weight[..., None]
+    return (image * 255).astype(np.uint8)
 
 
 def png_bytes(image: np.ndarray) -> bytes:
