@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
@@ -29,6 +30,8 @@ WIDER = 2.0
 """The wider window by the window; with 1 and 4 errors are nearly the same."""
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-9
 """What is divided by, where a window has no samples or no photons."""
+MOST_PER_PIXEL = 1 << 20
+"""Of a pixel: its square is counted exactly."""
 PRIOR_PHOTONS = 0.5
 """Weight of the mean rate beside the other samples of a voxel, in photons (Jeffreys' prior of a rate)."""
 
@@ -65,9 +68,17 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     from scipy.ndimage import gaussian_filter
 
     events = data.events
-    squared = PhotonCounts.from_events(
-        events.k, events.l, events.i, events.j, events.n**2, data.grid, cfa=data.cfa
-    )
+    most = int(events.n.max(initial=0))
+    if most > MOST_PER_PIXEL:
+        raise InputError(
+            f"data: likelihood-sweep takes at most {MOST_PER_PIXEL} photons per pixel, and one has {most}; use "
+            "variance-sweep"
+        )
+    squared = None  # where no pixel has two photons they are their own squares
+    if most > 1:
+        squared = PhotonCounts.from_events(
+            events.k, events.l, events.i, events.j, events.n**2, data.grid, cfa=data.cfa
+        )
 
     # Where all shifts are even a colour falls on every fourth voxel only, which then has four times as many
     # samples: of a mosaic 2 x 2 voxels are taken together.
@@ -85,8 +96,10 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
         )
         mean = np.maximum(around / np.maximum(reached, LEAST_SAMPLES), LEAST_RATE)
         # Of the photons of a voxel each is in a sample of sum m^2 / sum m photons on average.
-        squares = reconstruct(squared, sections.planes.take([plane])).counts[0]
-        others = photons - in_cells(squares) / np.maximum(photons, 1)
+        squares = photons
+        if squared is not None:
+            squares = in_cells(reconstruct(squared, sections.planes.take([plane])).counts[0])
+        others = photons - squares / np.maximum(photons, 1)
         weight = np.maximum(samples - 1, 0) + PRIOR_PHOTONS / mean
         rate = (others + PRIOR_PHOTONS) / weight
         # All samples of the voxel expect K (n - 1) + n a photons over n - 1 + a / r.

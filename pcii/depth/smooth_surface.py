@@ -5,7 +5,7 @@ The depth of a block of pixels is one of Z planes of evenly spaced total dispari
     T(z' | z) = (1 - q) (1 - s) / (1 + s) s^|z' - z|  +  q / Z:
 
 it moves by a few planes, or, at an outline or a fold, with the probability q to any. With the likelihoods
-exp(S_x(z)), S_x the evidence of block x, and T along the edges of a tree that reaches all blocks, the
+exp(e_x(z)), e_x the evidence of block x, and T along the edges of a tree that reaches all blocks, the
 posterior of a block is exact and takes two messages for each edge (Pearl 1988). Each block is the middle of
 two trees (Bleyer and Gelautz 2008): its column, from which all rows branch off, and its row, from which all
 columns do. They share their messages, so that eight passes over the film serve all blocks. The posterior is

@@ -153,3 +153,12 @@ def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_focus_gives_even_light_no_depth(rate: float, cfa: str | None) -> None:
     depth = estimate_depth(even_light(unit_grid(7, 7, 128, 128), rate, 1, cfa), (1 / 9, 1.0), method="focus")
     assert np.isfinite(depth.z_mm).mean() <= 0.001
+
+
+def test_too_many_photons_for_the_likelihood_sweep_are_refused() -> None:
+    grid = unit_grid(2, 2, 8, 8)
+    bright = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 2**20 + 1), grid)
+    with pytest.raises(
+        pcii.InputError, match="at most 1048576 photons per pixel, and one has 1048577; use var"
+    ):
+        estimate_depth(bright, (0.5, 1.0), method="likelihood-sweep")
