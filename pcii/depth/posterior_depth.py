@@ -22,7 +22,7 @@ from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureModel, evidence_o
 from pcii.sections.photon_statistics import cells_to_pixels
 
 MOST_VALUES = 1 << 26
-"""Blocks times planes, which decides on the memory: some 1.5 GB. Where there are more, blocks are larger."""
+"""Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
 
 
 @dataclass(frozen=True)
