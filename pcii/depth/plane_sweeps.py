@@ -71,8 +71,8 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     most = int(events.n.max(initial=0))
     if most > MOST_PER_PIXEL:
         raise InputError(
-            f"data: likelihood-sweep takes at most {MOST_PER_PIXEL} photons per pixel, and one has {most}; use "
-            "variance-sweep"
+            f"data: likelihood-sweep takes at most {MOST_PER_PIXEL} photons per pixel, and one has {most}; "
+            "use variance-sweep"
         )
     squared = None  # where no pixel has two photons they are their own squares
     if most > 1:
