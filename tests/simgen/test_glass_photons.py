@@ -73,5 +73,6 @@ def test_photons_through_glass_are_those_of_rendered_views(light: str, depth: in
     assert surprise(photons, np.maximum(short, 1e-3), GRID, gain) > 5
 
 
+@pytest.mark.slow
 def test_scalar_mode_passes_the_tests_of_this_file() -> None:
     in_scalar_mode(__file__)

@@ -143,5 +143,6 @@ def test_surroundings_that_shine_only_from_ahead_give_the_plane_nothing(tmp_path
     made([FLAT], [turned], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
 
 
+@pytest.mark.slow
 def test_scalar_mode_passes_the_tests_of_this_file() -> None:
     in_scalar_mode(__file__)

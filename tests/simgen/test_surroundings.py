@@ -187,5 +187,6 @@ def test_there_is_one_light_from_all_around() -> None:
     )
 
 
+@pytest.mark.slow
 def test_scalar_mode_passes_the_tests_of_this_file() -> None:
     in_scalar_mode(__file__)
