@@ -23,7 +23,7 @@ MEASURES = {
 }
 """What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
 PANELS = 4
-"""Of reliability, side by side."""
+"""Panels of a reliability diagram, side by side."""
 LEAST_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 
@@ -74,8 +74,8 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     return _data_uri(figure)
 
 
-def reliability_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
-    """Share of correct depths against stated confidence, a panel for each budget, as a PNG in a data URI.
+def reliability_diagrams(group: Mapping[str, Any], methods: Sequence[str]) -> str:
+    """Reliability diagrams: share of correct depths against confidence, by budget, as a PNG in a data URI.
 
     Confidence that is right lies on the diagonal, overconfidence below it. The area of a marker grows with
     its bin's share of the pixels. Empty if no method of `methods` answers anything.

@@ -48,6 +48,8 @@ class TextureModel:
     saturation_nats: float = 5.0
     octaves: int = 4
     """The finest is of single blocks; in the coarsest, means are Gaussian of 4 and 8 blocks."""
+    least_coverage: float = 0.3
+    """Coefficients with a smaller share of all views' samples are left out: they lie at the borders."""
 
 
 class TextureEvidence(NamedTuple):
@@ -61,11 +63,11 @@ class TextureEvidence(NamedTuple):
     photons: np.ndarray
 
 
+SAMPLES, SUMS, SPREAD = 0, 1, -1
+"""Places of the number of samples, of their sum and of its variance in the values of blocks."""
 CELL_BLOCKS = 4
 LEAST_SAMPLES, LEAST_RATE = 1e-3, 1e-12
 """What is divided by where there are no samples, or no light."""
-LEAST_COVERAGE = 0.3
-"""Coefficients with a smaller share of the samples of a whole film are left out: they lie at its borders."""
 
 
 def evidence_of_texture(
@@ -80,12 +82,13 @@ def evidence_of_texture(
 
     chosen = model or TextureModel()
     colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
-    least_samples = LEAST_COVERAGE * data.grid.view_count * colours * block_px**2
+    least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
 
     def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
         blocks = _block_sums(data, planes.take([plane]), block_px)
-        sums, _, spread = (cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks)
-        return _of_section(*blocks, chosen, least_samples), sums**2 / np.maximum(spread, LEAST_RATE)
+        cells = [cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
+        sums, spread = cells[SUMS], cells[SPREAD]
+        return _of_section(blocks, chosen, least_samples), sums**2 / np.maximum(spread, LEAST_RATE)
 
     with ThreadPoolExecutor(threads()) as pool:
         octaves, photons = zip(*pool.map(of_plane, range(len(planes))), strict=True)
@@ -95,12 +98,11 @@ def evidence_of_texture(
         return TextureEvidence(np.stack([each[:h, :w] for each in nats]), np.stack(photons))
 
 
-def _block_sums(
-    data: PhotonCounts | Views, plane: FocalPlanes, block_px: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sum of the samples, their number and the variance of the sum (h, w) in the blocks of one section.
+def _block_sums(data: PhotonCounts | Views, plane: FocalPlanes, block_px: int) -> list[np.ndarray]:
+    """The number of samples, their sum and the variance of the sum (h, w) in the blocks of one section.
 
-    Sizes are rounded up to multiples of a cell, with empty blocks.
+    Of photon counts the last two are the same, and the sum is the last. Sizes are rounded up to multiples of
+    a cell, with empty blocks.
     """
     is_counted = isinstance(data, PhotonCounts)
     section = reconstruct(data, plane, variance=not is_counted)
@@ -109,27 +111,27 @@ def _block_sums(
         blocks = cell_sums(values.sum(axis=-1), block_px, np.float32)
         return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
 
-    sums, samples = in_blocks(section.counts[0]), in_blocks(section.coverage[0])
-    if section.variance is None:  # that of a Poisson variable is its mean
-        return sums, samples, sums
-    return sums, samples, in_blocks(section.variance[0] * section.coverage[0])
+    blocks = [in_blocks(section.coverage[0]), in_blocks(section.counts[0])]
+    if section.variance is not None:  # else that of a Poisson variable, its mean
+        blocks.append(in_blocks(section.variance[0] * section.coverage[0]))
+    return blocks
 
 
-def _of_section(
-    sums: np.ndarray, samples: np.ndarray, spread: np.ndarray, model: TextureModel, least_samples: float
-) -> list[np.ndarray]:
-    """The e of each octave on its own grid, from the values of the blocks (h, w)."""
-    parts, excess = [sums, samples, spread], list[np.ndarray]()
+def _of_section(blocks: list[np.ndarray], model: TextureModel, least_samples: float) -> list[np.ndarray]:
+    """The e of each octave on its own grid, from the values of `_block_sums`."""
+    from scipy.ndimage import gaussian_filter
+
+    parts, excess = blocks, list[np.ndarray]()
     for octave in range(model.octaves):
         if octave > 1:
             parts = [cell_sums(part, 2, np.float32) / 4 for part in parts]
-        finer, parts = parts, [_smoothed(part, octave) for part in parts]
-        mean, around = (part[0] / np.maximum(part[1], LEAST_SAMPLES) for part in (finer, parts))
-        number = np.maximum(parts[1], LEAST_SAMPLES)
-        noise = _noise_weight(octave) * np.maximum(parts[2], 0) / number**2
+        finer, parts = parts, [gaussian_filter(part, _blur(octave), mode="constant") for part in parts]
+        mean, around = (part[SUMS] / np.maximum(part[SAMPLES], LEAST_SAMPLES) for part in (finer, parts))
+        number = np.maximum(parts[SAMPLES], LEAST_SAMPLES)
+        noise = _noise_weight(octave) * np.maximum(parts[SPREAD], 0) / number**2
         noise = np.maximum(noise, LEAST_RATE**2) + (model.averaging_error * around) ** 2
         texture = (model.contrast * around) ** 2
-        share = np.where(parts[1] >= least_samples, texture / (noise + texture), 0)
+        share = np.where(parts[SAMPLES] >= least_samples, texture / (noise + texture), 0)
         excess.append(share * ((mean - around) ** 2 / noise - 1) / 2)
     return excess
 
@@ -148,16 +150,19 @@ def _summed(octaves: Sequence[np.ndarray]) -> np.ndarray:
     """Sum of values of octaves per block (h, w): a coefficient of an octave stands for 4^octave blocks."""
     total = octaves[-1]
     for octave in reversed(range(len(octaves) - 1)):
-        # The first two octaves have the same grid.
-        total = octaves[octave] + (total if octave == 0 else expanded(total)) / 4
+        if octave > 0:  # the first two octaves have the same grid
+            h, w = octaves[octave].shape  # an odd one has one row less than twice its half
+            total = _expanded(total)[:h, :w]
+        total = octaves[octave] + total / 4
     return total
 
 
-def _smoothed(values: np.ndarray, octave: int) -> np.ndarray:
-    """Along all axes of more than one block: by 1 block in the finest octave, then from 1 block to 2."""
-    from scipy.ndimage import gaussian_filter
+def _blur(octave: int) -> float:
+    """Standard deviation that widens the finer mean of an octave to the coarser one, on the octave's grid.
 
-    return gaussian_filter(values, 1.0 if octave == 0 else np.sqrt(3.0), mode="constant")
+    From single blocks to 1 in the finest octave, then from 1 to 2.
+    """
+    return 1.0 if octave == 0 else 3.0**0.5
 
 
 @cache
@@ -170,15 +175,15 @@ def _noise_weight(octave: int) -> float:
 
     own = np.eye(64 << octave)
     for finer in range(octave):
-        own = gaussian_filter1d(own, 1.0 if finer == 0 else np.sqrt(3.0), axis=0, mode="constant")
+        own = gaussian_filter1d(own, _blur(finer), axis=0, mode="constant")
         if finer > 0:
             own = (own[::2] + own[1::2]) / 2
-    around = gaussian_filter1d(own, 1.0 if octave == 0 else np.sqrt(3.0), axis=0, mode="constant")
+    around = gaussian_filter1d(own, _blur(octave), axis=0, mode="constant")
     a, b = own[own.shape[0] // 2], around[own.shape[0] // 2]
     return float((a @ a) ** 2 + (b @ b) ** 2 - 2 * (a @ b) ** 2)
 
 
-def expanded(values: np.ndarray) -> np.ndarray:
+def _expanded(values: np.ndarray) -> np.ndarray:
     """Twice the size in both axes (h, w), interpolated between centres; continued beyond the borders."""
     return _expanded_rows(_expanded_rows(values).T).T
 

@@ -55,3 +55,15 @@ def test_views_that_differ_are_no_texture() -> None:
     noisy = Views(1 + 0.2 * np.random.default_rng(1).standard_normal((*grid.shape_KLHW, 1)), grid)
     nats = evidence_of_texture(noisy, FocalPlanes.at_depths(grid, [0.5]), model=UNBOUNDED).nats
     assert abs(nats[0, 16:-16, 16:-16].mean()) < 0.02
+
+
+@pytest.mark.parametrize("octaves", [1, 4, 7])
+@pytest.mark.parametrize("size", [(1, 1), (37, 50), (66, 23)])
+def test_films_of_any_size_have_as_many_octaves_as_are_asked_for(size: tuple[int, int], octaves: int) -> None:
+    grid = unit_grid(2, 3, *size)
+    planes = FocalPlanes.at_depths(grid, [0.5, 1.0])
+    nats = evidence_of_texture(
+        even_light(grid, 1.0, 0, None), planes, model=TextureModel(octaves=octaves)
+    ).nats
+    assert nats.shape == (2, -(-size[0] // 2), -(-size[1] // 2))
+    assert np.isfinite(nats).all()
