@@ -55,13 +55,17 @@ class CameraGrid:
     def __post_init__(self) -> None:
         for name in ("rows", "cols", "height", "width"):
             _check_size(name, getattr(self, name))
+            object.__setattr__(self, name, int(getattr(self, name)))
         pitch = self.pitch_mm
         if not isinstance(pitch, tuple | list) or len(pitch) != 2:
             raise InputError(f"pitch_mm: expected two lengths (x, y) in mm, got {pitch!r}")
         for name, value in (("pitch_mm", pitch[0]), ("pitch_mm", pitch[1])):
             _check_length(name, value)
         for name in ("focal_mm", "pixel_mm"):
-            _check_length(name, getattr(self, name))
+            length = getattr(self, name)
+            _check_length(name, length)
+            if isinstance(length, np.generic):  # small types of NumPy would overflow in products
+                object.__setattr__(self, name, float(length))
         object.__setattr__(self, "pitch_mm", (float(pitch[0]), float(pitch[1])))
         shear = self.shear_px
         if not isinstance(shear, tuple | list) or len(shear) != 2 or not all(map(_is_finite, shear)):

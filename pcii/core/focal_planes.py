@@ -35,9 +35,9 @@ class FocalPlanes(Brief):
     def __post_init__(self) -> None:
         object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
         object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
-        with np.errstate(over="ignore", divide="ignore"):
-            across, down = np.abs(disparity_px(self.grid, self.z_mm))
-        countable = np.maximum(across * self.grid.cols, down * self.grid.rows) < 2**31
+        across, down = np.abs(disparity_px(self.grid, self.z_mm))
+        with np.errstate(over="ignore"):
+            countable = np.maximum(across * self.grid.cols, down * self.grid.rows) < 2**31
         if not countable.all():
             near = self.z_mm[~countable][0]
             raise InputError(f"z_mm: {near:g} mm is so near that views shift by more than 2^31 pixels")
@@ -53,8 +53,7 @@ class FocalPlanes(Brief):
         [[-10, 0, 10], [-5, 0, 5]]
         """
         z = check_z_mm(z_mm)
-        with np.errstate(over="ignore"):
-            return cls(grid, z, total_disparity_px(grid, z))
+        return cls(grid, z, total_disparity_px(grid, z))
 
     @classmethod
     def at_total_disparity(cls, grid: CameraGrid, total_disparity_px: object) -> "FocalPlanes":

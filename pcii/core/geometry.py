@@ -34,8 +34,10 @@ def project_px(
 
 def parallax_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """(horizontal, vertical) disparity at depth z due to the camera pitch alone, in px per camera step."""
-    scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
-    return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
+    # Lengths whose product no float64 holds give 0, infinity or NaN; `FocalPlanes` refuses the last two.
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        scale_mm2 = np.asarray(z_mm, dtype=np.float64) * grid.pixel_mm
+        return grid.focal_mm * grid.pitch_mm[0] / scale_mm2, grid.focal_mm * grid.pitch_mm[1] / scale_mm2
 
 
 def disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -54,7 +56,8 @@ def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray
     array([20., 10.])
     """
     d_x, d_y = parallax_px(grid, z_mm)
-    return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
 
 
 def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:

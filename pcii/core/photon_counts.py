@@ -88,7 +88,7 @@ class PhotonCounts(Brief):
         """Counts from five equal-length lists: camera (k, l), pixel (i, j), photons n.
 
         A pixel may appear more than once; its photons add up. Raises `InputError` for an index
-        outside the grid, a negative or fractional count, or lists of different lengths.
+        outside the grid, a negative, fractional or too large count, or lists of different lengths.
 
         >>> grid = CameraGrid(
         ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
@@ -113,7 +113,9 @@ class PhotonCounts(Brief):
         if len({column.shape for column in (*indices.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         _check_total("n", photons)
-        return cls(grid, cfa, _events=_canonical_events(tuple(indices.values()), photons, grid))
+        events = _canonical_events(tuple(indices.values()), photons, grid)
+        whole_counts("n", events.n)  # after those of one pixel are added up
+        return cls(grid, cfa, _events=events)
 
     def _facts(self) -> dict[str, object]:
         kept = "events" if self.is_sparse else "dense"
@@ -193,8 +195,11 @@ class PhotonCounts(Brief):
         """Counts of about `most` photons, each photon kept with the same probability.
 
         The number of photons kept is binomial with mean `most`; Poisson counts stay Poisson counts. Counts of
-        no more than `most` photons are returned as they are.
+        no more than `most` photons are returned as they are. Raises `InputError` if `most` is not a number
+        of at least 0.
         """
+        if not most >= 0:
+            raise InputError(f"most: expected a number of photons of at least 0, got {most!r}")
         if self.total <= most:
             return self
         events = self.events

@@ -21,14 +21,16 @@ MOST_PHOTONS = 1e12
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
     """What a sensor's pixels see of radiance (H, W, C): (H, W), same units and dtype.
 
-    A Bayer pixel keeps its own colour; a monochrome one the luminance of linear sRGB, or the one channel that
-    its camera has.
+    A Bayer pixel keeps its own colour; a monochrome one the luminance of linear sRGB (float64 of whole
+    numbers), or the one channel that its camera has.
     """
     if radiance.shape[2] == 1:
         return radiance[..., 0]
     if cfa is not None:
         return mosaic(radiance, cfa)
-    return (radiance @ LUMINANCE).astype(radiance.dtype)
+    with np.errstate(over="ignore"):  # infinite energies are refused
+        luminance = radiance @ LUMINANCE
+        return luminance.astype(radiance.dtype) if radiance.dtype.kind == "f" else luminance
 
 
 def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
@@ -37,7 +39,8 @@ def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
     Sums are float64: float32 sums of a million pixels are wrong in the third digit.
     """
     if scope != "channel":
-        return np.array([raw.sum(dtype=np.float64)])
+        with np.errstate(over="ignore"):
+            return np.array([raw.sum(dtype=np.float64)])
     colours = colour_index(raw.shape[0], raw.shape[1], cfa)
     return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
 
@@ -48,11 +51,15 @@ def photon_rates(
     """Expected photons per pixel, (H, W) float64: the budget shared out in proportion to `raw`.
 
     `energies` are those of `scope_energies`, for scope "scene" summed over all views. A scope with
-    no light at all gets no photons. Raises `InputError` if radiance is not finite.
+    no light at all gets no photons. Raises `InputError` if radiance or its sum is not finite.
     """
     if not np.all(np.isfinite(energies)):
-        raise InputError("radiance: the view holds NaN or infinity")
-    share = np.divide(budget, energies, out=np.zeros_like(energies), where=energies > 0)
+        raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
+    with np.errstate(over="ignore"):
+        share = np.divide(budget, energies, out=np.zeros_like(energies), where=energies > 0)
+    if not np.isfinite(share).all():  # of very faint light the pixel's part is taken first
+        own = energies[colour_index(raw.shape[0], raw.shape[1], cfa) if scope == "channel" else 0]
+        return budget * np.divide(raw, own, out=np.zeros(raw.shape), where=own > 0)
     if scope != "channel":
         return raw * share[0]
     return raw * share[colour_index(raw.shape[0], raw.shape[1], cfa)]

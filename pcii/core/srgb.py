@@ -19,8 +19,13 @@ def linear_to_srgb(linear: np.ndarray) -> np.ndarray:
 def srgb_to_linear(srgb: np.ndarray) -> np.ndarray:
     """Linear values, float, of sRGB: of numbers in [0, 1], or of 8-bit or 16-bit whole numbers.
 
+    The curve is continued above 1, up to infinity where the type holds no more, and as a straight line below
+    0. NaN stays NaN.
+
     >>> srgb_to_linear(np.array([0, 188, 255], dtype=np.uint8)).round(3)
     array([0.   , 0.503, 1.   ])
     """
-    x = srgb / np.iinfo(srgb.dtype).max if srgb.dtype.kind == "u" else srgb
-    return np.where(x <= 0.04045, x / 12.92, ((x + 0.055) / 1.055) ** 2.4)
+    encoded = np.asarray(srgb)
+    x = encoded / np.iinfo(encoded.dtype).max if encoded.dtype.kind == "u" else encoded
+    with np.errstate(over="ignore"):
+        return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0) + 0.055) / 1.055) ** 2.4)

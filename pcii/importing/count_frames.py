@@ -40,7 +40,7 @@ def import_counts(
     K, L = shape[:2]
     for done, (camera, frames) in enumerate(zip(np.ndindex(K, L), views, strict=True), start=1):
         for name, frame in frames:
-            counts[camera] += whole_counts(name, frame)
+            counts[camera] += whole_counts(name, frame).astype(np.int64, copy=False)
             if counts[camera].max(initial=0) > LARGEST_COUNT:
                 raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
         report("views", done, K * L)

@@ -26,7 +26,8 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
     """Linear radiance, float32, of whole numbers (of 1 at the largest of their type) or of floats.
 
     Without an encoding whole numbers are sRGB, as in nearly all picture files, and floats are linear.
-    Raises `InputError` for encoded numbers below 0, or that are NaN or infinite.
+    Raises `InputError` for numbers that are NaN or infinite, for encoded ones below 0, and for light that is
+    too bright for float32.
 
     >>> to_radiance(np.array([0, 128, 255], np.uint8), None).round(3)
     array([0.   , 0.216, 1.   ], dtype=float32)
@@ -42,12 +43,14 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
         table = srgb_to_linear(np.arange(np.iinfo(numbers.dtype).max + 1, dtype=numbers.dtype))
         return table.astype(np.float32)[numbers]
     share = numbers / np.float32(np.iinfo(numbers.dtype).max) if whole else numbers
-    if encoding == "linear":
-        with np.errstate(over="ignore"):
-            linear = share.astype(np.float32)
-        if not np.isfinite(linear).all():
-            raise InputError("holds light that is too bright for float32")
-        return linear
-    if not whole and share.size and share.min() < 0:
+    if encoding != "linear" and not whole and share.size and share.min() < 0:
         raise InputError("holds numbers below 0, which no encoded light has")
-    return (srgb_to_linear(share) if encoding == "srgb" else share**encoding).astype(np.float32)
+    with np.errstate(over="ignore"):
+        if encoding == "srgb":
+            share = srgb_to_linear(share)
+        elif encoding != "linear":
+            share = (share if whole else share.astype(np.float64)) ** encoding
+        linear = share.astype(np.float32)
+    if not np.isfinite(linear).all():
+        raise InputError("holds light that is too bright for float32")
+    return linear

@@ -22,7 +22,8 @@ def demosaic(
 
     `method` is "laroche-prescott", "bilinear", "malvar" or "menon". Borders continue the image by
     reflection about the border pixels, which keeps the Bayer phase.
-    Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity.
+    Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity, and values
+    so large that those of neighbours cannot be added up.
 
     >>> from pcii.core.bayer import mosaic
     >>> image = demosaic(mosaic(np.full((4, 6, 3), [1.0, 2.0, 3.0]), "GRBG"), cfa="GRBG")
@@ -39,7 +40,11 @@ def demosaic(
         raise InputError(f"mosaic: expected an image (H, W) of at least 2 x 2, got {raw.shape}")
     if not np.all(np.isfinite(raw)):
         raise InputError("mosaic: holds NaN or infinity")
-    return METHODS[method](raw, cfa)
+    with np.errstate(over="ignore", invalid="ignore"):
+        image = METHODS[method](raw, cfa)
+    if not np.all(np.isfinite(image)):
+        raise InputError("mosaic: values are too large for those of neighbours to be added up")
+    return image
 
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:

@@ -17,7 +17,7 @@ def sum_views(
 ) -> bool:
     """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
 
-    `variance` is empty if it is not wanted. Returns whether all sums and all images are finite.
+    `variance` is empty if it is not wanted. Returns whether the results and all images are finite.
     """
     height, width = images.shape[1:]
     bad = bad_rows(images, moves)
@@ -33,8 +33,10 @@ def sum_views(
         band_variance = variance[top:bottom] if variance.size else variance
         bad += add_rows(running, images, moves, top, 0, bottom - top)
         for line in range(bottom - top):
-            bad += not_finite(total[:, line])
             merge_line(sums[top:bottom], band_variance, running, groups, top, line)
+            bad += not_finite(sums[top + line])
+            if variance.size:
+                bad += not_finite(squares[:, line]) + not_finite(variance[top + line])
     return bad == 0
 
 
@@ -55,12 +57,14 @@ def add_views(running: Running, images: np.ndarray, moves: Moves) -> bool:
 def merge_groups(sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups) -> bool:
     """Sums and, unless it is empty, variances (H, W, C) from the running sums of the groups.
 
-    Returns whether all sums are finite.
+    Returns whether the results are finite.
     """
     bad = 0
     for line in nb.prange(sums.shape[0]):
-        bad += not_finite(running.total[:, line])
         merge_line(sums, variance, running, groups, 0, line)
+        bad += not_finite(sums[line])
+        if variance.size:
+            bad += not_finite(running.squares[:, line]) + not_finite(variance[line])
     return bad == 0
 
 

@@ -30,7 +30,7 @@ def sum_views(
     """Sums and unbiased variances (Z, H, W, C) of the samples at each voxel; float64 for float64 data.
 
     A view is read once, however many planes. A voxel below two samples has the variance 0.
-    Raises `InputError` for radiance that is NaN or infinite.
+    Raises `InputError` for radiance that is NaN or infinite, or whose sums or variances would be.
     """
     kind = _dtype(data)
     planes = [_Plane(data, focal_planes, p, shifts, kind, variance) for p in range(len(focal_planes))]
@@ -52,7 +52,7 @@ def sum_views(
 def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) -> np.ndarray:
     """Photons per voxel (Z, H, W, C), int64, from counts that are kept dense: the same as from events.
 
-    Sums run in double precision, which is exact: no voxel has 2^53 photons.
+    Sums run in double precision, which is exact if no voxel has more than 2^53 photons.
     """
     images = data.dense.reshape(data.grid.view_count, data.grid.height, -1)
     planes = [_Plane(data, focal_planes, p, shifts, np.int64, False) for p in range(len(focal_planes))]
@@ -67,7 +67,8 @@ def sum_fine(
     """Sums and unbiased variances (Z, H M, W M, C), float64, of radiance on finer voxels.
 
     `rows` (Z, K, H) and `cols` (Z, L, W) are `FocalPlanes.voxel_indices`; `coverage` is (Z, H M, W M, C).
-    A view is read once, however many planes.
+    A view is read once, however many planes. Raises `InputError` for radiance that is NaN or infinite, or
+    whose sums or variances would be.
     """
     from pcii.sections import dense_kernels
 
@@ -79,11 +80,15 @@ def sum_fine(
         image = data.view(k, l).astype(np.float64)
         for p, running in enumerate(zip(total, squares, first, strict=True)):
             dense_kernels.add_fine(*running, image, rows[p, k], cols[p, l], cells)
-    if not variance:
-        return total, None
-    deviations = np.maximum(squares - total**2 / np.maximum(coverage, 1), 0)
-    sums = np.where(coverage > 0, total + first * coverage, 0)
-    return sums, deviations / np.maximum(coverage.astype(np.int64) - 1, 1)
+    sums, sample_variance = total, None
+    if variance:
+        with np.errstate(over="ignore", invalid="ignore"):
+            deviations = np.maximum(squares - total * (total / np.maximum(coverage, 1)), 0)
+            sums = np.where(coverage > 0, total + first * coverage, 0)
+        sample_variance = deviations / np.maximum(coverage.astype(np.int64) - 1, 1)
+    if not all(np.isfinite(part).all() for part in (sums, squares)):
+        _raise_not_finite(data)
+    return sums, sample_variance
 
 
 def _stacked(planes: list[np.ndarray]) -> np.ndarray:
@@ -178,4 +183,4 @@ def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
 def _raise_not_finite(data: Views) -> None:
     for k, l in np.ndindex(data.grid.rows, data.grid.cols):
         data.view(k, l)  # raises for a view with NaN or infinity
-    raise InputError("radiance: values are too large for their sum to be a number")
+    raise InputError("radiance: values are too large for their sum, or for their variance, to be a number")

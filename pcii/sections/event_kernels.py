@@ -1,5 +1,7 @@
 """Compiled loops over photons: sections, and samples of windows."""
 
+from typing import NamedTuple
+
 import numba as nb
 import numpy as np
 
@@ -55,11 +57,22 @@ def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
         target[row] = rows[kinds[row]]
 
 
+class Samples(NamedTuple):
+    """Running statistics of samples that are not zero, (H, W) each, int64 and `squares` float64.
+
+    Their `number`, the `first`, and sums of the others' differences from it and of these squared: the squares
+    of large samples themselves would not fit in 64 bits.
+    """
+
+    number: np.ndarray
+    first: np.ndarray
+    difference: np.ndarray
+    squares: np.ndarray
+
+
 @compiled
 def window_samples(
-    number: np.ndarray,
-    total: np.ndarray,
-    squares: np.ndarray,
+    samples: Samples,
     row: np.ndarray,
     col: np.ndarray,
     n: np.ndarray,
@@ -67,29 +80,33 @@ def window_samples(
     window: int,
     bands: int,
 ) -> None:
-    """Number, sum and sum of squares of each window's samples that are not zero, (H, W) int64, from zeros.
+    """Statistics of each window's samples that are not zero, from zeros.
 
     A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
     `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
     thread owns a band of rows. The cost follows the photons times the cells of a window.
     """
+    number, first, difference, squares = samples
     height, width = number.shape
     above = (window - 1) // 2  # the window of a cell reaches further above and left of it if its size is even
     below = window // 2
     for band in nb.prange(bands):
-        first, last = height * band // bands, height * (band + 1) // bands
-        sample = np.zeros((last - first, width), np.int64)
+        start, stop = height * band // bands, height * (band + 1) // bands
+        sample = np.zeros((stop - start, width), np.int64)
         for view in range(starts.size - 1):
             for e in range(starts[view], starts[view + 1]):
-                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                for i in range(max(row[e] - above, start), min(row[e] + below + 1, stop)):
                     for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
-                        sample[i - first, j] += n[e]
+                        sample[i - start, j] += n[e]
             for e in range(starts[view], starts[view + 1]):
-                for i in range(max(row[e] - above, first), min(row[e] + below + 1, last)):
+                for i in range(max(row[e] - above, start), min(row[e] + below + 1, stop)):
                     for j in range(max(col[e] - above, 0), min(col[e] + below + 1, width)):
-                        value = sample[i - first, j]
+                        value = sample[i - start, j]
                         if value > 0:  # 0 once this cell's sample has been counted
+                            if number[i, j] == 0:
+                                first[i, j] = value
                             number[i, j] += 1
-                            total[i, j] += value
-                            squares[i, j] += value * value
-                            sample[i - first, j] = 0
+                            value -= first[i, j]
+                            difference[i, j] += value
+                            squares[i, j] += float(value) * float(value)
+                            sample[i - start, j] = 0

@@ -32,7 +32,7 @@ def entropy_bits(values: np.ndarray, top: float) -> float:
     """
     if values.size == 0 or top <= 0:
         return 0.0
-    levels = np.clip(values * (GREY_LEVELS / top), 0, GREY_LEVELS - 1).astype(np.int64)
+    levels = np.clip(values / top * GREY_LEVELS, 0, GREY_LEVELS - 1).astype(np.int64)
     histogram = np.bincount(levels.ravel())
     share = histogram[histogram > 0] / values.size
     return float(abs((share * np.log2(share)).sum()))  # abs: -0.0 is 0
@@ -117,6 +117,9 @@ def view_samples(
     In focus all views see the same surface point, so their samples differ by Poisson noise only; out of focus
     they see different points, and the variance is larger. A window of an even number of
     pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
+
+    Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
+    of their squares times the number of views is below 2^53.
     """
     from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
@@ -124,14 +127,15 @@ def view_samples(
     grid, events = counts.grid, counts.events
     row, col, inside = planes.project(events, plane)
     shape = (-(-grid.height // cell_px), -(-grid.width // cell_px))
-    number, total, squares = (np.zeros(shape, dtype=np.int64) for _ in range(3))
+    number, first, difference = (np.zeros(shape, dtype=np.int64) for _ in range(3))
+    squares = np.zeros(shape)
     # Events are sorted by view.
     starts = np.append(0, np.cumsum(inside))[counts.view_starts]
     cells = row[inside] // cell_px, col[inside] // cell_px
-    kernels.window_samples(number, total, squares, *cells, events.n[inside], starts, window_cells, threads())
-    mean = total / np.maximum(number, 1)
-    # n Q - S^2 is exact in integers.
-    deviations = number * squares - total * total
+    samples = kernels.Samples(number, first, difference, squares)
+    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells, threads())
+    mean = (number * first + difference) / np.maximum(number, 1)
+    deviations = np.maximum(number * squares - difference.astype(np.float64) ** 2, 0)
     variance = deviations / np.maximum(number * (number - 1), 1)
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
 

@@ -15,7 +15,7 @@ from pcii.base.errors import InputError
 from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes, planes_at
 from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts
 from pcii.core.section_stack import Normalisation, Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
 from pcii.sections.image_moves import AxisMoves, axis_moves, step_px
@@ -49,8 +49,8 @@ def reconstruct(
     mosaic to be demosaiced: `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for
     even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
 
-    Raises `InputError` for a depth not above 0, a subpixel division below 1, or options that do not go
-    together.
+    Raises `InputError` for a depth not above 0, a subpixel division below 1, options that do not go together,
+    radiance that is not finite or too large to be added up, and counts too large for their exact variance.
 
     Three cameras count a photon each of a point at 500 mm, where the disparity is 10 px:
 
@@ -77,7 +77,7 @@ def reconstruct(
     else:
         coverage = _coverage(planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
-        if not data.is_sparse and subpixel == 1 and data.occupied_share > DENSE_SHARE:
+        if subpixel == 1 and _as_images(data):
             sums = sum_counts(data, planes, shifts)
         else:
             sums = _scatter(data, data.events.n, shape, rows, cols)
@@ -144,6 +144,13 @@ def _check(
         raise InputError("shifts: photon counts are never interpolated; use 'nearest', or finer voxels")
     if shifts == "bilinear" and variance:
         raise InputError("variance: samples that are shared between voxels have none; use 'nearest' shifts")
+
+
+def _as_images(counts: PhotonCounts) -> bool:
+    """Whether whole images are added: of dense counts with many photons, if float64 holds all sums exactly."""
+    if counts.is_sparse or counts.occupied_share <= DENSE_SHARE:
+        return False
+    return counts.grid.view_count * LARGEST_COUNT <= 1 << 53 or counts.total <= 1 << 53
 
 
 def _scatter(

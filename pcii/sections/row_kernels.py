@@ -210,4 +210,4 @@ def merge_line(sums, variance, running, groups, top, line) -> None:
 @helper
 def _deviations(total, squares, inverse) -> float:
     """Sum of squared deviations from the mean, of 1 / `inverse` numbers of this sum and sum of squares."""
-    return max(squares - total * total * inverse, 0.0)
+    return max(squares - total * (total * inverse), 0.0)  # the square of the total could be infinite

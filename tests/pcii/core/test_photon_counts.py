@@ -175,13 +175,13 @@ MOST = np.int64(1 << 40)  # in one pixel; 2^23 of them are 2^63, one more than i
 
 
 def test_events_that_add_up_to_more_than_int64_holds_are_refused_by_name() -> None:
-    grid = unit_grid(1, 1, 1, 1)
-    zeros = np.zeros(MANY, dtype=np.uint8)
+    grid = unit_grid(1, 1, 1, MANY)
+    zeros, cols = np.zeros(MANY, dtype=np.uint8), np.arange(MANY)
     with pytest.raises(InputError, match=r"^n: 9223372036854775808 photons in all"):
-        PhotonCounts.from_events(zeros, zeros, zeros, zeros, np.full(MANY, MOST), grid)
+        PhotonCounts.from_events(zeros, zeros, zeros, cols, np.full(MANY, MOST), grid)
     just = np.full(MANY, MOST)
     just[0] -= 1
-    assert PhotonCounts.from_events(zeros, zeros, zeros, zeros, just, grid).total == (1 << 63) - 1
+    assert PhotonCounts.from_events(zeros, zeros, zeros, cols, just, grid).total == (1 << 63) - 1
 
 
 def test_a_dense_stack_of_more_than_int64_holds_is_refused_by_name() -> None:
