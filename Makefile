@@ -1,5 +1,6 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
+# make stress  numerical limits: full sizes, and 10 000 random cases of each property; hours
 # make bench  run time against error; TABLES="sections" for one table, TABLES=removal BENCH_SEEDS=3 to
 #             compare methods over scenes and seeds, TABLES=depth those of depth
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
@@ -9,7 +10,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out
 
-.PHONY: demo test bench gallery format clean llvm
+.PHONY: demo test stress bench gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -38,7 +39,10 @@ test: llvm
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
-	$(BIN)/python -m pytest -n 2 -m "not slow"
+	$(BIN)/python -m pytest -n 2 -m "not slow and not stress"
+
+stress: llvm
+	$(BIN)/python -m pytest -n 2 -m "stress or hypothesis" --hypothesis-profile=stress
 
 bench: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'

@@ -3,7 +3,12 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from tiny import TINY_RECIPE
+
+settings.register_profile("fast", max_examples=25, deadline=None)
+settings.register_profile("stress", max_examples=10_000, deadline=None)
+settings.load_profile("fast")  # unless --hypothesis-profile names another
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -83,3 +83,14 @@ class Views(Brief):
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
         return image
+
+
+def binary_scale(views: Views) -> float:
+    """The power of two nearest above the light of the middle view, or 1 if that is within 2^-20 .. 2^20.
+
+    Methods whose result does not depend on the unit of radiance divide by it, which is exact, so that squares
+    neither overflow nor vanish.
+    """
+    middle = views.view(views.grid.rows // 2, views.grid.cols // 2)
+    exponent = int(np.frexp(max(abs(float(middle.max())), abs(float(middle.min()))))[1])
+    return 1.0 if abs(exponent) <= 20 else 2.0 ** min(exponent, 1023)

@@ -10,7 +10,7 @@ import numpy as np
 from pcii.core.estimates import DepthMap
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px
-from pcii.core.images import Views
+from pcii.core.images import Views, binary_scale
 from pcii.sections.demosaicing import demosaic
 
 INNER_SIGMA_PX, OUTER_SIGMA_PX = 0.8, 2.5
@@ -47,9 +47,10 @@ Line = list[tuple[int, int, np.ndarray]]
 def _cross(data: Views) -> list[tuple[int, Line]]:
     """The middle rows and columns of cameras, smoothed, each with the axis of its disparity."""
     K, L = data.grid.rows, data.grid.cols
+    scale = binary_scale(data)
     places = [(1, [(k, l) for l in range(L)]) for k in _middle(K) if L > 1]
     places += [(0, [(k, l) for k in range(K)]) for l in _middle(L) if K > 1]
-    return [(axis, [(k, l, _grey(data, k, l)) for k, l in line]) for axis, line in places]
+    return [(axis, [(k, l, _grey(data, k, l, scale)) for k, l in line]) for axis, line in places]
 
 
 def _middle(number: int) -> range:
@@ -57,14 +58,19 @@ def _middle(number: int) -> range:
     return range((number - 1) // 2, number // 2 + 1)
 
 
-def _grey(data: Views, k: int, l: int) -> np.ndarray:
-    """One view (H, W) without colours, smoothed."""
+def _grey(data: Views, k: int, l: int, scale: float) -> np.ndarray:
+    """One view (H, W) without colours, smoothed, in units of `scale`."""
     from scipy.ndimage import gaussian_filter
 
-    image = data.view(k, l).astype(np.float64)
+    image = data.view(k, l).astype(np.float64) / scale
     if data.cfa is not None:
         image = demosaic(image[..., 0], cfa=data.cfa)
     return gaussian_filter(image.mean(axis=-1), INNER_SIGMA_PX)
+
+
+def _gradient(stack: np.ndarray, axis: int) -> np.ndarray:
+    """Differences along an axis; 0 along a single pixel."""
+    return np.gradient(stack, axis=axis) if stack.shape[axis] > 1 else np.zeros_like(stack)
 
 
 def _slope(lines: list[tuple[int, Line]], plane: FocalPlanes) -> tuple[np.ndarray, np.ndarray]:
@@ -78,7 +84,7 @@ def _slope(lines: list[tuple[int, Line]], plane: FocalPlanes) -> tuple[np.ndarra
         ratio = float(parallax_px(plane.grid, plane.z_mm)[1 - axis][0]) / longest
         images = [shift(image, (rows[0, k], cols[0, l]), order=1, mode="nearest") for k, l, image in line]
         stack = np.stack(images)
-        across, along = ratio * np.gradient(stack, axis=1 + axis), np.gradient(stack, axis=0)
+        across, along = ratio * _gradient(stack, 1 + axis), _gradient(stack, 0)
         for total, product in ((xx, across * across), (xs, across * along), (ss, along * along)):
             total += gaussian_filter(product.sum(axis=0), OUTER_SIGMA_PX)
     # I(x, s) = f(x + slope s): the slope of least squares, and the share of the gradient that it explains.

@@ -33,7 +33,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
+from pcii.core.images import Views, binary_scale
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.photon_statistics import cell_sums
 from pcii.sections.reconstruction import reconstruct
@@ -83,9 +83,10 @@ def evidence_of_texture(
     chosen = model or TextureModel()
     colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
     least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
+    scale = binary_scale(data) if isinstance(data, Views) else 1.0
 
     def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
-        blocks = _block_sums(data, planes.take([plane]), block_px)
+        blocks = _block_sums(data, planes.take([plane]), block_px, scale)
         cells = [cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
         sums, spread = cells[SUMS], cells[SPREAD]
         return _of_section(blocks, chosen, least_samples), sums**2 / np.maximum(spread, LEAST_RATE)
@@ -98,11 +99,13 @@ def evidence_of_texture(
         return TextureEvidence(np.stack([each[:h, :w] for each in nats]), np.stack(photons))
 
 
-def _block_sums(data: PhotonCounts | Views, plane: FocalPlanes, block_px: int) -> list[np.ndarray]:
+def _block_sums(
+    data: PhotonCounts | Views, plane: FocalPlanes, block_px: int, scale: float
+) -> list[np.ndarray]:
     """The number of samples, their sum and the variance of the sum (h, w) in the blocks of one section.
 
-    Of photon counts the last two are the same, and the sum is the last. Sizes are rounded up to multiples of
-    a cell, with empty blocks.
+    Radiance is in units of `scale`. Of photon counts the last two are the same, and the sum is the last.
+    Sizes are rounded up to multiples of a cell, with empty blocks.
     """
     is_counted = isinstance(data, PhotonCounts)
     section = reconstruct(data, plane, variance=not is_counted)
@@ -111,9 +114,13 @@ def _block_sums(data: PhotonCounts | Views, plane: FocalPlanes, block_px: int) -
         blocks = cell_sums(values.sum(axis=-1), block_px, np.float32)
         return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
 
-    blocks = [in_blocks(section.coverage[0]), in_blocks(section.counts[0])]
+    blocks = [
+        in_blocks(section.coverage[0]),
+        in_blocks(section.counts[0] if scale == 1 else section.counts[0] / scale),
+    ]
     if section.variance is not None:  # else that of a Poisson variable, its mean
-        blocks.append(in_blocks(section.variance[0] * section.coverage[0]))
+        variance = section.variance[0] if scale == 1 else section.variance[0] / scale / scale
+        blocks.append(in_blocks(variance * section.coverage[0]))
     return blocks
 
 

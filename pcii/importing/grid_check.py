@@ -14,6 +14,7 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.importing.camera_order import AS_STORED, ViewOrder
 from pcii.importing.plane_sweep import SmallViews, Sweep, shifts_px, small_views, sweep
+from pcii.io.dataset_writer import check_depth_range
 
 COARSE_PX, FINE_PX = 144, 512
 """Largest side of the reduced views of which all mistakes are tried, and of those that refine depths."""
@@ -67,8 +68,11 @@ def check_grid(
 
     They were stored in the `order`, as a table or `counted` one by one. Without a range all depths are
     looked at whose parallax is not larger than the views. Small views, single ones and such without texture
-    are not judged.
+    are not judged. Raises `InputError` for a view that holds NaN or infinity, and for a range that is not
+    0 < near < far.
     """
+    if z_range_mm is not None:
+        check_depth_range(z_range_mm)
     if grid.view_count < 2 or min(grid.height, grid.width) < FEWEST_PX:
         return GridCheck()
     small = small_views(view, grid, COARSE_PX)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import disparity_px
 
@@ -58,7 +59,7 @@ def small_views(view: Callable[[int, int], np.ndarray], grid: CameraGrid, most_p
     rows, cols = (_spread(count) for count in (grid.rows, grid.cols))
     scale = -(-max(grid.height, grid.width) // most_px)
     scale = max(1, min(scale + scale % 2 if scale > 1 else 1, grid.height, grid.width))
-    images = [_reduced(view(k, l), scale) for k in rows for l in cols]
+    images = [_reduced(_finite(view(k, l), k, l), scale) for k in rows for l in cols]
     return SmallViews(np.stack(images), np.repeat(rows, cols.size), np.tile(cols, rows.size), scale)
 
 
@@ -66,11 +67,20 @@ def _spread(count: int) -> np.ndarray:
     return np.unique(np.rint(np.linspace(0, count - 1, min(count, MOST_CAMERAS))).astype(int))
 
 
+def _finite(image: np.ndarray, k: int, l: int) -> np.ndarray:
+    if not np.isfinite(image).all():
+        raise InputError(f"view: view ({k}, {l}) holds NaN or infinity")
+    return image
+
+
 def _reduced(image: np.ndarray, scale: int) -> np.ndarray:
     """Band-passed square root of the mean light of cells: noise and contrast no longer follow brightness."""
     from scipy.ndimage import gaussian_filter
 
     h, w = (size // scale for size in image.shape)
+    largest = float(np.abs(image).max(initial=0))
+    if largest > 1e30 or 0 < largest < 1e-30:  # squares and sums in single precision
+        image = image / largest
     cells = image[: h * scale, : w * scale].reshape(h, scale, w, scale).mean(axis=(1, 3), dtype=np.float32)
     light = np.sqrt(np.maximum(cells, 0))
     light /= max(float(light.mean()), 1e-30)

@@ -147,7 +147,7 @@ def _check(
 
 
 def _as_images(counts: PhotonCounts) -> bool:
-    """Whether whole images are added: of dense counts with many photons, if float64 holds all sums exactly."""
+    """Whether whole images are added: of dense counts with many photons, if float64 holds all sums."""
     if counts.is_sparse or counts.occupied_share <= DENSE_SHARE:
         return False
     return counts.grid.view_count * LARGEST_COUNT <= 1 << 53 or counts.total <= 1 << 53

@@ -1,0 +1,155 @@
+"""Means and standard deviations of NIST's reference data, with their certified values, through sections.
+
+One datum is one view of one pixel, so that the mean and the variance of a section far away are those of the
+data. Certified values: Statistical Reference Datasets, National Institute of Standards and Technology.
+"""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import count
+from math import log10, sqrt
+
+import numpy as np
+import pytest
+from nist_univariate import LEW, LOTTERY, MAVRO, MICHELSO
+from rational_sections import variance_of
+from twins import unit_grid
+
+import pcii
+from pcii.core.focal_planes import FocalPlanes
+from pcii.sections.photon_statistics import view_samples
+
+FAR_MM = 1e9
+
+
+def alternating(middle: str, low: str, high: str) -> list[str]:
+    return [middle, *[low, high] * 500]
+
+
+def digits_of_pi(number: int) -> list[str]:
+    """By Machin's formula in whole numbers, with twenty digits to spare."""
+    unit = 10 ** (number + 20)
+
+    def arccot(x: int) -> int:
+        total, power = 0, unit // x
+        for n in count(1, 2):
+            if not power:
+                return total
+            total += power // n if n % 4 == 1 else -(power // n)
+            power //= x * x
+        raise AssertionError
+
+    # In two halves: Python refuses to write out more than 4300 digits at once.
+    high, low = divmod(4 * (4 * arccot(5) - arccot(239)) // 10**21, 10 ** (number // 2))
+    return list(f"{high}{low:0{number // 2}}")
+
+
+@dataclass(frozen=True)
+class Certified:
+    """A data set as decimal text, and the 15 certified digits of its mean and standard deviation."""
+
+    data: list[str]
+    mean: float
+    deviation: float
+
+    @property
+    def side(self) -> tuple[int, int]:
+        """Rows and columns of cameras, one for each datum."""
+        rows = next(n for n in range(int(sqrt(len(self.data))), 0, -1) if len(self.data) % n == 0)
+        return rows, len(self.data) // rows
+
+
+def pi_as_certified() -> list[str]:
+    """The first 5000 digits of pi as NIST has them: with a 3 in place of one 8.
+
+    Their certified sum is 22 674 and their sum of squares 143 922; those of pi are 5 and 55 more, which one
+    such digit explains. Its place changes neither the mean nor the deviation.
+    """
+    digits = digits_of_pi(5000)
+    digits[digits.index("8")] = "3"
+    return digits
+
+
+SETS = {
+    "PiDigits": Certified(pi_as_certified(), 4.53480000000000, 2.86733906028871),
+    "Lottery": Certified(LOTTERY.split(), 518.958715596330, 291.699727470969),
+    "Lew": Certified(LEW.split(), -177.435000000000, 277.332168044316),
+    "Mavro": Certified(MAVRO.split(), 2.00185600000000, 0.000429123454003053),
+    "Michelso": Certified(MICHELSO.split(), 299.852400000000, 0.0790105478190518),
+    "NumAcc1": Certified(["10000001", "10000003", "10000002"], 10000002, 1),
+    "NumAcc2": Certified(alternating("1.2", "1.1", "1.3"), 1.2, 0.1),
+    "NumAcc3": Certified(alternating("1000000.2", "1000000.1", "1000000.3"), 1000000.2, 0.1),
+    "NumAcc4": Certified(alternating("10000000.2", "10000000.1", "10000000.3"), 10000000.2, 0.1),
+}
+IN_FLOAT32 = ("PiDigits", "Lottery", "Lew", "NumAcc1")
+"""Whole numbers below 2^24. Of the others float32 holds seven digits, of which a mean of 10^7 takes all."""
+COUNTED = ("PiDigits", "Lottery", "NumAcc1")
+"""What photons can be: whole numbers of at least 0."""
+
+
+def digits(found: float, certified: float) -> float:
+    """Number of correct decimal digits, at most 15: the logarithm of the relative error."""
+    return 15.0 if found == certified else min(15.0, -log10(abs(found / certified - 1)))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_data_are_the_certified_ones(name: str) -> None:
+    """As fractions they have the certified values to all digits; a datum mistyped would show."""
+    certified = SETS[name]
+    data = [Fraction(text) for text in certified.data]
+    assert digits(float(sum(data) / len(data)), certified.mean) > 14
+    assert digits(sqrt(variance_of(data)), certified.deviation) > 14
+
+
+@pytest.mark.parametrize("subpixel", [1, 3])
+@pytest.mark.parametrize(("name", "dtype"), [(n, "f8") for n in SETS] + [(n, "f4") for n in IN_FLOAT32])
+def test_sections_of_radiance(name: str, dtype: str, subpixel: int) -> None:
+    """The data as float64 differ from the decimal ones by 2e-9 of NumAcc4's deviation, which leaves 8 digits."""
+    certified = SETS[name]
+    grid = unit_grid(*certified.side, 1, 1)
+    light = np.array(certified.data, dtype=np.float64).astype(dtype).reshape(*grid.shape_KLHW, 1)
+    # With 3 subpixels the centre of a pixel is in the middle of the middle voxel.
+    sections = pcii.reconstruct(pcii.Views(light, grid), FAR_MM, subpixel=subpixel, variance=True)
+    assert sections.variance is not None
+    middle = (0, subpixel // 2, subpixel // 2, 0)
+    single = sections.counts.dtype == np.float32  # results are rounded to it once
+    assert digits(sections.estimate[middle], certified.mean) > (7 if single else 14)
+    least = 7 if single else {"NumAcc3": 8.5, "NumAcc4": 8.0}.get(name, 11.5)
+    assert digits(float(np.sqrt(sections.variance[middle], dtype=np.float64)), certified.deviation) > least
+
+
+@pytest.mark.parametrize("name", COUNTED)
+@pytest.mark.parametrize("dense", [True, False])
+def test_sections_of_photons(name: str, dense: bool) -> None:
+    certified = SETS[name]
+    grid = unit_grid(*certified.side, 1, 1)
+    film = np.array(certified.data, dtype=np.int64).reshape(grid.shape_KLHW)
+    k, l, i, j = np.nonzero(film)
+    counts = (
+        pcii.PhotonCounts.from_dense(film, grid)
+        if dense
+        else pcii.PhotonCounts.from_events(k, l, i, j, film[k, l, i, j], grid)
+    )
+    sections = pcii.reconstruct(counts, FAR_MM, variance=True)
+    assert sections.variance is not None
+    assert digits(sections.estimate.item(), certified.mean) > 14
+    assert digits(sqrt(sections.variance.item()), certified.deviation) > 14
+
+
+@pytest.mark.parametrize("name", ["Lottery", "NumAcc1"])
+def test_samples_of_views(name: str) -> None:
+    """Of samples that are not 0, which these are."""
+    certified = SETS[name]
+    grid = unit_grid(*certified.side, 1, 1)
+    counts = pcii.PhotonCounts.from_dense(np.array(certified.data, int).reshape(grid.shape_KLHW), grid)
+    found = view_samples(counts, FocalPlanes.at_depths(grid, FAR_MM), 0, cell_px=1, window_cells=1)
+    assert found.number.item() == len(certified.data)
+    assert digits(found.mean.item(), certified.mean) > 14
+    assert digits(sqrt(found.variance.item()), certified.deviation) > 14
+
+
+def test_the_textbook_formula_would_fail() -> None:
+    """The fault that these data are made for: mean of squares less square of the mean."""
+    data = np.array(SETS["NumAcc4"].data, dtype=np.float64)
+    textbook = (np.sum(data**2) - data.size * data.mean() ** 2) / (data.size - 1)
+    assert digits(sqrt(max(textbook, 0)), 0.1) < 3

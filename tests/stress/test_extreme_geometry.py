@@ -1,0 +1,175 @@
+"""Films of 1 x 1 to 8192 x 8192, 1 to 400 cameras, depths from below a micrometre to beyond the stars."""
+
+import json
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+from twins import section_twin, unit_grid
+
+import pcii
+from pcii.core.geometry import total_disparity_px
+
+RANGE_MM = (300.0, 900.0)
+
+
+def grid_of(rows: int, cols: int, height: int, width: int) -> pcii.CameraGrid:
+    return pcii.CameraGrid(
+        rows=rows, cols=cols, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.25, height=height, width=width
+    )
+
+
+def sparse(grid: pcii.CameraGrid, photons: int, cfa: str | None = None) -> pcii.PhotonCounts:
+    rng = np.random.default_rng(0)
+    k, l, i, j = (rng.integers(0, size, photons) for size in grid.shape_KLHW)
+    return pcii.PhotonCounts.from_events(k, l, i, j, np.ones(photons, int), grid, cfa=cfa)
+
+
+@pytest.mark.parametrize("cfa", [None, "BGGR"])
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 1), (1, 17), (3, 3), (8, 8), (13, 64)])
+def test_every_method_answers_on_films_of_any_size(size: tuple[int, int], cfa: str | None) -> None:
+    grid = grid_of(2, 3, *size)
+    counts = pcii.PhotonCounts.from_dense(np.random.default_rng(1).poisson(2, grid.shape_KLHW), grid, cfa=cfa)
+    for method in pcii.removal_methods():
+        focus = pcii.segment(counts, [400.0, 500.0], method=method)
+        assert focus.in_focus.shape == (2, *size)
+        assert np.isfinite(focus.cleaned).all()
+    for method in pcii.depth_methods(counts):
+        depth = pcii.estimate_depth(counts, RANGE_MM, method=method)
+        check_depth(depth, size)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 1), (1, 17), (5, 3)])
+@pytest.mark.parametrize("method", pcii.depth_methods(pcii.Views(np.ones((1, 1, 1, 1, 1)), unit_grid(1, 1, 1, 1))))
+def test_depth_of_radiance_answers_on_films_of_any_size(size: tuple[int, int], method: str) -> None:
+    grid = grid_of(2, 3, *size)
+    light = np.random.default_rng(2).uniform(0, 1, (*grid.shape_KLHW, 3))
+    check_depth(pcii.estimate_depth(pcii.Views(light, grid), RANGE_MM, method=method), size)
+
+
+def check_depth(depth: pcii.DepthMap, size: tuple[int, int]) -> None:
+    """NaN where there is no depth, and nowhere else."""
+    assert depth.z_mm.shape == size
+    answered = np.isfinite(depth.z_mm)
+    assert (np.isnan(depth.z_mm) | answered).all()
+    slack = 1 + 1e-9
+    assert (depth.z_mm[answered] >= RANGE_MM[0] / slack).all()
+    assert (depth.z_mm[answered] <= RANGE_MM[1] * slack).all()
+    assert np.isfinite(depth.confidence).all()
+    assert (depth.confidence[~answered] == 0).all()
+
+
+@pytest.mark.parametrize("cameras", [(1, 1), (1, 2), (2, 1), (1, 20), (20, 1), (20, 20)])
+def test_sections_of_any_number_of_cameras_are_eq_3(cameras: tuple[int, int]) -> None:
+    grid = unit_grid(*cameras, 3, 2, (0.37, 0.61))
+    film = np.random.default_rng(3).poisson(1.0, grid.shape_KLHW)
+    z_mm = [0.5, 2.0]
+    total, coverage = section_twin(film, grid, "RGGB", z_mm, 1)
+    sections = pcii.reconstruct(pcii.PhotonCounts.from_dense(film, grid, cfa="RGGB"), z_mm, variance=True)
+    np.testing.assert_array_equal(sections.counts, total)
+    np.testing.assert_array_equal(sections.coverage, coverage)
+
+
+@pytest.mark.parametrize("z_mm", [1e-3, 1.0, 1e3, 1e7, 1e100, 1.7e308])
+@pytest.mark.parametrize("subpixel", [1, 3])
+def test_no_depth_makes_photons_or_loses_those_that_stay(z_mm: float, subpixel: int) -> None:
+    grid = grid_of(3, 3, 6, 7)
+    counts = sparse(grid, 200)
+    sections = pcii.reconstruct(counts, z_mm, subpixel=subpixel)
+    if z_mm >= 1e7:  # no view shifts by half a voxel
+        assert sections.counts.sum() == 200
+    if z_mm <= 1:  # all views but the middle one leave the film
+        assert sections.counts.sum() == counts.view(1, 1).sum()
+    assert np.isfinite(sections.estimate).all()
+
+
+@pytest.mark.parametrize("z_mm", [0, -0.0, -1, -1e300, np.nan, np.inf, -np.inf, [500, 0], [], "near", None])
+def test_what_is_no_depth_is_refused(z_mm: object) -> None:
+    counts = sparse(grid_of(2, 2, 4, 4), 5)
+    for make in (pcii.reconstruct, pcii.segment):
+        with pytest.raises(pcii.InputError, match="^z_mm: "):
+            make(counts, z_mm)
+    with pytest.raises(pcii.InputError, match="^z_(range_)?mm: "):
+        pcii.estimate_depth(counts, (z_mm, 600.0))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("z_mm", [5e-324, 1e-320, 1e-300, 1e-9, 1.0, 1e300, 1.7e308])
+@pytest.mark.parametrize("pixel_mm", [5e-324, 1e-300, 0.05, 1e300])
+@pytest.mark.parametrize("length_mm", [1e-300, 5.0, 1e300])
+@pytest.mark.parametrize("cameras", [1, 2])
+def test_lengths_whose_products_no_number_holds_are_refused_or_right(
+    z_mm: float, pixel_mm: float, length_mm: float, cameras: int
+) -> None:
+    grid = pcii.CameraGrid(
+        rows=1,
+        cols=cameras,
+        pitch_mm=(length_mm, length_mm),
+        focal_mm=length_mm,
+        pixel_mm=pixel_mm,
+        height=2,
+        width=3,
+    )
+    total_disparity_px(grid, z_mm)  # without a warning
+    counts = sparse(grid, 10)
+    try:
+        section = pcii.reconstruct(counts, z_mm)
+    except pcii.InputError as fault:
+        assert str(fault).startswith("z_mm: ")  # noqa: PT017
+        return
+    assert section.counts.sum() <= 10
+    assert np.isfinite(section.planes.total_disparity_px).all()
+
+
+def test_numbers_of_numpy_s_small_types_do_not_overflow() -> None:
+    """100 x 100 cameras are more than int8 holds, and float16 has three digits."""
+    grid = pcii.CameraGrid(
+        rows=np.int8(100),  # type: ignore[arg-type]
+        cols=np.int8(100),  # type: ignore[arg-type]
+        pitch_mm=(np.float16(5.0), np.float16(5.0)),  # type: ignore[arg-type]
+        focal_mm=np.float16(1000.0),  # type: ignore[arg-type]
+        pixel_mm=np.float16(0.5),  # type: ignore[arg-type]
+        height=np.uint8(200),  # type: ignore[arg-type]
+        width=np.uint8(200),  # type: ignore[arg-type]
+    )
+    assert grid.view_count == 10_000
+    assert total_disparity_px(grid, 123.0) == pytest.approx(99 * 1000 * 5 / (123 * 0.5), rel=1e-15)
+    assert json.loads(json.dumps(asdict(grid)))["rows"] == 100
+
+
+@pytest.mark.parametrize("z_range_mm", [(0.0, 900.0), (-5.0, 900.0), (900.0, 300.0), (np.nan, 900.0)])
+def test_the_check_of_a_grid_refuses_what_is_no_range(z_range_mm: tuple[float, float]) -> None:
+    with pytest.raises(pcii.InputError, match="^z_range_mm: "):
+        pcii.check_grid(lambda k, l: np.ones((32, 32)), grid_of(3, 3, 32, 32), z_range_mm)
+
+
+@pytest.mark.parametrize("value", [0.0, 5e-324, 1e-40, 1e40, 1.7e308, -1e300])
+def test_the_check_of_a_grid_takes_light_of_any_size(value: float) -> None:
+    texture = np.random.default_rng(4).uniform(0.5, 1.0, (3, 3, 32, 32))
+    found = [
+        pcii.check_grid(lambda k, l, u=unit: texture[k, l] * u, grid_of(3, 3, 32, 32), RANGE_MM)
+        for unit in (value, 1.0)
+    ]
+    if value > 1e-300:  # a number of one bit has no texture
+        assert found[0] == found[1]
+    with pytest.raises(pcii.InputError, match=r"^view: view \(0, 0\) holds NaN"):
+        pcii.check_grid(lambda k, l: np.full((32, 32), np.nan), grid_of(3, 3, 32, 32))
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("side", [1024, 4096, 8192])
+@pytest.mark.parametrize("cfa", [None, "GRBG"])
+def test_the_largest_films_keep_every_photon(side: int, cfa: str | None) -> None:
+    """2 x 2 views of up to 8192 x 8192 pixels hold a million photons, of which none shifts out at infinity."""
+    counts = sparse(grid_of(2, 2, side, side), 1_000_000, cfa)
+    for z_mm, least in ((1e9, 1_000_000), (500.0, 990_000)):
+        sections = pcii.reconstruct(counts, z_mm)
+        assert least <= int(sections.counts.sum(dtype=np.int64)) <= 1_000_000
+
+
+@pytest.mark.stress
+def test_20_x_20_cameras_of_a_thousand_pixels() -> None:
+    grid = grid_of(20, 20, 1024, 1024)
+    counts = sparse(grid, 400_000, "GRBG")
+    assert int(pcii.reconstruct(counts, 1e9).counts.sum(dtype=np.int64)) == 400_000
+    focus = pcii.segment(counts, [400.0, 500.0], method="three-step")
+    assert focus.in_focus.shape == (2, 1024, 1024)

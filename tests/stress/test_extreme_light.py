@@ -1,0 +1,254 @@
+"""Radiance of any size: black, faint, bright, too bright, no number; values are right, or refused by name."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from rational_sections import samples_of, variance_of
+from twins import blocky_texture, patch_views, unit_grid
+
+import pcii
+from pcii.core.images import binary_scale
+from pcii.sections.photon_statistics import entropy_bits
+
+FAR_MM = 1e6  # no view shifts
+GRID = unit_grid(2, 2, 4, 4)
+OPTICS = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
+MODES: list[dict[str, Any]] = [
+    {},
+    {"variance": True},
+    {"shifts": "bilinear"},
+    {"subpixel": 2},
+    {"subpixel": 2, "variance": True},
+]
+
+
+def constant(value: float, dtype: type = np.float64, channels: int = 1) -> pcii.Views:
+    return pcii.Views(np.full((*GRID.shape_KLHW, channels), value, dtype), GRID)
+
+
+def all_arrays(sections: pcii.Sections) -> list[np.ndarray]:
+    made = [sections.counts, sections.estimate, sections.coverage]
+    return made if sections.variance is None else [*made, sections.variance]
+
+
+@pytest.mark.parametrize("options", MODES)
+@pytest.mark.parametrize(
+    ("value", "dtype"),
+    [
+        (0.0, np.float32),
+        (5e-324, np.float64),  # the smallest numbers above 0, which have one bit
+        (1e-45, np.float32),
+        (6e-8, np.float16),
+        (1e-300, np.float64),
+        (-3.0, np.float32),
+        (65504.0, np.float16),
+        (1e30, np.float32),
+        (1e300, np.float64),
+        (2**53 - 1, np.int64),
+    ],
+)
+def test_a_constant_film_is_that_constant(value: float, dtype: type, options: dict[str, Any]) -> None:
+    sections = pcii.reconstruct(constant(value, dtype), FAR_MM, **options)
+    reached = sections.coverage > 0
+    single = sections.counts.dtype == np.float32
+    kept = np.float64(np.asarray(value, dtype))
+    # Shares of bilinear shifts are not binary fractions, and float32 rounds the sum.
+    tolerance = 1e-6 if single else 1e-15
+    np.testing.assert_allclose(sections.estimate[reached], kept, rtol=tolerance, atol=1e-323)
+    assert (sections.estimate[~reached] == 0).all()
+    assert sections.variance is None or (sections.variance == 0).all()
+    assert all(np.isfinite(array).all() for array in all_arrays(sections))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("options", MODES)
+@pytest.mark.parametrize("z_mm", [FAR_MM, 0.2])  # where it is seen, and where it falls outside
+def test_what_is_no_number_is_refused_wherever_it_is(
+    value: float, options: dict[str, Any], z_mm: float
+) -> None:
+    for pixel in ((0, 0, 0, 0), (1, 1, 3, 3), (0, 1, 2, 1)):
+        light = np.ones((*GRID.shape_KLHW, 1), np.float32)
+        light[pixel] = value
+        with pytest.raises(pcii.InputError, match=r"^radiance: view \(\d, \d\) holds NaN or infinity"):
+            pcii.reconstruct(pcii.Views(light, GRID), z_mm, **options)
+    with pytest.raises(pcii.InputError, match="^radiance: "):
+        pcii.limit_photons(pcii.Views(light, GRID), 10, seed=0)
+
+
+@pytest.mark.parametrize("options", MODES)
+@pytest.mark.parametrize(("value", "dtype"), [(3e38, np.float32), (1.7e308, np.float64)])
+def test_sums_that_no_number_holds_are_refused(value: float, dtype: type, options: dict[str, Any]) -> None:
+    views = constant(value, dtype)
+    if options.get("subpixel"):  # no two samples of these views meet, so their sum is one of them
+        assert np.isfinite(pcii.reconstruct(views, 2.0, **options).counts).all()
+        return
+    with pytest.raises(pcii.InputError, match=r"^radiance: values are too large for their sum"):
+        pcii.reconstruct(views, FAR_MM, **options)
+
+
+@pytest.mark.parametrize("subpixel", [1, 2])
+@pytest.mark.parametrize(("value", "dtype"), [(1e30, np.float32), (1e200, np.float64)])
+def test_variances_that_no_number_holds_are_refused(value: float, dtype: type, subpixel: int) -> None:
+    """Sums are finite, squares are not: infinity must not be stored."""
+    if subpixel == 2 and dtype is np.float32:
+        pytest.skip("fine voxels are made in double precision")
+    grid = unit_grid(3, 3, 4, 4)  # on fine voxels the samples of the last two rows of cameras meet
+    light = np.zeros((*grid.shape_KLHW, 1), dtype)
+    light[1] = value
+    views = pcii.Views(light, grid)
+    assert np.isfinite(pcii.reconstruct(views, FAR_MM, subpixel=subpixel).counts).all()
+    with pytest.raises(pcii.InputError, match=r"^radiance: values are too large for .*variance"):
+        pcii.reconstruct(views, FAR_MM, subpixel=subpixel, variance=True)
+
+
+def test_a_variance_just_below_the_largest_number_is_right() -> None:
+    """100 samples of which half are 1e152: the square of their sum is infinite, the variance is not."""
+    grid = unit_grid(10, 10, 1, 1)
+    light = np.zeros((10, 10, 1, 1, 1))
+    light[:5] = 1e153
+    for radiance in (light, Reader(light)):
+        sections = pcii.reconstruct(pcii.Views(radiance, grid), FAR_MM, variance=True)
+        assert sections.variance is not None
+        np.testing.assert_allclose(sections.variance.item(), 25 / 99 * 1e306, rtol=1e-12)
+
+
+class Reader:
+    """Views that are read one by one, as from disk."""
+
+    def __init__(self, images: np.ndarray) -> None:
+        self.images, self.shape, self.dtype = images, images.shape, images.dtype
+
+    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+        return self.images[index]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("cfa", [None, "GRBG"])
+@pytest.mark.parametrize("ratio", [1e6, 1e9, 1e12])
+def test_one_pixel_may_be_10_to_the_12_times_as_bright(ratio: float, cfa: str | None, dtype: type) -> None:
+    """Each sum is that of fractions within the roundings of its own samples: no bright neighbour leaks."""
+    grid = unit_grid(3, 2, 6, 5, (0.8, 1.4))
+    light = np.random.default_rng(4).uniform(0.5, 1.5, (*grid.shape_KLHW, 1)).astype(dtype)
+    light[:, :, 3, 2] *= dtype(ratio)
+    sections = pcii.reconstruct(pcii.Views(light, grid, cfa), 1.0, variance=True)
+    assert sections.variance is not None
+    ulp = float(np.finfo(dtype).eps)
+    for where, samples in samples_of(light, grid, 1.0, cfa=cfa).items():
+        np.testing.assert_allclose(sections.counts[0][where], float(sum(samples)), rtol=4 * ulp)
+        exact = float(variance_of(samples))
+        np.testing.assert_allclose(sections.variance[0][where], exact, rtol=8 * ulp, atol=1e-25)
+
+
+@pytest.mark.parametrize("magnitude", [1e6, 1e7, 1e8])
+@pytest.mark.parametrize("subpixel", [1, 2])
+def test_variance_survives_a_mean_of_millions_of_standard_deviations(magnitude: float, subpixel: int) -> None:
+    """A one-pass formula is off by the square of the ratio: even double precision would lose it at 10^8."""
+    grid = unit_grid(5, 4, 2, 2)
+    light = magnitude + np.random.default_rng(5).standard_normal((*grid.shape_KLHW, 1))
+    sections = pcii.reconstruct(pcii.Views(light, grid), FAR_MM, subpixel=subpixel, variance=True)
+    assert sections.variance is not None
+    for where, samples in samples_of(light, grid, FAR_MM, subpixel=subpixel).items():
+        np.testing.assert_allclose(sections.variance[0][where], float(variance_of(samples)), rtol=1e-13)
+
+
+# Photons of light
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("value", "dtype"),
+    [(1, np.int32), (2**62, np.int64), (5e-324, np.float64), (1e-45, np.float32), (1e300, np.float64)],
+)
+def test_photons_do_not_depend_on_the_unit_of_light(value: float, dtype: type, channels: int) -> None:
+    expected = pcii.limit_photons(constant(1.0, channels=channels), 1000, seed=6)
+    found = pcii.limit_photons(constant(value, dtype, channels), 1000, seed=6)
+    assert abs(found.total - expected.total) <= 2  # a rate may be rounded over a Poisson step
+    assert abs(found.total - 4000) < 5 * np.sqrt(4000)
+
+
+def test_luminance_of_whole_numbers_is_not_cut_off() -> None:
+    """Red light of 1 has a luminance of 0.2126, which was cut off to 0: no photons at all."""
+    light = np.zeros((*GRID.shape_KLHW, 3), np.int64)
+    light[..., 0] = 1
+    assert pcii.limit_photons(pcii.Views(light, GRID), 1000, seed=7).total > 3000
+
+
+def test_black_views_have_no_photons_and_bright_ones_are_refused() -> None:
+    assert pcii.limit_photons(constant(0.0), 1e12, seed=8).total == 0
+    with pytest.raises(pcii.InputError, match=r"^radiance: .*more light than can be added up"):
+        pcii.limit_photons(constant(1.7e308), 10, seed=8)
+    with pytest.raises(pcii.InputError, match=r"^radiance: view \(0, 0\) holds light below 0"):
+        pcii.limit_photons(constant(-1.0), 10, seed=8)
+
+
+# Pictures
+
+
+@pytest.mark.parametrize("encoding", ["srgb", "linear", 2.2, 10.0])
+@pytest.mark.parametrize(("value", "dtype"), [(6e4, np.float16), (3e38, np.float32), (1e300, np.float64)])
+def test_imported_light_is_finite_or_refused(value: float, dtype: type, encoding: Any) -> None:
+    numbers = np.full((1, 2, 2, 2), value, dtype)
+    try:
+        light = pcii.import_arrays(numbers, OPTICS, encoding=encoding).radiance
+    except pcii.InputError as fault:
+        assert "too bright for float32" in str(fault)  # noqa: PT017
+        return
+    assert np.isfinite(np.asarray(light)).all()
+
+
+def test_srgb_has_a_value_for_every_number() -> None:
+    numbers = np.array([-1e300, -1.0, -0.0, 5e-324, 1.0, 2.0, 1e300, np.inf])
+    linear = pcii.srgb_to_linear(numbers)
+    assert (linear[1:] >= linear[:-1]).all()
+    assert linear[1] == -1 / 12.92
+    assert np.isinf(linear[-2:]).all()
+    assert np.isnan(pcii.srgb_to_linear(np.array([np.nan]))).all()
+
+
+@pytest.mark.parametrize("method", ["laroche-prescott", "bilinear", "malvar", "menon"])
+@pytest.mark.parametrize("value", [0.0, 5e-324, 1e12, 1e300, 1.7e308, -5.0])
+@pytest.mark.parametrize("shape", [(2, 2), (2, 9), (5, 4)])
+def test_demosaicing_gives_finite_colours_or_refuses(
+    method: str, value: float, shape: tuple[int, int]
+) -> None:
+    raw = np.full(shape, value)
+    try:
+        image = pcii.demosaic(raw, method=method)
+    except pcii.InputError as fault:
+        assert str(fault).startswith("mosaic: values are too large")  # noqa: PT017
+        assert value > 1e307
+        return
+    np.testing.assert_allclose(image, value, rtol=1e-12, atol=1e-322)
+
+
+@pytest.mark.parametrize("top", [5e-324, 1e-300, 1.0, 1e308])
+def test_entropy_knows_no_unit(top: float) -> None:
+    values = np.array([0.0, 0.0, top, top])
+    assert entropy_bits(values, top) == 1.0
+
+
+# Depth does not depend on the unit of radiance
+
+
+@pytest.mark.parametrize("method", ["posterior", "structure-tensor"])
+@pytest.mark.parametrize("exponent", [-1000, -120, -40, 40, 120, 960])
+def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: int) -> None:
+    grid = unit_grid(3, 3, 32, 32, (4.0, 4.0))
+    light = patch_views(blocky_texture(np.random.default_rng(9), 32, 32), 0, 0, 2, grid) + 0.1
+    if method == "posterior":  # of which it makes variances, and so squares
+        exponent = int(np.clip(exponent, -400, 400))
+    plain, scaled = (
+        pcii.estimate_depth(pcii.Views(light * unit, grid), (1.0, 4.0), method=method)
+        for unit in (2.0**30, 2.0**exponent)
+    )
+    assert np.isfinite(plain.z_mm).any()
+    np.testing.assert_array_equal(np.isfinite(plain.z_mm), np.isfinite(scaled.z_mm))
+    np.testing.assert_allclose(plain.z_mm, scaled.z_mm, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("value", "scale"), [(0, 1), (1, 1), (-1, 1), (2.0**30, 2.0**31), (1.7e308, 2.0**1023), (5e-324, 2.0**-1073)]
+)
+def test_scales_are_powers_of_two_and_never_zero(value: float, scale: float) -> None:
+    assert binary_scale(constant(value)) == scale

@@ -1,0 +1,143 @@
+"""From no photon to 10^12 per view, and to the last photon that 64 bits hold: sums are exact, or refused."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from rational_sections import samples_of, variance_of
+from twins import even_light, unit_grid
+
+import pcii
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.photon_counts import LARGEST_COUNT
+from pcii.sections.photon_statistics import view_samples
+
+BUDGETS = [0, *(10**power for power in range(13))]
+
+
+def film_of(budget: int, shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
+    """Exactly so many photons in each view, wherever they fall."""
+    K, L, H, W = shape
+    rng = np.random.default_rng(seed)
+    return rng.multinomial(budget, np.full(H * W, 1 / (H * W)), (K, L)).reshape(shape)
+
+
+def as_events(film: np.ndarray, grid: pcii.CameraGrid, cfa: str | None = None) -> pcii.PhotonCounts:
+    k, l, i, j = np.nonzero(film)
+    return pcii.PhotonCounts.from_events(k, l, i, j, film[k, l, i, j], grid, cfa=cfa)
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("cfa", [None, "GRBG"])
+def test_sums_of_any_budget_are_those_of_python_integers(budget: int, cfa: str | None) -> None:
+    grid = unit_grid(2, 3, 5, 4, (1.3, 0.7))
+    film = film_of(budget, grid.shape_KLHW)
+    expected = samples_of(film[..., None], grid, 1.1, cfa=cfa)
+    for counts in (pcii.PhotonCounts.from_dense(film, grid, cfa=cfa), as_events(film, grid, cfa)):
+        assert counts.total == budget * grid.view_count
+        sections = pcii.reconstruct(counts, 1.1)
+        assert sections.counts.sum(dtype=object) == sum(sum(each) for each in expected.values())
+        for where, samples in expected.items():
+            assert int(sections.counts[0][where]) == sum(samples)
+            assert sections.coverage[0][where] == len(samples)
+            assert sections.estimate[0][where] == float(sum(samples) / len(samples))
+        assert np.isfinite(sections.estimate).all()
+
+
+@pytest.mark.parametrize("budget", BUDGETS[:8])
+def test_variances_of_counts_are_exact(budget: int) -> None:
+    grid = unit_grid(3, 2, 4, 4, (0.9, 1.6))
+    film = film_of(budget, grid.shape_KLHW)
+    sections = pcii.reconstruct(pcii.PhotonCounts.from_dense(film, grid), 1.0, variance=True)
+    assert sections.variance is not None
+    for where, samples in samples_of(film[..., None], grid, 1.0).items():
+        # One rounding of each of numerator and denominator, and of the quotient.
+        np.testing.assert_allclose(sections.variance[0][where], float(variance_of(samples)), rtol=5e-16)
+
+
+@pytest.mark.parametrize("count", [10**10, LARGEST_COUNT])
+def test_variances_that_64_bits_cannot_make_exactly_are_refused(count: int) -> None:
+    grid = unit_grid(2, 2, 2, 2)
+    counts = pcii.PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid)
+    with pytest.raises(pcii.InputError, match=r"^variance: the counts are too large"):
+        pcii.reconstruct(counts, 10.0, variance=True)
+
+
+def test_more_than_2_to_the_53_photons_of_a_voxel_are_counted_to_the_last() -> None:
+    """10 000 views of 2^40 - 1 photons each: double precision would miss 1808 of them."""
+    grid = unit_grid(100, 100, 1, 1)
+    counts = pcii.PhotonCounts.from_dense(np.full(grid.shape_KLHW, LARGEST_COUNT - 1), grid)
+    assert int(pcii.reconstruct(counts, 1e6).counts[0, 0, 0, 0]) == 10_000 * (LARGEST_COUNT - 1)
+
+
+def test_a_pixel_holds_2_to_the_40_photons_however_they_come() -> None:
+    grid, zero = unit_grid(1, 1, 1, 1), [0, 0]
+    most = pcii.PhotonCounts.from_events(zero, zero, zero, zero, [LARGEST_COUNT - 1, 1], grid)
+    assert most.total == LARGEST_COUNT
+    with pytest.raises(pcii.InputError, match=r"^n: more than 2\^40 photons in a pixel"):
+        pcii.PhotonCounts.from_events(zero, zero, zero, zero, [LARGEST_COUNT, 1], grid)
+    with pytest.raises(pcii.InputError, match=r"^counts: more than 2\^40 photons in a pixel"):
+        pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), LARGEST_COUNT + 1), grid)
+
+
+@pytest.mark.parametrize("number", [-1, 0.5, np.nan, np.inf, -np.inf, 1e300])
+def test_what_is_no_number_of_photons_is_refused(number: float) -> None:
+    grid = unit_grid(1, 1, 1, 1)
+    with pytest.raises(pcii.InputError, match="^counts: "):
+        pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), number), grid)
+    with pytest.raises(pcii.InputError, match="^n: "):
+        pcii.PhotonCounts.from_events([0], [0], [0], [0], [number], grid)
+
+
+@pytest.mark.parametrize("most", [-1, np.nan, -np.inf])
+def test_fewer_than_no_photons_cannot_be_kept(most: float) -> None:
+    with pytest.raises(pcii.InputError, match="^most: "):
+        even_light(unit_grid(1, 1, 4, 4), 1.0, seed=0).subsample(most, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint32, np.uint64, np.float32, ">i4"])
+def test_counts_of_every_type_are_the_same(dtype: object) -> None:
+    grid = unit_grid(2, 2, 3, 3)
+    film = np.random.default_rng(1).integers(0, 100, grid.shape_KLHW)
+    optics = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
+    same = np.asarray(film).astype(dtype)  # type: ignore[arg-type]
+    for counts in (pcii.PhotonCounts.from_dense(same, grid), pcii.import_counts(same, optics)):
+        assert counts.total == film.sum()
+        np.testing.assert_array_equal(
+            pcii.reconstruct(counts, 1.0).counts,
+            pcii.reconstruct(pcii.PhotonCounts.from_dense(film, grid), 1.0).counts,
+        )
+
+
+@pytest.mark.parametrize("level", [10**3, 10**6, 10**9, 10**12])
+def test_the_variance_over_views_does_not_lose_the_noise_of_bright_windows(level: int) -> None:
+    """Squares of 16 pixels of 10^12 photons are 10^26: added up in 64 bits they would be noise."""
+    grid = unit_grid(3, 3, 4, 4)
+    film = np.random.default_rng(2).poisson(level, grid.shape_KLHW)
+    counts = pcii.PhotonCounts.from_dense(film, grid)
+    found = view_samples(counts, FocalPlanes.at_depths(grid, 1e6), 0, cell_px=4, window_cells=1)
+    samples = [int(total) for total in film.sum(axis=(2, 3)).ravel()]
+    mean, exact = np.mean(samples), float(variance_of([*map(Fraction, samples)]))
+    assert found.number.item() == 9
+    np.testing.assert_allclose(found.mean.item(), mean, rtol=4e-16)
+    np.testing.assert_allclose(found.variance.item(), exact, rtol=1e-14)
+
+
+@pytest.mark.parametrize("budget", [1e-3, 1.0, 1e3, 1e6, 1e9, 1e12])
+def test_drawn_photons_are_as_many_as_the_budget_says(budget: float) -> None:
+    grid = unit_grid(4, 4, 8, 8)
+    counts = pcii.limit_photons(pcii.Views(np.ones((*grid.shape_KLHW, 3)), grid), budget, seed=3, cfa="RGGB")
+    expected = budget * grid.view_count
+    assert abs(counts.total - expected) <= 5 * np.sqrt(expected) + 1  # five standard deviations
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("budget", [10**3, 10**6, 10**9, 10**12])
+def test_sums_of_the_paper_s_cameras_are_exact(budget: int) -> None:
+    """All photons of 10 x 10 views of 512 x 512 arrive where views do not shift, at any budget."""
+    grid = unit_grid(10, 10, 512, 512)
+    film = film_of(budget, grid.shape_KLHW)
+    counts = pcii.PhotonCounts.from_dense(film, grid, cfa="GRBG")
+    sections = pcii.reconstruct(counts, 1e6)
+    assert int(sections.counts.sum(dtype=np.int64)) == budget * 100
+    np.testing.assert_array_equal(sections.counts[0].sum(axis=-1), film.sum(axis=(0, 1)))
