@@ -77,7 +77,8 @@ stress`.
   / (m (m − 1)) of m samples with the sum S and the sum of squares Q. It is refused where m Q might exceed
   2^63: 100 views of 10 million photons per pixel are fine, and 100 views of 100 million are not.
 * Shifts are whole pixels, from the disparity in double precision; they reach up to 2^31 px.
-* Results are the same to the bit for any number of threads and in any run.
+* Results are the same to the bit for any number of threads and in any run. Radiance that is read from disk
+  in batches is added in another order than that in memory, which may differ in the last bit.
 
 ## Bounded
 

@@ -40,7 +40,9 @@ def test_every_method_answers_on_films_of_any_size(size: tuple[int, int], cfa: s
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 2), (2, 1), (1, 17), (5, 3)])
-@pytest.mark.parametrize("method", pcii.depth_methods(pcii.Views(np.ones((1, 1, 1, 1, 1)), unit_grid(1, 1, 1, 1))))
+@pytest.mark.parametrize(
+    "method", pcii.depth_methods(pcii.Views(np.ones((1, 1, 1, 1, 1)), unit_grid(1, 1, 1, 1)))
+)
 def test_depth_of_radiance_answers_on_films_of_any_size(size: tuple[int, int], method: str) -> None:
     grid = grid_of(2, 3, *size)
     light = np.random.default_rng(2).uniform(0, 1, (*grid.shape_KLHW, 3))
@@ -87,9 +89,9 @@ def test_no_depth_makes_photons_or_loses_those_that_stay(z_mm: float, subpixel: 
 def test_what_is_no_depth_is_refused(z_mm: object) -> None:
     counts = sparse(grid_of(2, 2, 4, 4), 5)
     for make in (pcii.reconstruct, pcii.segment):
-        with pytest.raises(pcii.InputError, match="^z_mm: "):
+        with pytest.raises(pcii.InputError, match=r"^z_mm: "):
             make(counts, z_mm)
-    with pytest.raises(pcii.InputError, match="^z_(range_)?mm: "):
+    with pytest.raises(pcii.InputError, match=r"^z_(range_)?mm: "):
         pcii.estimate_depth(counts, (z_mm, 600.0))  # type: ignore[arg-type]
 
 
@@ -138,7 +140,7 @@ def test_numbers_of_numpy_s_small_types_do_not_overflow() -> None:
 
 @pytest.mark.parametrize("z_range_mm", [(0.0, 900.0), (-5.0, 900.0), (900.0, 300.0), (np.nan, 900.0)])
 def test_the_check_of_a_grid_refuses_what_is_no_range(z_range_mm: tuple[float, float]) -> None:
-    with pytest.raises(pcii.InputError, match="^z_range_mm: "):
+    with pytest.raises(pcii.InputError, match=r"^z_range_mm: "):
         pcii.check_grid(lambda k, l: np.ones((32, 32)), grid_of(3, 3, 32, 32), z_range_mm)
 
 
@@ -159,7 +161,7 @@ def test_the_check_of_a_grid_takes_light_of_any_size(value: float) -> None:
 @pytest.mark.parametrize("side", [1024, 4096, 8192])
 @pytest.mark.parametrize("cfa", [None, "GRBG"])
 def test_the_largest_films_keep_every_photon(side: int, cfa: str | None) -> None:
-    """2 x 2 views of up to 8192 x 8192 pixels hold a million photons, of which none shifts out at infinity."""
+    """2 x 2 views of up to 8192 x 8192 pixels hold a million photons; none shifts out at infinity."""
     counts = sparse(grid_of(2, 2, side, side), 1_000_000, cfa)
     for z_mm, least in ((1e9, 1_000_000), (500.0, 990_000)):
         sections = pcii.reconstruct(counts, z_mm)

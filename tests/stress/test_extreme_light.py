@@ -72,7 +72,7 @@ def test_what_is_no_number_is_refused_wherever_it_is(
         light[pixel] = value
         with pytest.raises(pcii.InputError, match=r"^radiance: view \(\d, \d\) holds NaN or infinity"):
             pcii.reconstruct(pcii.Views(light, GRID), z_mm, **options)
-    with pytest.raises(pcii.InputError, match="^radiance: "):
+    with pytest.raises(pcii.InputError, match=r"^radiance: "):
         pcii.limit_photons(pcii.Views(light, GRID), 10, seed=0)
 
 
@@ -248,7 +248,8 @@ def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: in
 
 
 @pytest.mark.parametrize(
-    ("value", "scale"), [(0, 1), (1, 1), (-1, 1), (2.0**30, 2.0**31), (1.7e308, 2.0**1023), (5e-324, 2.0**-1073)]
+    ("value", "scale"),
+    [(0, 1), (1, 1), (-1, 1), (2.0**30, 2.0**31), (1.7e308, 2.0**1023), (5e-324, 2.0**-1073)],
 )
 def test_scales_are_powers_of_two_and_never_zero(value: float, scale: float) -> None:
     assert binary_scale(constant(value)) == scale

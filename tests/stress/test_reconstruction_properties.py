@@ -1,0 +1,356 @@
+"""Properties of sections, photons, light and scores, for any numbers: see also every other `@given`."""
+
+import statistics
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from camera_grids import grids
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as nst
+from rational_sections import variance_of
+from twins import unit_grid
+
+import pcii
+from pcii.core.arrays import check_z_mm
+from pcii.core.bayer import PATTERNS
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import depth_of_total_disparity_mm, project_px, total_disparity_px
+from pcii.core.photon_limit import photon_rates, scope_energies
+from pcii.core.srgb import linear_to_srgb
+from pcii.evaluation.paired_tests import mean_interval, paired_difference
+from pcii.imaging.mask_outlines import boundary_f, object_share
+from pcii.metrics.agreement import mask_agreement
+from pcii.metrics.depth_accuracy import depth_errors
+from pcii.sections.photon_statistics import cell_sums, cells_to_pixels, view_samples
+
+SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
+DEPTHS = st.floats(0.3, 30)
+SEEDS = st.integers(0, 2**32 - 1)
+ANY_NUMBER = st.one_of(
+    st.floats(), st.integers(-(2**70), 2**70), st.none(), st.booleans(), st.text(max_size=3)
+)
+MASKS = nst.arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12)))
+MOSAICS = nst.arrays(np.float64, st.tuples(st.integers(2, 7), st.integers(2, 7)), elements=st.floats(0, 1e6))
+
+
+def light_of(grid: pcii.CameraGrid, seed: int, channels: int = 1) -> np.ndarray:
+    """Whole numbers, whose sums are exact, some of them 0."""
+    rng = np.random.default_rng(seed)
+    return rng.integers(0, 1 << 20, (*grid.shape_KLHW, channels)).astype(np.float64) * rng.integers(0, 2)
+
+
+def film_of(grid: pcii.CameraGrid, seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return rng.poisson(rng.choice([0.05, 1.0, 1e4]), grid.shape_KLHW)
+
+
+# What is accepted
+
+
+@given(st.lists(ANY_NUMBER, max_size=4))
+def test_depths_are_used_as_they_are_or_refused(values: list[object]) -> None:
+    try:
+        found = check_z_mm(values)
+    except pcii.InputError as fault:
+        assert str(fault).startswith("z_mm: ")  # noqa: PT017
+        return
+    assert np.isfinite(found).all()
+    assert (found > 0).all()
+    np.testing.assert_array_equal(found, [float(value) for value in values])  # type: ignore[arg-type]
+
+
+@given(
+    ANY_NUMBER, ANY_NUMBER, ANY_NUMBER, st.tuples(ANY_NUMBER, ANY_NUMBER), st.tuples(ANY_NUMBER, ANY_NUMBER)
+)
+def test_a_camera_grid_is_valid_or_refused(size, focal, pixel, pitch, shear) -> None:
+    try:
+        grid = pcii.CameraGrid(
+            rows=size,
+            cols=2,
+            pitch_mm=pitch,
+            focal_mm=focal,
+            pixel_mm=pixel,
+            height=3,
+            width=3,
+            shear_px=shear,
+        )
+    except pcii.InputError as fault:
+        assert str(fault).split(":")[0] in {"rows", "pitch_mm", "focal_mm", "pixel_mm", "shear_px"}  # noqa: PT017
+        return
+    assert grid.view_count == 2 * size
+    lengths = (*grid.pitch_mm, grid.focal_mm, grid.pixel_mm)
+    assert all(np.isfinite(length) and length > 0 for length in lengths)
+
+
+@given(nst.arrays(np.float64, (1, 1, 2, 3), elements=st.floats()))
+def test_photons_are_counted_exactly_or_refused(film: np.ndarray) -> None:
+    grid = unit_grid(1, 1, 2, 3)
+    usable = all(np.isfinite(n) and 0 <= n <= 2**40 and n == int(n) for n in film.ravel())
+    if not usable:
+        with pytest.raises(pcii.InputError, match=r"^counts: "):
+            pcii.PhotonCounts.from_dense(film, grid)
+        return
+    counts = pcii.PhotonCounts.from_dense(film, grid)
+    assert counts.total == sum(int(n) for n in film.ravel())
+
+
+@given(nst.arrays(np.float64, (2, 3, 4, 5, 1), elements=st.floats(width=64)), DEPTHS)
+def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: float) -> None:
+    try:
+        sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, variance=True)
+    except pcii.InputError as fault:
+        assert str(fault).startswith("radiance: ")  # noqa: PT017
+        assert not np.isfinite(light).all() or np.abs(light).max() > 1e150
+        return
+    assert sections.variance is not None
+    assert np.isfinite(sections.estimate).all()
+    assert np.isfinite(sections.variance).all()
+    assert (sections.variance >= 0).all()
+
+
+# Photons
+
+
+@given(grids, SEEDS)
+def test_all_photons_are_in_the_views(grid: pcii.CameraGrid, seed: int) -> None:
+    film = film_of(grid, seed)
+    counts = pcii.PhotonCounts.from_dense(film, grid)
+    events = counts.events
+    again = pcii.PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid)
+    views = [again.view(k, l) for k, l in np.ndindex(grid.rows, grid.cols)]
+    np.testing.assert_array_equal(np.reshape(views, grid.shape_KLHW), film)
+    assert again.total == counts.total == int(film.sum())
+
+
+@given(SEEDS, st.floats(0, 1e6))
+def test_a_subsample_has_no_photon_that_was_not_there(seed: int, most: float) -> None:
+    film = film_of(SMALL, seed)
+    counts = pcii.PhotonCounts.from_dense(film, SMALL)
+    few = counts.subsample(most, np.random.default_rng(seed))
+    kept = np.array([[few.view(k, l) for l in range(3)] for k in range(2)])
+    assert (kept <= film).all()
+    assert few.total == kept.sum()
+    assert few.total <= most + 6 * np.sqrt(most) + 6 or few.total == counts.total
+
+
+@given(SEEDS, st.sampled_from([*PATTERNS, None]), st.floats(1e-3, 1e12), st.integers(-1000, 900))
+def test_expected_photons_add_up_to_the_budget(seed: int, cfa: str | None, budget: float, power: int) -> None:
+    raw = np.random.default_rng(seed).uniform(0, 1, (5, 6)) * 2.0**power
+    for scope in ("view", "channel"):
+        rates = photon_rates(raw, cfa, budget, scope, scope_energies(raw, cfa, scope))
+        parts = 1 if scope == "view" or cfa is None else 3
+        assert (rates >= 0).all()
+        np.testing.assert_allclose(rates.sum(), parts * budget, rtol=1e-12 if power > -900 else 1e-3)
+
+
+@given(SEEDS, st.floats(0.1, 1e9))
+def test_photons_fall_only_where_there_is_light(seed: int, budget: float) -> None:
+    light = light_of(SMALL, seed, 3)
+    light[np.random.default_rng(seed).random(SMALL.shape_KLHW) < 0.5] = 0
+    views = pcii.Views(light, SMALL)
+    counts = pcii.limit_photons(views, budget, seed=seed, cfa="RGGB")
+    events = counts.events
+    assert (light[events.k, events.l, events.i, events.j].sum(axis=-1) > 0).all()
+    again = pcii.limit_photons(views, budget, seed=seed, cfa="RGGB")
+    np.testing.assert_array_equal(again.events.n, events.n)
+
+
+@given(SEEDS, st.integers(1, 3), st.integers(1, 4), DEPTHS)
+def test_samples_of_windows_are_those_of_fractions(seed: int, cell: int, window: int, z_mm: float) -> None:
+    film = film_of(SMALL, seed)
+    planes = FocalPlanes.at_depths(SMALL, z_mm)
+    counts = pcii.PhotonCounts.from_dense(film, SMALL)
+    found = view_samples(counts, planes, 0, cell_px=cell, window_cells=window)
+    rows, cols = planes.voxel_indices()
+
+    def near(index: np.ndarray, centre: int, size: int) -> np.ndarray:
+        """Pixels that fall into the window about a cell, which reaches further up and left if it is even."""
+        first, last = centre - window // 2, centre + (window - 1) // 2
+        return (index >= 0) & (index < size) & (index // cell >= first) & (index // cell <= last)
+
+    for y, x in np.ndindex(found.number.shape):
+        samples = [
+            int(film[k, l][np.ix_(near(rows[0, k], y, 4), near(cols[0, l], x, 5))].sum())
+            for k, l in np.ndindex(2, 3)
+        ]
+        seen = [Fraction(sample) for sample in samples if sample]
+        assert found.number[y, x] == len(seen)
+        if seen:
+            np.testing.assert_allclose(found.mean[y, x], float(sum(seen) / len(seen)), rtol=4e-16)
+            np.testing.assert_allclose(found.variance[y, x], float(variance_of(seen)), rtol=1e-14)
+
+
+# Sections
+
+
+@given(SEEDS, DEPTHS, st.integers(-800, 400), st.sampled_from(["nearest", "bilinear"]))
+def test_sections_scale_with_the_light(seed: int, z_mm: float, power: int, shifts) -> None:
+    light = light_of(SMALL, seed)
+    plain, scaled = (
+        pcii.reconstruct(pcii.Views(light * unit, SMALL), z_mm, shifts=shifts) for unit in (1.0, 2.0**power)
+    )
+    np.testing.assert_array_equal(plain.counts * 2.0**power, scaled.counts)
+    np.testing.assert_array_equal(plain.coverage, scaled.coverage)
+
+
+@given(SEEDS, DEPTHS, st.integers(-(2**30), 2**30), st.sampled_from([1, 2]))
+def test_variance_does_not_change_with_what_is_added_to_all(seed, z_mm, added, subpixel) -> None:
+    light = light_of(SMALL, seed)
+    plain, moved = (
+        pcii.reconstruct(pcii.Views(light + offset, SMALL), z_mm, subpixel=subpixel, variance=True).variance
+        for offset in (0, added)
+    )
+    assert plain is not None
+    assert moved is not None
+    np.testing.assert_array_equal(plain, moved)
+
+
+@given(SEEDS, DEPTHS, st.sampled_from(["nearest", "bilinear"]), st.booleans())
+def test_means_lie_between_the_samples(seed: int, z_mm: float, shifts, single: bool) -> None:
+    light = np.random.default_rng(seed).uniform(-5, 9, (*SMALL.shape_KLHW, 3))
+    light = light.astype(np.float32 if single else np.float64)
+    sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, shifts=shifts)
+    reached = sections.coverage > 1e-6
+    slack = 1e-4 if single or shifts == "bilinear" else 1e-12
+    assert (sections.estimate[reached] >= light.min() - slack).all()
+    assert (sections.estimate[reached] <= light.max() + slack).all()
+
+
+@given(SEEDS, st.lists(DEPTHS, min_size=1, max_size=4), st.integers(1, 3))
+def test_planes_one_at_a_time_are_planes_together(seed: int, z_mm: list[float], subpixel: int) -> None:
+    counts = pcii.PhotonCounts.from_dense(film_of(SMALL, seed), SMALL, cfa="GBRG")
+    together = pcii.reconstruct(counts, z_mm, subpixel=subpixel, variance=True)
+    each = list(pcii.reconstruct_each(counts, z_mm, subpixel=subpixel, variance=True))
+    for name in ("counts", "coverage", "estimate", "variance"):
+        alone = np.concatenate([getattr(one, name) for one in each])
+        np.testing.assert_array_equal(alone, getattr(together, name))
+
+
+@given(MOSAICS, st.sampled_from(PATTERNS), st.integers(-900, 900))
+def test_colours_scale_with_the_light(raw: np.ndarray, cfa: str, power: int) -> None:
+    assume(not ((raw > 0) & (raw < 1e-20)).any())  # which would fall below the smallest normal number
+    plain, scaled = (pcii.demosaic(raw * unit, cfa=cfa) for unit in (1.0, 2.0**power))
+    np.testing.assert_array_equal(plain * 2.0**power, scaled)
+
+
+# Geometry
+
+
+@given(grids, st.floats(1e-3, 1e7))
+def test_depth_and_total_disparity_are_each_other_s_inverse(grid: pcii.CameraGrid, z_mm: float) -> None:
+    assume(grid.view_count > 1)
+    total = total_disparity_px(grid, z_mm)
+    np.testing.assert_allclose(depth_of_total_disparity_mm(grid, total), z_mm, rtol=1e-14)
+
+
+@given(grids, st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(50, 5000)))
+def test_a_point_is_where_its_section_has_it(
+    grid: pcii.CameraGrid, point_mm: tuple[float, float, float]
+) -> None:
+    """Moved by the exact shifts of its depth, each camera's image is that of the virtual centre."""
+    rows, cols = FocalPlanes.at_depths(grid, point_mm[2]).exact_shifts_px
+    centre = project_px(grid, point_mm, (grid.rows - 1) / 2, (grid.cols - 1) / 2)
+    for k, l in np.ndindex(grid.rows, grid.cols):
+        i, j = project_px(grid, point_mm, k, l)
+        np.testing.assert_allclose((i + rows[0, k], j + cols[0, l]), centre, rtol=1e-9, atol=1e-6)
+
+
+@given(st.booleans(), st.booleans(), st.booleans(), st.integers(1, 5), st.integers(1, 5))
+def test_stored_views_are_put_in_order_without_loss(swap, rows, cols, K: int, L: int) -> None:
+    order = pcii.ViewOrder(swap_axes=swap, flip_rows=rows, flip_cols=cols)
+    numbers = order.numbers(K, L)
+    assert numbers.shape == (K, L)
+    assert sorted(numbers.ravel().tolist()) == list(range(K * L))
+
+
+# Light of pictures
+
+
+@given(nst.arrays(np.float64, 6, elements=st.floats(0, 1)))
+def test_srgb_and_back_is_the_same(linear: np.ndarray) -> None:
+    # The published curve jumps by 1e-8 where its two parts meet.
+    np.testing.assert_allclose(pcii.srgb_to_linear(linear_to_srgb(linear)), linear, atol=1e-7)
+
+
+@given(nst.arrays(st.sampled_from([np.uint8, np.uint16]), (1, 2, 2, 3)))
+def test_linear_pictures_are_shares_of_their_largest_number(numbers: np.ndarray) -> None:
+    optics = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
+    light = np.asarray(pcii.import_arrays(numbers, optics, encoding="linear").radiance)[..., 0]
+    np.testing.assert_allclose(light, numbers / np.iinfo(numbers.dtype).max, rtol=2e-7)
+
+
+# Cells
+
+
+@given(nst.arrays(np.int64, st.tuples(st.integers(1, 9), st.integers(1, 9)), elements=st.integers(0, 2**50)))
+def test_cells_have_all_that_their_pixels_have(pixels: np.ndarray) -> None:
+    grid = unit_grid(1, 1, *pixels.shape)
+    for side in (1, 2, 3, 4):
+        cells = cell_sums(pixels, side, np.int64)
+        assert int(cells.sum()) == int(pixels.sum())
+        assert cells_to_pixels(cells, side, grid).shape == pixels.shape
+
+
+# Scores
+
+
+@given(MASKS, SEEDS)
+def test_agreement_is_a_share_and_knows_no_order(claimed: np.ndarray, seed: int) -> None:
+    true = np.random.default_rng(seed).random(claimed.shape) < 0.5
+    found, turned = mask_agreement(claimed, true), mask_agreement(true, claimed)
+    assert all(value is None or 0 <= value <= 1 for value in found.values())
+    assert found["iou"] == turned["iou"]
+    assert found["precision"] == turned["recall"]
+    assert boundary_f(claimed, true) == pytest.approx(boundary_f(true, claimed))
+    same = mask_agreement(claimed, claimed)
+    assert same["iou"] == same["f1"] == 1
+    if claimed.any() and not claimed.all():  # one that fills the frame has no outline, and 0
+        assert same["boundary_f"] == 1
+
+
+@given(MASKS, SEEDS)
+def test_shares_of_area_are_shares(mask: np.ndarray, seed: int) -> None:
+    coverage = np.random.default_rng(seed).random(mask.shape)
+    share = object_share(mask, mask.astype(int), coverage)
+    assert (share >= 0).all()
+    assert (share <= 1 + 1e-12).all()
+    rest = object_share(~mask, mask.astype(int), coverage)
+    if mask.any() and not mask.all():
+        other = (mask.astype(int) != mask.astype(int).flat[0]).any()
+        assert other
+        assert (share + rest <= 1 + 1e-12).all()
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=20))
+def test_means_and_intervals_are_those_of_exact_statistics(values: list[float]) -> None:
+    found = mean_interval(values)
+    exact = statistics.mean(map(Fraction, values))
+    deviation = float(statistics.stdev(map(Fraction, values)))
+    assert found.low is not None
+    assert found.high is not None
+    scale = max(map(abs, values)) + 1e-290
+    np.testing.assert_allclose(found.mean, float(exact), atol=1e-15 * scale * len(values))
+    assert found.low <= found.mean <= found.high
+    # Student's 97.5 % quantile is at least the normal one, and at most that of one degree of freedom.
+    half = (found.high - found.low) / 2
+    error = deviation / np.sqrt(len(values))
+    assert 1.959 * error - 1e-12 * scale <= half <= 12.71 * error + 1e-12 * scale
+
+
+@given(st.lists(st.tuples(st.floats(-9, 9), st.floats(-9, 9)), min_size=2, max_size=12))
+def test_differences_of_pairs_change_sign_when_exchanged(pairs: list[tuple[float, float]]) -> None:
+    first, second = zip(*pairs, strict=True)
+    there, back = paired_difference(first, second), paired_difference(second, first)
+    assert there.difference.mean == pytest.approx(-back.difference.mean, abs=1e-12)
+    assert 0 < there.p <= 1
+    assert there.p == pytest.approx(back.p)
+
+
+@given(nst.arrays(np.float64, (5, 6), elements=st.floats(100, 1000)))
+def test_the_true_depth_has_no_error(z_mm: np.ndarray) -> None:
+    truth = pcii.Truth(z_mm, np.ones(z_mm.shape, int), {1: "wall"})
+    errors = depth_errors(SMALL, pcii.DepthMap(z_mm, np.ones(z_mm.shape)), truth)
+    assert errors["mae_mm"] == errors["bad_1px"] == errors["median_px"] == errors["ece"] == 0
+    assert errors["coverage"] == 1

@@ -1,0 +1,146 @@
+"""The same numbers to the bit for any number of threads and in any run; the same sums in any precision."""
+
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rational_sections import samples_of
+from twins import even_light, unit_grid
+
+import pcii
+
+ROOT = Path(__file__).resolve().parents[2]
+GRID = pcii.CameraGrid(rows=3, cols=4, pitch_mm=(5.0, 4.0), focal_mm=50.0, pixel_mm=0.25, height=37, width=41)
+
+MODES: list[dict[str, Any]] = [
+    {"variance": True},
+    {"shifts": "bilinear"},
+    {"subpixel": 2, "variance": True},
+]
+
+
+def results(grid: pcii.CameraGrid = GRID) -> dict[str, str]:
+    """Hashes of what every compiled loop takes part in."""
+    rng = np.random.default_rng(0)
+    film = rng.poisson(0.4, grid.shape_KLHW)
+    dense = pcii.PhotonCounts.from_dense(film, grid, cfa="GRBG")
+    few = pcii.limit_photons(pcii.Views(rng.random((*grid.shape_KLHW, 3)), grid), 50, seed=1, cfa="GRBG")
+    made: dict[str, np.ndarray] = {"photons": np.stack([few.events.i, few.events.j])}
+    for name, counts in (("dense", dense), ("sparse", few)):
+        for subpixel in (1, 2):
+            sections = pcii.reconstruct(counts, [400, 500], subpixel=subpixel, variance=True)
+            assert sections.variance is not None
+            made |= {f"{name} {subpixel}": sections.counts, f"{name} {subpixel} variance": sections.variance}
+        for method in pcii.removal_methods():
+            made[f"{name} {method}"] = pcii.segment(counts, [400, 500], method=method).in_focus
+        for method in pcii.depth_methods(counts):
+            depth = pcii.estimate_depth(counts, (300, 900), method=method)
+            made |= {f"{name} {method} z": depth.z_mm, f"{name} {method} sure": depth.confidence}
+    for dtype in (np.float32, np.float64):
+        views = pcii.Views(rng.normal(5, 1, (*grid.shape_KLHW, 3)).astype(dtype), grid)
+        for options in MODES:
+            sections = pcii.reconstruct(views, [400, 500], **options)
+            made[f"{np.dtype(dtype)} {options}"] = sections.counts
+            if sections.variance is not None:
+                made[f"{np.dtype(dtype)} {options} variance"] = sections.variance
+        for method in pcii.depth_methods(views):
+            made[f"{np.dtype(dtype)} {method}"] = pcii.estimate_depth(views, (300, 900), method=method).z_mm
+    made["demosaiced"] = pcii.demosaic(film[0, 0], cfa="GRBG")
+    return {name: hashlib.sha256(np.ascontiguousarray(x).tobytes()).hexdigest() for name, x in made.items()}
+
+
+def results_of(threads: int, height: int) -> dict[str, str]:
+    """The hashes in a process of its own, which has four threads and uses so many."""
+    script = (
+        "import json, sys\n"
+        "from dataclasses import replace\n"
+        "from pcii.base.compiled_loops import threads, use_threads\n"
+        "use_threads(int(sys.argv[1]))\n"
+        "assert threads() == int(sys.argv[1])\n"
+        "from test_repeatability import GRID, results\n"
+        "print(json.dumps(results(replace(GRID, height=int(sys.argv[2])))))\n"
+    )
+    folders = [ROOT, *(ROOT / "tests" / name for name in (".", "pcii", "stress"))]
+    environment = os.environ | {
+        "NUMBA_NUM_THREADS": "4",
+        "PYTHONPATH": os.pathsep.join(map(str, folders)),
+    }
+    done = subprocess.run(
+        [sys.executable, "-W", "error::RuntimeWarning", "-c", script, str(threads), str(height)],
+        capture_output=True,
+        text=True,
+        env=environment,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_a_second_run_gives_the_same_bits() -> None:
+    assert results() == results()
+
+
+def test_any_number_of_threads_gives_the_same_bits() -> None:
+    here = results()
+    for threads in (1, 4):
+        assert results_of(threads, GRID.height) == here
+
+
+@pytest.mark.stress
+@pytest.mark.parametrize("threads", [1, 2, 3, 4])
+def test_any_number_of_threads_gives_the_same_bits_of_larger_films(threads: int) -> None:
+    """Films of 300 rows have many bands of rows, which are shared out unevenly."""
+    assert results_of(threads, 300) == results_of(4, 300)
+
+
+class Reader:
+    """Views that are read one by one, as from disk."""
+
+    def __init__(self, images: np.ndarray) -> None:
+        self.images, self.shape, self.dtype = images, images.shape, images.dtype
+
+    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+        return self.images[index]
+
+
+@pytest.mark.parametrize("cfa", [None, "GBRG"])
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+def test_views_in_memory_or_on_disk_give_the_same_sections(dtype: type, cfa: str | None) -> None:
+    """But for the order of the 12 sums: those on disk are read in batches."""
+    light = np.random.default_rng(2).normal(3, 1, (*GRID.shape_KLHW, 1)).astype(dtype)
+    one, two = (pcii.reconstruct(pcii.Views(r, GRID, cfa), [400, 500]) for r in (light, Reader(light)))
+    tolerance = 12 * 1.2e-16 if dtype is np.float64 else 1.2e-7
+    np.testing.assert_allclose(one.counts, two.counts, rtol=tolerance)
+    np.testing.assert_array_equal(one.coverage, two.coverage)
+
+
+@pytest.mark.parametrize("cfa", [None, "RGGB"])
+def test_single_and_double_precision_and_fractions_agree(cfa: str | None) -> None:
+    """Single precision is off by the one rounding of its result, double by the roundings of 12 sums."""
+    grid = unit_grid(3, 4, 5, 6, (0.8, 1.7))
+    light = np.random.default_rng(3).uniform(0, 1, (*grid.shape_KLHW, 1)).astype(np.float32)
+    single = pcii.reconstruct(pcii.Views(light, grid, cfa), 1.0)
+    double = pcii.reconstruct(pcii.Views(light.astype(np.float64), grid, cfa), 1.0)
+    assert single.counts.dtype == np.float32
+    for where, samples in samples_of(light, grid, 1.0, cfa=cfa).items():
+        exact = float(sum(samples))
+        np.testing.assert_allclose(double.counts[0][where], exact, rtol=12 * 1.2e-16)
+        np.testing.assert_allclose(single.counts[0][where], exact, rtol=6.1e-8)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.uint16])
+def test_whole_numbers_give_the_same_sums_whatever_they_are_kept_as(dtype: type) -> None:
+    grid = unit_grid(3, 3, 6, 6, (1.2, 0.9))
+    counts = even_light(grid, 30.0, seed=4)
+    photons = pcii.reconstruct(counts, 1.0)
+    same = pcii.reconstruct(pcii.PhotonCounts.from_dense(counts.dense.astype(dtype), grid), 1.0)
+    np.testing.assert_array_equal(same.counts, photons.counts)
+    if dtype is np.uint16:
+        return  # as light refused: it may be sRGB
+    radiance = pcii.reconstruct(pcii.Views(counts.dense.astype(dtype)[..., None], grid), 1.0)
+    np.testing.assert_array_equal(radiance.counts, photons.counts)

@@ -1,0 +1,289 @@
+"""Properties of what simulates a sensor and its cameras, without a renderer."""
+
+import math
+
+import numpy as np
+import pytest
+from camera_grids import grids
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from twins import unit_grid
+
+from pcii.base.errors import InputError
+from pcii.core import geometry
+from pcii.core.bayer import PATTERNS, channel_count
+from pcii.core.camera_grid import CameraGrid
+from simgen.base import random_streams
+from simgen.base.strict_models import validate
+from simgen.cameras import disparities
+from simgen.cameras.calibration import turn
+from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
+from simgen.cameras.rig import as_rig, with_larger_pixels
+from simgen.photons.candidates import even_film_points
+from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, places
+from simgen.sensor.detector import detect, full_light_image, nested_subset, saturate
+from simgen.sensor.exposure import photons_per_radiance
+from simgen.sensor.mosaic import draw_counts, fixed_totals
+from simgen.sensor.photon_table import PhotonTable
+from simgen.spec.camera_grid import Grid, Lens
+from simgen.spec.recipe import Exposure, FullLight, Photons, Recipe, Sensor
+
+GRID = unit_grid(2, 2, 4, 5)
+SEEDS = st.integers(0, 2**63 - 1)
+SHARES = st.floats(0, 1)
+
+
+def photons_of(seed: int, number: int, most: int = 1, scopes: int = 0) -> PhotonTable:
+    """Photons anywhere, in the order of their scopes if they have any."""
+    rng = np.random.default_rng(seed)
+    k, l, i, j = (rng.integers(0, size, number) for size in GRID.shape_KLHW)
+    scope = np.sort(rng.integers(0, scopes, number)) if scopes else None
+    rank = None if scope is None else places(scope)
+    return PhotonTable(k, l, i, j, rng.integers(1, most + 1, number), scope, rank)
+
+
+def film_of(table: PhotonTable) -> np.ndarray:
+    film = np.zeros(GRID.shape_KLHW, np.int64)
+    np.add.at(film, (table.k, table.l, table.i, table.j), table.n)
+    return film
+
+
+# The sensor
+
+
+@given(SEEDS, st.integers(0, 60), st.tuples(*[st.floats(1e-3, 1)] * 3), SHARES)
+def test_a_detector_that_adds_nothing_detects_no_more_than_arrives(seed, number, efficiency, dead) -> None:
+    sensor = Sensor(quantum_efficiency=efficiency, dead_pixel_share=dead)
+    arrivals = photons_of(seed, number, 9)
+    counts = detect(arrivals, GRID, "GRBG", sensor, seed)
+    assert (film_of(counts) <= film_of(arrivals)).all()
+    assert (counts.n > 0).all()
+    whole = detect(arrivals, GRID, "GRBG", Sensor(), seed)
+    np.testing.assert_array_equal(film_of(whole), film_of(arrivals))
+
+
+@given(SEEDS, st.floats(0, 20), SHARES, st.floats(0, 1e6))
+def test_false_counts_need_no_light_and_are_the_same_again(seed, dark, hot, hot_counts) -> None:
+    sensor = Sensor(dark_counts=dark, hot_pixel_share=hot, hot_pixel_counts=hot_counts)
+    first, again = (detect(photons_of(0, 0), GRID, None, sensor, seed) for _ in range(2))
+    np.testing.assert_array_equal(film_of(first), film_of(again))
+    if dark == 0:
+        hot_pixels = (film_of(first) > 0).any(axis=(0, 1)).sum()
+        assert hot_pixels <= round(hot * GRID.height * GRID.width)
+
+
+@given(SEEDS, st.integers(0, 60), st.integers(1, 32), st.sampled_from([1, 50, 2**40]))
+def test_a_counter_stops_at_its_largest_number(seed: int, number: int, bits: int, most: int) -> None:
+    arrivals = photons_of(seed, number, most)
+    stopped = saturate(arrivals, GRID, bits, seed)
+    np.testing.assert_array_equal(film_of(stopped), np.minimum(film_of(arrivals), 2**bits - 1))
+
+
+@given(SEEDS, st.integers(1, 80), st.integers(1, 5), st.data())
+def test_a_smaller_budget_is_the_first_of_the_larger(seed, number, scopes, data) -> None:
+    small, large = sorted(data.draw(st.tuples(st.integers(1, 50), st.integers(51, 99))))
+    photons = Photons(budget=large, nested=(small,), statistics="multinomial")
+    table = photons_of(seed, number, scopes=scopes)
+    belongs = nested_subset(table, table, photons, small, seed)
+    assert table.scope is not None
+    for scope in range(scopes):
+        assert belongs[table.scope == scope].sum() == min(small, (table.scope == scope).sum())
+
+
+@given(SEEDS, st.integers(0, 40))
+def test_a_table_by_pixel_has_the_same_photons(seed: int, number: int) -> None:
+    table = photons_of(seed, number, 5)
+    ordered = table.by_pixel(GRID)
+    assert (np.diff(ordered.flat_pixels(GRID)) >= 0).all()
+    np.testing.assert_array_equal(film_of(ordered), film_of(table))
+    singles = table.one_by_one()
+    assert (singles.n == 1).all()
+    np.testing.assert_array_equal(film_of(singles), film_of(table))
+
+
+@given(SEEDS, st.sampled_from([*PATTERNS, None]), st.integers(0, 10**12))
+def test_fixed_totals_are_drawn_exactly(seed: int, cfa: str | None, total: int) -> None:
+    rng = np.random.default_rng(seed)
+    rates = rng.uniform(0.01, 1, (6, 7)) * 10.0 ** rng.integers(-200, 200)
+    for totals in (np.array([total]), np.full(channel_count(cfa), total)):
+        counts = draw_counts(rates, cfa, rng, totals)
+        assert counts.sum() == totals.sum()
+        assert (counts >= 0).all()
+
+
+@given(SEEDS, st.integers(1, 10**12), st.integers(1, 9), st.integers(-290, 290))
+def test_a_scene_s_budget_is_shared_out_to_the_last_photon(seed, budget, views, power) -> None:
+    energies = np.random.default_rng(seed).uniform(0, 1, (views, 1)) * 10.0**power
+    photons = Photons(budget=budget, scope="scene", statistics="multinomial")
+    totals = fixed_totals(photons, energies, np.random.default_rng(seed))
+    assert totals is not None
+    assert totals.sum() == budget
+    none = fixed_totals(photons, 0 * energies, np.random.default_rng(seed))
+    assert none is not None
+    assert not none.any()
+
+
+@given(
+    SEEDS,
+    st.floats(1, 1e6),
+    st.floats(0, 100),
+    st.integers(1, 24),
+    st.floats(0, 1e6),
+    st.sampled_from([1, 3]),
+)
+def test_full_light_is_finite_and_no_brighter_than_the_full_well(
+    seed: int, well: float, noise: float, bits: int, level: float, channels: int
+) -> None:
+    light = FullLight(full_well_e=well, read_noise_e=noise, adc_bits=bits)
+    radiance = np.full((3, 4, channels), level)
+    rng = np.random.default_rng(seed)
+    image = full_light_image(radiance, "RGGB" if channels == 1 else None, 2.0, Sensor(full_light=light), rng)
+    assert np.isfinite(image).all()
+    assert (image >= 0).all()
+    assert (image <= well / 2.0 * (1 + 1e-6)).all()
+
+
+@given(st.floats(0.5, 64), st.floats(1e-9, 1e3), st.floats(1e-4, 1))
+def test_exposure_goes_with_time_area_and_the_square_of_the_aperture(f, time, pixel) -> None:
+    one = photons_per_radiance(Exposure(f_number=f, time_s=time), pixel)
+    assert 0 < one < math.inf
+    assert photons_per_radiance(Exposure(f_number=f, time_s=2 * time), pixel) == pytest.approx(2 * one)
+    assert photons_per_radiance(Exposure(f_number=2 * f, time_s=time), pixel) == pytest.approx(one / 4)
+    assert photons_per_radiance(Exposure(f_number=f, time_s=time), 2 * pixel) == pytest.approx(4 * one)
+
+
+# Cameras
+
+
+@given(grids, st.floats(1.0, 1e6))
+def test_both_packages_see_the_same_disparity(grid: CameraGrid, z_mm: float) -> None:
+    np.testing.assert_allclose(
+        disparities.disparities_px(grid, z_mm), geometry.disparity_px(grid, z_mm), rtol=1e-12, atol=1e-9
+    )
+    assert disparities.spread_px_mm(grid) / z_mm == pytest.approx(geometry.total_disparity_px(grid, z_mm))
+
+
+@given(grids, st.floats(1.0, 1e6), st.sampled_from([*PATTERNS, None]))
+def test_every_camera_gives_each_voxel_one_colour(grid: CameraGrid, z_mm: float, cfa: str | None) -> None:
+    found = disparities.colour_samples(grid, cfa, z_mm)
+    assert (found.sum(axis=-1) == grid.view_count).all()
+    assert 0 <= disparities.share_seen_by_all(grid, z_mm) <= 1
+    without = disparities.shares_without(grid, cfa, z_mm)
+    assert ((without >= 0) & (without <= 1)).all()
+
+
+@given(grids, st.floats(-20, 20), st.floats(-20, 20), st.floats(1, 1e5))
+def test_a_ray_through_a_point_of_the_film_leads_back_to_it(grid, row, col, z_mm) -> None:
+    rig = as_rig(grid)
+    for k, l in ((0, 0), (grid.rows - 1, grid.cols - 1)):
+        camera = rig.camera(k, l)
+        point = camera.position_mm + z_mm * camera.towards(np.array([row]), np.array([col]))
+        from_middle = camera.film_px(point)[0]
+        middle = np.array([(grid.width - 1) / 2, (grid.height - 1) / 2])
+        np.testing.assert_allclose(from_middle + middle, [col, row], rtol=1e-6, atol=1e-5)
+
+
+@given(st.tuples(*[st.floats(-720, 720)] * 3))
+def test_a_turn_keeps_lengths_and_handedness(angles: tuple[float, float, float]) -> None:
+    rotation = turn(np.array(angles))
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(rotation) == pytest.approx(1)
+
+
+@given(grids, st.floats(0.1, 50), st.floats(10, 1e4), st.floats(-9, 9), st.floats(-9, 9), SHARES, SHARES)
+def test_rays_of_a_lens_meet_where_it_is_in_focus(grid, aperture, focus, row, col, u, v) -> None:
+    lens = Lens(aperture_mm=aperture, focus_mm=focus)
+    chief = film_slopes(grid, row, col, (0.0, 0.0))
+    point = ((u - 0.5) * aperture, (v - 0.5) * aperture)
+    bent = slopes_behind_lens(chief, lens, point)
+    for axis in (0, 1):
+        assert point[axis] + focus * bent[axis] == pytest.approx(focus * chief[axis], abs=1e-9 * focus)
+
+
+@given(grids, st.floats(1, 50), st.integers(1, 8))
+def test_larger_pixels_keep_the_disparity_in_mm(grid: CameraGrid, scale: float, least: int) -> None:
+    coarse = with_larger_pixels(grid, scale, least_px=least)
+    assert min(coarse.height, coarse.width) >= least
+    fine, other = (np.array(disparities.disparities_px(g, 777.0)) * g.pixel_mm for g in (grid, coarse))
+    np.testing.assert_allclose(fine, other, rtol=1e-9, atol=1e-9)
+
+
+# Photons to be drawn
+
+
+@given(grids, st.integers(1, 500), SEEDS)
+def test_points_of_the_film_are_on_the_film(grid: CameraGrid, number: int, seed: int) -> None:
+    view, i, j = even_film_points(grid, number, np.random.default_rng(seed))
+    assert ((i >= 0) & (i < grid.height) & (j >= 0) & (j < grid.width)).all()
+    assert ((view >= 0) & (view < grid.view_count)).all()
+    assert number / 2 - 1 <= view.size <= 2 * number + 1
+
+
+@given(st.lists(st.integers(0, 2**60), min_size=1, max_size=8), st.integers(0, 3), st.floats(1e-6, 1))
+def test_candidates_fit_a_wavefront(missing: list[int], round_number: int, share: float) -> None:
+    found = candidates_needed(np.array(missing), round_number, share)
+    assert (found >= 16).all()
+    assert found.sum() <= max(WAVEFRONT, 16 * len(missing))
+
+
+@given(st.lists(st.integers(0, 9), max_size=50))
+def test_places_count_each_scope_from_zero(scopes: list[int]) -> None:
+    scope = np.sort(np.array(scopes, dtype=np.int64))
+    place = places(scope)
+    for one in set(scopes):
+        assert place[scope == one].tolist() == list(range(scopes.count(one)))
+
+
+@given(SEEDS, st.integers(0, 2**31), st.integers(0, 2**31))
+def test_streams_differ_by_every_part_of_their_key(seed: int, view: int, part: int) -> None:
+    assume(view != part)
+    stage = "photons"
+
+    def first(**key: int) -> int:
+        return int(random_streams.generator(seed, stage=stage, **key).integers(2**63))
+
+    assert first(view=view, part=part) == first(view=view, part=part)
+    assert (
+        len({first(view=view, part=part), first(view=part, part=view), first(view=view, part=part + 1)}) == 3
+    )
+
+
+# What people write
+
+
+@given(
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "rows": st.integers(-2, 5),
+            "focal_mm": st.one_of(st.floats(), st.text(max_size=2)),
+            "pixel_mm": st.floats(),
+            "pitch_mm": st.lists(st.floats(), min_size=1, max_size=3),
+            "shear_px": st.tuples(st.floats(), st.floats()).map(list),
+            "colour": st.none(),
+        },
+    )
+)
+def test_a_grid_is_what_pcii_takes_or_is_refused(values: dict) -> None:
+    try:
+        grid = validate(Grid, values, "recipe")
+    except InputError as fault:
+        assert str(fault).startswith("recipe: ")  # noqa: PT017
+        return
+    assert grid.camera_grid().rows == grid.rows
+
+
+@given(
+    st.floats(), st.sampled_from(["view", "channel", "scene", "exposure"]), st.lists(st.floats(), max_size=2)
+)
+def test_a_budget_is_a_number_of_photons_or_is_refused(
+    budget: float, scope: str, nested: list[float]
+) -> None:
+    values = {"scene": "two_objects", "photons": {"budget": budget, "scope": scope, "nested": nested}}
+    try:
+        photons = validate(Recipe, values, "recipe").photons
+    except InputError as fault:
+        assert "photons" in str(fault) or "exposure" in str(fault)  # noqa: PT017
+        return
+    assert 0 < photons.budget <= 1e15
+    assert all(0 < smaller < photons.budget for smaller in photons.nested)

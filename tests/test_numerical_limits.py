@@ -1,0 +1,48 @@
+"""docs/numerical_limits.md is what its script makes of real calls, and nothing in it is a surprise."""
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import pcii
+import simgen
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+CELLS = {"value", "NaN, documented", "refused", "·", "value or refused", "value or NaN, documented"}
+
+
+@pytest.fixture(scope="module")
+def script() -> dict[str, Any]:
+    return runpy.run_path(str(DOCS / "make_numerical_limits.py"))
+
+
+def test_the_page_is_what_the_script_makes(script: dict[str, Any]) -> None:
+    """A call that fails with another error, warns, or gives NaN that is not documented stops the script."""
+    page = script["page"]()
+    assert page == (DOCS / "numerical_limits.md").read_text(encoding="utf-8"), (
+        "run docs/make_numerical_limits.py"
+    )
+    rows = [line.strip("|").split("|") for line in page.splitlines() if line.startswith("| ")][1:]
+    assert len(rows) == len(script["rows"]())
+    assert {cell for _, *cells in rows for cell in cells} <= CELLS
+
+
+def test_every_public_name_is_on_the_page(script: dict[str, Any]) -> None:
+    called = {name.removeprefix("simgen.") for name, _ in script["rows"]().values()}
+    assert called | set(script["NO_NUMBERS"]) == {*pcii.__all__, *simgen.__all__}
+    assert not called & set(script["NO_NUMBERS"])
+
+
+@pytest.mark.parametrize(
+    ("result", "fault"), [(float("nan"), "undocumented NaN"), (pcii.InputError("no"), "no argument is named")]
+)
+def test_a_surprise_stops_the_script(script: dict[str, Any], result: object, fault: str) -> None:
+    def call(case: object) -> object:
+        if isinstance(result, Exception):
+            raise result
+        return result
+
+    with pytest.raises(AssertionError, match=fault):
+        script["cell"](call, "constant", "depth_methods")
