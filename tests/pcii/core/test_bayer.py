@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import colour_of
 
 from pcii.base.errors import InputError
@@ -39,7 +40,7 @@ def test_every_pixel_repeats_the_cell_of_its_parity(cfa, size):
 @given(
     cfa=st.sampled_from(PATTERNS), height=st.integers(1, 7), width=st.integers(1, 7), seed=st.integers(0, 9)
 )
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_a_mosaic_keeps_the_colour_that_each_pixel_sees(cfa, height, width, seed):
     rgb = np.random.default_rng(seed).integers(0, 1000, size=(2, height, width, 3))
     raw = mosaic(rgb, cfa)

@@ -3,8 +3,9 @@ import math
 import numpy as np
 import pytest
 from camera_grids import grids
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import paper_grid, unit_grid, voxel_of
 
 from pcii.base.errors import InputError
@@ -29,7 +30,7 @@ def test_half_pixel_shifts_round_up_and_do_not_alternate():
 
 
 @given(grid=grids, z=depths)
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_shifts_are_the_nearest_whole_pixels(grid, z):
     for shifts, cameras, disparity in zip(
         whole_shifts(grid, z), (grid.rows, grid.cols), reversed(disparity_px(grid, z)), strict=True
@@ -41,7 +42,7 @@ def test_shifts_are_the_nearest_whole_pixels(grid, z):
 
 
 @given(grid=grids, z=st.sampled_from([250.0, 540.0, 620.0]), subpixel=st.integers(1, 3))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_voxel_indices_follow_the_contracts_formula(grid, z, subpixel):
     d_x, d_y = (float(d) for d in disparity_px(grid, z))
     rows, cols = (index[0] for index in FocalPlanes.at_depths(grid, z).voxel_indices(subpixel))
@@ -70,7 +71,7 @@ def test_where_a_camera_sees_a_point_is_sent_to_where_the_centre_sees_it(rows, c
 
 
 @given(near=st.floats(100, 900), extra=st.floats(1, 900), step=st.floats(0.5, 20))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_planes_run_from_far_to_near_in_equal_steps_of_total_disparity(near, extra, step):
     planes = FocalPlanes.between(paper_grid(), near, near + extra, step)
     steps = np.diff(planes.total_disparity_px)
@@ -100,7 +101,7 @@ def test_a_step_of_total_disparity_is_a_quadratic_step_of_depth():
 
 
 @given(grid=grids, z=depths)
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_planes_of_a_total_disparity_are_those_of_its_depth(grid, z):
     planes = FocalPlanes.at_depths(grid, z)
     if planes.total_disparity_px[0] > 0:

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 from camera_grids import grids
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import paper_grid, unit_grid
 
 from pcii.core.geometry import (
@@ -58,7 +59,7 @@ def test_the_virtual_centre_of_an_even_grid_is_between_cameras():
 
 
 @given(grid=grids, z=depths)
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_disparity_is_the_step_between_neighbouring_cameras(grid, z):
     i0, j0 = project_px(grid, (0, 0, z), 0, 0)
     i1, j1 = project_px(grid, (0, 0, z), 1, 1)
@@ -94,7 +95,7 @@ def test_a_single_camera_has_no_total_disparity():
 
 
 @given(grid=grids, z=depths, z0=depths)
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_blur_is_half_of_where_the_cameras_scatter_a_point(grid, z, z0):
     extents = []
     shifts_at_z0 = disparity_px(grid, z0)

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import unit_grid
 
 from pcii.base.errors import InputError
@@ -31,7 +32,7 @@ small_counts = st.builds(
 
 
 @given(dense=small_counts, shuffle=st.integers(0, 99))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
     grid = unit_grid(*dense.shape)
     from_dense = PhotonCounts.from_dense(dense, grid, cfa="GRBG")

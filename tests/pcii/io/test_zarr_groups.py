@@ -10,6 +10,7 @@ import zarr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from property_settings import at_least
 from stored_datasets import one_sentence
 
 from pcii.core.array_labels import Label
@@ -65,7 +66,7 @@ def test_arrays_without_the_names_of_the_conventions_are_read(tmp_path):
 
 
 @given(st.lists(st.integers(0, 3000), max_size=5).map(tuple))
-@settings(max_examples=200, deadline=None)
+@at_least(200)
 def test_chunks_fit_the_array_and_the_limit(shape):
     chunks = chunk_shape(shape)
     assert len(chunks) == len(shape)

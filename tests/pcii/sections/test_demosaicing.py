@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import demosaic_twin
 
 from pcii.base.errors import InputError
@@ -110,20 +111,20 @@ images = st.builds(
 
 
 @given(raw=images, cfa=st.sampled_from(PATTERNS))
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_demosaicing_is_eqs_4_to_6_to_the_bit(raw, cfa):
     # Halves and quarters of whole numbers are exact, so the order of additions cannot matter.
     np.testing.assert_array_equal(demosaic(raw, cfa=cfa), demosaic_twin(raw, cfa))
 
 
 @given(raw=images, cfa=st.sampled_from(PATTERNS))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_what_the_sensor_saw_is_kept(raw, cfa):
     np.testing.assert_array_equal(mosaic(demosaic(raw, cfa=cfa), cfa), raw)
 
 
 @given(raw=images, cfa=st.sampled_from(PATTERNS))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_rows_and_columns_are_treated_alike(raw, cfa):
     transposed = cfa[0] + cfa[2] + cfa[1] + cfa[3]
     np.testing.assert_array_equal(demosaic(raw.T, cfa=transposed), np.swapaxes(demosaic(raw, cfa=cfa), 0, 1))

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import colour_of, unit_grid, voxel_of
 
 from pcii.base.errors import InputError
@@ -50,7 +51,7 @@ class Reader:
     double=st.booleans(),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_sums_and_variances_are_those_of_the_samples(
     cameras, pixels, pitch, z, cfa, channels, double, seed
 ) -> None:
@@ -130,7 +131,7 @@ exact_depths = st.sampled_from([0.25, 0.5, 1.0, 2.0, 4.0])
     most=st.sampled_from([1, 3, 10**6]),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_variances_of_counts_and_on_finer_voxels_are_those_of_the_samples(
     cameras, pixels, z, cfa, subpixel, most, seed
 ) -> None:
@@ -179,7 +180,7 @@ def test_variance_of_counts_survives_a_mean_of_a_million_deviations() -> None:
     cfa=patterns,
     seed=st.integers(0, 999),
 )
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_bilinear_shifts_share_each_sample_among_four_voxels(cameras, pixels, pitch, cfa, seed) -> None:
     grid = unit_grid(*cameras, *pixels, pitch)
     K, L, H, W = grid.shape_KLHW
@@ -231,7 +232,7 @@ def test_a_slope_is_exact_with_bilinear_shifts_only() -> None:
     cfa=st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG"]),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_even_shifts_add_raw_samples_of_one_colour(cameras, pixels, z, cfa, seed) -> None:
     grid = unit_grid(*cameras, *pixels)
     K, L, H, W = grid.shape_KLHW
@@ -294,7 +295,7 @@ def test_neither_counts_are_interpolated_nor_colourless_data_demosaiced() -> Non
     most=st.sampled_from([1, 255, 65_535, 10**9]),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_bright_counts_are_the_same_as_images_and_as_photons(cameras, pixels, z, cfa, most, seed) -> None:
     grid = unit_grid(*cameras, *pixels)
     kind = {1: np.uint8, 255: np.uint8, 65_535: np.uint16, 10**9: np.int64}[most]

@@ -2,8 +2,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import unit_grid, voxel_of
 
 from pcii.core.camera_grid import CameraGrid
@@ -60,7 +61,7 @@ def test_there_are_256_levels_up_to_the_top():
 
 
 @given(values=st.lists(st.floats(0, 1), min_size=1, max_size=40), scale=st.sampled_from([0.25, 2.0, 1024.0]))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_entropy_knows_no_order_and_no_scale_and_stays_in_bounds(values, scale):
     a = np.array(values)
     entropy = entropy_bits(a, top=1.0)
@@ -223,7 +224,7 @@ def test_bright_samples_are_never_zero_so_their_variance_is_their_mean():
 
 
 @given(st.lists(st.floats(1.001, 1e3), min_size=2, max_size=10))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_the_truncated_variance_grows_with_the_mean_and_stays_below_it(means):
     m = np.sort(np.array(means))
     variance = truncated_poisson_variance(m)

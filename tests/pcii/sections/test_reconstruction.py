@@ -2,8 +2,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from twins import bayer_photons, blocky_texture, section_twin, unit_grid
 
 from pcii.base.errors import InputError
@@ -38,7 +39,7 @@ def photons(dense: np.ndarray, grid: CameraGrid, cfa: str | None = None) -> Phot
 
 
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed)
     sections = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
@@ -63,7 +64,7 @@ def test_sections_are_eq_3_for_grids_of_every_kind(shape, cfa, subpixel):
 
 
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_radiance_is_summed_as_counts_are(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed)  # whole numbers, whose float64 sums are exact
     sections = reconstruct(Views(dense[..., None].astype(float), grid, cfa), z, subpixel=subpixel)
@@ -115,7 +116,7 @@ def test_a_photon_goes_to_its_fine_voxel_by_hand():
     subpixel=st.integers(1, 3),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=100, deadline=None)
+@at_least(100)
 def test_no_photon_is_lost_or_doubled_inside_the_frame(K, L, cfa, z, subpixel, seed):
     grid = unit_grid(K, L, 16, 17, pitch_mm=(2.0, 3.0))
     margin = 6  # the largest shift is 3/2 x 3 px at z = 1, and a rounding
@@ -136,7 +137,7 @@ def test_no_photon_is_lost_or_doubled_inside_the_frame(K, L, cfa, z, subpixel, s
     subpixel=st.sampled_from([2, 3, 5]),
     seed=st.integers(0, 999),
 )
-@settings(max_examples=60, deadline=None)
+@at_least(60)
 def test_fine_voxels_of_a_pixel_add_up_to_its_coarse_voxel(pitch, cfa, subpixel, seed):
     # Shifts in sixteenths of a pixel are exact, so that both floors see the same number.
     grid = unit_grid(3, 4, 6, 7, pitch_mm=(pitch[0] / 16, pitch[1] / 16))
@@ -148,7 +149,7 @@ def test_fine_voxels_of_a_pixel_add_up_to_its_coarse_voxel(pitch, cfa, subpixel,
 
 
 @given(grid=grids, cfa=patterns, z=depths, seed=st.integers(0, 999))
-@settings(max_examples=50, deadline=None)
+@at_least(50)
 def test_sections_of_a_sum_are_the_sum_of_sections(grid, cfa, z, seed):
     a, b = random_counts(grid, seed), random_counts(grid, seed + 1)
     parts = [reconstruct(photons(dense, grid, cfa), z).counts for dense in (a, b, a + 3 * b)]
@@ -156,7 +157,7 @@ def test_sections_of_a_sum_are_the_sum_of_sections(grid, cfa, z, seed):
 
 
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 2), seed=st.integers(0, 999))
-@settings(max_examples=50, deadline=None)
+@at_least(50)
 def test_events_and_dense_counts_give_the_same_sections(grid, cfa, z, subpixel, seed):
     dense = random_counts(grid, seed, rate=0.3)
     k, l, i, j = np.nonzero(dense)

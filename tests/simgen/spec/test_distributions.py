@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from scipy.spatial.transform import Rotation
 from surface_points import SHAPES, surface_points
 
@@ -176,7 +177,7 @@ def test_what_is_edited_elsewhere_changes_nothing_here() -> None:
 
 
 @given(st.integers(min_value=0, max_value=2**63 - 1))
-@settings(max_examples=30, deadline=None)
+@at_least(30)
 def test_every_number_gives_a_valid_scene(number: int) -> None:
     scene, _ = load_scene("drawn_foliage", number=number)
     assert 21 <= len(scene.objects) <= 46

@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from property_settings import at_least
 from pydantic import ValidationError
 
 from pcii.core.srgb import srgb_to_linear
@@ -276,7 +277,7 @@ TEXTURES = st.one_of(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@at_least(150)
 @given(TEXTURES, st.floats(-4, 4).map(lambda power: 10.0**power))
 def test_every_texture_is_reflectance_on_every_aspect(texture: Texture, aspect: float) -> None:
     painted = paint(texture, aspect)
