@@ -1,6 +1,6 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
-# make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 25 minutes
+# make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 20 minutes
 # make bench  run time against error; TABLES="sections" for one table, TABLES=removal BENCH_SEEDS=3 to
 #             compare methods over scenes and seeds, TABLES=depth those of depth
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
