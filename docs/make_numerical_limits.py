@@ -197,8 +197,7 @@ class Case:
 
     @property
     def truth(self) -> pcii.Truth:
-        size = self.grid.height, self.grid.width
-        return pcii.Truth(np.full(size, 500.0), np.ones(size, int), {1: "wall"})
+        return pcii.Truth(np.full(self.side, 500.0), np.ones(self.side, int), {1: "wall"})
 
 
 def _from_events(case: Case) -> pcii.PhotonCounts:
@@ -216,7 +215,7 @@ def _grid(case: Case) -> pcii.CameraGrid:
 def _map(case: Case, kind: type) -> Any:
     """A `Truth` or a `DepthMap` of which one depth is that of the case."""
     case.need("constant", "bad depth", "1 x 1")
-    z_mm = np.full((case.grid.height, case.grid.width), 500.0)
+    z_mm = np.full(case.side, 500.0)
     z_mm[0, 0] = case.z_mm
     if np.isinf(case.z_mm):
         raise NotApplicableError  # a miss, which maps may have

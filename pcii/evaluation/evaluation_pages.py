@@ -7,7 +7,7 @@ from typing import Any
 from pcii.base.plain_text import in_markdown
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.pages import page
-from pcii.evaluation.plots import accuracy_plots, reliability_diagrams
+from pcii.evaluation.plots import accuracy_plots, calibration_plots
 from pcii.evaluation.tables import light_name, markdown, overviews, tables_of, with_interval
 from pcii.io.evaluation_layout import seal_evaluation
 
@@ -102,7 +102,7 @@ def _plots(group: Mapping[str, Any], removal: Sequence[str], depth: Sequence[str
             "Errors above 1 px of each method of depth against photons and seconds",
         ),
         (
-            reliability_diagrams(group, depth),
+            calibration_plots(group, depth),
             "Share of correct depths against confidence, by photons per view",
         ),
     ]

@@ -23,7 +23,7 @@ MEASURES = {
 }
 """What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
 PANELS = 4
-"""Panels of a reliability diagram, side by side."""
+"""Panels of the calibration plots, side by side."""
 LEAST_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 
@@ -74,11 +74,13 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     return _data_uri(figure)
 
 
-def reliability_diagrams(group: Mapping[str, Any], methods: Sequence[str]) -> str:
-    """Reliability diagrams: share of correct depths against confidence, by budget, as a PNG in a data URI.
+def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
+    """Share of correct depths against their stated confidence, as a PNG in a data URI.
 
-    Confidence that is right lies on the diagonal, overconfidence below it. The area of a marker grows with
-    its bin's share of the pixels. Empty if no method of `methods` answers anything.
+    `group` holds the results of the datasets of one recipe; each photon budget has a panel, a reliability
+    diagram (Naeini, Cooper and Hauskrecht 2015). Confidence that is right lies on the diagonal, too much
+    confidence below it. The area of a marker grows with its bin's share of the pixels. Empty if no method
+    of `methods` answers anything.
     """
     from matplotlib.lines import Line2D
 

@@ -50,6 +50,22 @@ def voxel_of(pixel: int, camera: int, cameras: int, disparity: float, subpixel: 
     return math.floor((pixel + 1 / 2 + shift) * subpixel)
 
 
+def samples_of(
+    images: np.ndarray, grid: CameraGrid, z_mm: float, *, cfa: str | None = None, subpixel: int = 1
+) -> dict[tuple[int, int, int], list[float]]:
+    """The samples that meet at each (row, column, colour) of views (K, L, H, W, C) of a `unit_grid`."""
+    K, L, H, W, C = images.shape
+    meeting: dict[tuple[int, int, int], list[float]] = {}
+    for k, l, i, j in np.ndindex(K, L, H, W):
+        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, subpixel)
+        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, subpixel)
+        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
+            for channel in range(C):
+                colour = channel if cfa is None else colour_of(i, j, cfa)
+                meeting.setdefault((row, col, colour), []).append(images[k, l, i, j, channel].item())
+    return meeting
+
+
 def section_twin(
     counts_KLHW: np.ndarray, grid: CameraGrid, cfa: str | None, z_mm: list[float], subpixel: int
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -184,3 +200,13 @@ def square_mask(grid: CameraGrid, top: int, left: int, size: int) -> np.ndarray:
 
 def intersection_over_union(a: np.ndarray, b: np.ndarray) -> float:
     return float((a & b).sum() / (a | b).sum())
+
+
+class Reader:
+    """Views that are read one by one, as from disk."""
+
+    def __init__(self, images: np.ndarray) -> None:
+        self.images, self.shape, self.dtype = images, images.shape, images.dtype
+
+    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
+        return self.images[index]

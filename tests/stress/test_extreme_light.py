@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rational_sections import samples_of, variance_of
-from twins import blocky_texture, patch_views, unit_grid
+from twins import Reader, blocky_texture, patch_views, unit_grid
 
 import pcii
 from pcii.core.images import binary_scale
@@ -111,16 +111,6 @@ def test_a_variance_just_below_the_largest_number_is_right() -> None:
         sections = pcii.reconstruct(pcii.Views(radiance, grid), FAR_MM, variance=True)
         assert sections.variance is not None
         np.testing.assert_allclose(sections.variance.item(), 25 / 99 * 1e306, rtol=1e-12)
-
-
-class Reader:
-    """Views that are read one by one, as from disk."""
-
-    def __init__(self, images: np.ndarray) -> None:
-        self.images, self.shape, self.dtype = images, images.shape, images.dtype
-
-    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
-        return self.images[index]
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rational_sections import samples_of
-from twins import even_light, unit_grid
+from twins import Reader, even_light, unit_grid
 
 import pcii
 
@@ -96,16 +96,6 @@ def test_any_number_of_threads_gives_the_same_bits() -> None:
 def test_any_number_of_threads_gives_the_same_bits_of_larger_films(threads: int) -> None:
     """Films of 300 rows have many bands of rows, which are shared out unevenly."""
     assert results_of(threads, 300) == results_of(4, 300)
-
-
-class Reader:
-    """Views that are read one by one, as from disk."""
-
-    def __init__(self, images: np.ndarray) -> None:
-        self.images, self.shape, self.dtype = images, images.shape, images.dtype
-
-    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
-        return self.images[index]
 
 
 @pytest.mark.parametrize("cfa", [None, "GBRG"])

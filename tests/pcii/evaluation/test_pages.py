@@ -81,7 +81,7 @@ def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     evaluation = summarise([row for name in NAMES for row in rows_of(name)])
     drawn = accuracy_plots(evaluation["groups"][0], NAMES[-2:])  # for all: a plot takes half a second
     with pytest.MonkeyPatch.context() as patch:
-        for plots in ("accuracy_plots", "reliability_diagrams"):
+        for plots in ("accuracy_plots", "calibration_plots"):
             patch.setattr(f"pcii.evaluation.evaluation_pages.{plots}", lambda *_: drawn)
         write_evaluation(out, evaluation)
     files = ("report.html", "evaluation.html", "evaluation.md")

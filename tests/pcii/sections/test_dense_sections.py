@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from property_settings import at_least
-from twins import colour_of, unit_grid, voxel_of
+from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import mosaic
@@ -15,30 +15,6 @@ from pcii.sections.demosaicing import demosaic
 from pcii.sections.reconstruction import reconstruct
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
-
-
-def samples_twin(images: np.ndarray, grid, cfa: str | None, z_mm: float, subpixel: int = 1) -> dict:
-    """The samples that meet at each (row, column, colour), by loops."""
-    K, L, H, W, C = images.shape
-    meeting: dict[tuple[int, int, int], list[float]] = {}
-    for k, l, i, j in np.ndindex(K, L, H, W):
-        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, subpixel)
-        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, subpixel)
-        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
-            for channel in range(C):
-                colour = channel if cfa is None else colour_of(i, j, cfa)
-                meeting.setdefault((row, col, colour), []).append(float(images[k, l, i, j, channel]))
-    return meeting
-
-
-class Reader:
-    """Views that are read one by one, as from disk."""
-
-    def __init__(self, images: np.ndarray) -> None:
-        self.images, self.shape, self.dtype = images, images.shape, images.dtype
-
-    def __getitem__(self, index: tuple[int, int]) -> np.ndarray:
-        return self.images[index]
 
 
 @given(
@@ -61,7 +37,7 @@ def test_sums_and_variances_are_those_of_the_samples(
     images = np.random.default_rng(seed).integers(0, 50, shape).astype(np.float64 if double else np.float32)
     sections = reconstruct(Views(images, grid, cfa), z, variance=True)
     expected = np.zeros((2, *sections.counts.shape[1:]))
-    for where, values in samples_twin(images, grid, cfa, z).items():
+    for where, values in samples_of(images, grid, z, cfa=cfa).items():
         expected[0][where] = sum(values)
         expected[1][where] = np.var(values, ddof=1) if len(values) > 1 else 0
     assert sections.variance is not None
@@ -137,7 +113,7 @@ def test_variances_of_counts_and_on_finer_voxels_are_those_of_the_samples(
 ) -> None:
     grid = unit_grid(*cameras, *pixels)
     dense = np.random.default_rng(seed).integers(0, most, grid.shape_KLHW, endpoint=True)
-    samples = samples_twin(dense[..., None], grid, cfa, z, subpixel)
+    samples = samples_of(dense[..., None], grid, z, cfa=cfa, subpixel=subpixel)
     bright = PhotonCounts.from_dense(dense, grid, cfa=cfa)
     events = bright.events
     sparse = PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid, cfa=cfa)
