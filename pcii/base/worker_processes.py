@@ -108,7 +108,7 @@ def _reply(worker: _Worker) -> Done | Exception | None:
 
 
 def _work(pipe: Connection, job: Job, threads: int) -> None:
-    """Do the pieces whose numbers come through the pipe, until it is closed."""
+    """Do the pieces whose numbers come through the pipe, until it is closed at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; who started this process ends it
     job.use_threads(threads)
     while True:
@@ -122,4 +122,7 @@ def _work(pipe: Connection, job: Job, threads: int) -> None:
             reply = fault
         if reply is None:
             time.sleep(AGAIN_S)
-        pipe.send(reply)
+        try:
+            pipe.send(reply)
+        except BrokenPipeError:  # who started this process was killed
+            return
