@@ -2,8 +2,9 @@
 
 Counts drawn from a rendered view have the view's noise besides their own: a rate that is off by a random
 amount of variance v makes counts whose variance is larger by v. That share of the Poisson variance is
-to stay below `NOISE_SHARE`, so dimmer light needs fewer samples. A budget is divided by a view's light,
-whose own standard error is to stay below `NORMALISER_ERROR`.
+to stay below `NOISE_SHARE`, so dimmer light needs fewer samples. The paths of a pixel are spread evenly and
+vary less than independent ones, of which that is said. A budget is divided by a view's light, whose own
+standard error is to stay below `NORMALISER_ERROR`.
 """
 
 import math
@@ -68,6 +69,7 @@ def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: in
                 0,
                 samples_per_pixel=PROBE_SAMPLES,
                 seed=seeds.integer(seed, stage="plan probe", part=part),
+                independent=True,
             ),
             cfa,
         ).astype(np.float64)

@@ -23,16 +23,19 @@ def render_view(
     *,
     samples_per_pixel: int,
     seed: int,
+    independent: bool = False,
 ) -> np.ndarray:
     """Linear radiance (H, W, C), float32, of camera (k, l): sRGB whose luminance is in cd/m^2.
 
     In spectral mode: what pixels of each of the camera's colours see, in the unit of `filters`.
 
     The mean of `samples_per_pixel` paths through each pixel's square; the same bytes for the same
-    seed on the same backend. Views need different seeds: with one seed their noise is the same.
+    seed on the same backend. Views need different seeds: with one seed their noise is the same. The paths of
+    a pixel are spread evenly over it and over the lamps (correlated multi-jittered sampling, Kensler 2013),
+    which at 4 or 8 paths has the error of four times as many `independent` ones.
     """
     mi = render_scene.mi
-    sampler = {"type": "independent"}
+    sampler = {"type": "independent" if independent else "multijitter"}
     camera = as_rig(cameras).camera(k, l)
     plugin = sensor_plugin(mi, camera, sampler)
     if render_scene.filters is not None:
@@ -40,12 +43,23 @@ def render_view(
     sensor = mi.load_dict(plugin)
     channels = 3 if render_scene.filters is None else len(render_scene.filters.sensitivity)
     total = np.zeros((camera.grid.height, camera.grid.width, channels))
-    # By powers of two: other numbers of samples the renderer adds in an order that is left to chance.
-    parts = [1 << bit for bit in range(samples_per_pixel.bit_length()) if samples_per_pixel >> bit & 1]
-    for number, samples in enumerate(reversed(parts)):
+    for number, samples in enumerate(_parts(samples_per_pixel)):
         own_seed = (seed + number * SEED_STEP) % 2**32
         total += samples * np.array(mi.render(render_scene.scene, sensor=sensor, spp=samples, seed=own_seed))
     return (total / samples_per_pixel).astype(np.float32)
+
+
+def _parts(samples: int) -> list[int]:
+    """Numbers of samples to render at a time.
+
+    They are powers of two, since others the renderer adds in an order that is left to chance, and such that
+    the sampler divides a pixel into exactly so many cells: of 32 it makes 5 x 7, and 35 samples.
+    """
+    parts = []
+    for part in (*(4**power for power in range(15, 1, -1)), 8, 4, 2, 1):
+        parts += [part] * (samples // part)
+        samples %= part
+    return parts
 
 
 def _film(film: dict[str, Any], filters: Filters) -> dict[str, Any]:

@@ -26,8 +26,8 @@ def scene() -> RenderScene:
     return two_balls()
 
 
-def seen(built: RenderScene, samples: int, seed: int) -> np.ndarray:
-    image = render_view(built, GRID, 0, 0, samples_per_pixel=samples, seed=seed)
+def seen(built: RenderScene, samples: int, seed: int, independent: bool = False) -> np.ndarray:
+    image = render_view(built, GRID, 0, 0, samples_per_pixel=samples, seed=seed, independent=independent)
     return sense(image, "GRBG").astype(np.float64)
 
 
@@ -79,6 +79,17 @@ def test_a_view_is_the_same_bytes_again_whatever_its_samples(scene: RenderScene)
 
 
 @pytest.mark.renders
+def test_paths_that_are_spread_evenly_have_the_error_of_four_times_as_many(
+    scene: RenderScene, radiance: np.ndarray
+) -> None:
+    def error(samples: int, independent: bool) -> float:
+        images = [seen(scene, samples, seed, independent) for seed in range(5)]
+        return float(np.sqrt(np.mean((np.array(images) - radiance) ** 2)))
+
+    assert error(4, independent=False) < error(16, independent=True)
+
+
+@pytest.mark.renders
 def test_an_even_light_has_no_noise() -> None:
     light = {"type": "uniform", "luminance_cd_m2": 50.0}
     even = build(backend.load(), Scene.model_validate({"title": "even", "lights": [light]}), Path(), 3)
@@ -102,12 +113,15 @@ def looked_often(built: RenderScene, grid: CameraGrid) -> Probe:
     return Probe(float(np.mean([one.mean for one in found])), float(np.mean([one.variance for one in found])))
 
 
-def excess(scene: RenderScene, radiance: np.ndarray, gain: float, samples: int) -> float:
+def excess(
+    scene: RenderScene, radiance: np.ndarray, gain: float, samples: int, independent: bool = False
+) -> float:
     """By how much counts drawn from noisy views are more dispersed than Poisson ones, as a share of that."""
     rng = np.random.default_rng(1)
     rates = gain * radiance
     squares = [
-        (rng.poisson(gain * seen(scene, samples, seed)) - rates) ** 2 / rates.sum() for seed in range(DRAWS)
+        (rng.poisson(gain * seen(scene, samples, seed, independent)) - rates) ** 2 / rates.sum()
+        for seed in range(DRAWS)
     ]
     return float(np.sum(squares) / DRAWS - 1)
 
@@ -134,10 +148,10 @@ def test_a_coarse_look_at_a_larger_film_sees_no_less_noise(scene: RenderScene) -
     assert coarse.mean == pytest.approx(same.mean, rel=0.05)  # the same picture, in as many pixels
     assert coarse.variance == pytest.approx(same.variance, rel=0.45)  # 4 standard errors of 11 %
     first, second = (
-        sense(render_view(scene, fine, 1, 1, samples_per_pixel=8, seed=seed), "GRBG").astype(np.float64)
+        sense(render_view(scene, fine, 1, 1, samples_per_pixel=8, seed=seed, independent=True), "GRBG")
         for seed in (5, 6)
     )
-    own = 8 * ((first - second) ** 2).mean() / 2
+    own = 8 * ((first.astype(np.float64) - second) ** 2).mean() / 2
     assert coarse.variance > own / 1.45
 
 
@@ -152,5 +166,6 @@ def test_planned_samples_keep_rendering_noise_out_of_the_counts(
     # The mean of n squared standard Poisson deviates, weighted by their rates, spreads by this.
     rates = gain * radiance
     spread = np.sqrt((2 * rates**2 + rates).sum() / DRAWS) / rates.sum()
-    assert abs(excess(scene, radiance, gain, samples) - NOISE_SHARE) < 4 * spread
+    assert abs(excess(scene, radiance, gain, samples, independent=True) - NOISE_SHARE) < 4 * spread
+    assert excess(scene, radiance, gain, samples) < NOISE_SHARE + 4 * spread
     assert excess(scene, radiance, gain, samples=1) > NOISE_SHARE + 4 * spread
