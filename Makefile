@@ -3,14 +3,16 @@
 # make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 20 minutes
 # make bench  run time against error; TABLES="sections" for one table, TABLES=removal BENCH_SEEDS=3 to
 #             compare methods over scenes and seeds, TABLES=depth those of depth
+# make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out
+TRAIN_MINUTES ?= 90
 
-.PHONY: demo test stress bench gallery format clean llvm
+.PHONY: demo test stress bench train gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -47,6 +49,15 @@ stress: llvm
 bench: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'
 	$(BIN)/python -m benchmarks $(TABLES)
+
+train: llvm
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[train]'
+	for recipe in training/recipes/*.toml; do \
+	  $(BIN)/simgen generate $$recipe --out $(OUT)/training/$$(basename $$recipe .toml) || exit; \
+	done
+	$(BIN)/python -m training.samples $(OUT)/training/* --out $(OUT)/training-examples
+	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES)
+	$(BIN)/python -m training.export $(OUT)/depth.pt
 
 gallery: llvm
 	$(BIN)/python docs/make_gallery.py

@@ -43,6 +43,7 @@ NO_NUMBERS = {
     "evaluate": "scores as `score` does",
     "import_hci": "reads pictures as `import_images` does",
     "Sections": "made by `reconstruct`",
+    "DepthPosterior": "made by `depth_posterior`",
     "Segmented": "made by `segment`",
     "Score": "made by `score`",
     "Crew": "worker processes",
@@ -371,6 +372,11 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         table[f"estimate_depth, radiance, {method}"] = (
             "estimate_depth",
             lambda case, m=method: pcii.estimate_depth(case.views(), case.z_range_mm, method=m),
+        )
+    for kind, data in (("photons", Case.counts), ("radiance", Case.views)):
+        table[f"depth_posterior, {kind}"] = (
+            "depth_posterior",
+            lambda case, data=data: pcii.depth_posterior(data(case), case.z_range_mm),
         )
     return table | {
         "limit_photons, light": (

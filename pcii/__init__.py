@@ -8,14 +8,14 @@ __version__ = "0.1.0"
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import limit_photons
 from pcii.core.section_stack import Sections
 from pcii.core.srgb import srgb_to_linear
 from pcii.core.truth import Truth
-from pcii.depth.methods import depth_methods, estimate_depth
+from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.exporting.export_formats import export_dataset
 from pcii.importing.array_files import import_arrays
@@ -40,6 +40,7 @@ __all__ = [
     "Collection",
     "Dataset",
     "DepthMap",
+    "DepthPosterior",
     "InputError",
     "LensArray",
     "Optics",
@@ -54,6 +55,7 @@ __all__ = [
     "check_grid",
     "demosaic",
     "depth_methods",
+    "depth_posterior",
     "estimate_depth",
     "evaluate",
     "export_dataset",

@@ -10,6 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, span, table, times
 from pcii.core.array_labels import DEPTH_LABELS
 from pcii.core.arrays import read_only
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.section_stack import Sections
 from pcii.core.xarray_form import labelled_dataset
 
@@ -93,6 +94,52 @@ class DepthMap(Brief):
     def to_xarray(self) -> "xarray.Dataset":
         """`z_mm` and `confidence` over pixels."""
         return labelled_dataset({"z_mm": self.z_mm, "confidence": self.confidence}, DEPTH_LABELS)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthPosterior(Brief):
+    """What is known of the depth of blocks of `block_px` x `block_px` pixels of the virtual centre camera.
+
+    `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
+    there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
+    total disparity. h x w are enough blocks for all pixels. Raises `InputError` for other shapes.
+    """
+
+    planes: FocalPlanes
+    probability: np.ndarray
+    no_surface: np.ndarray
+    block_px: int
+
+    def __post_init__(self) -> None:
+        h, w = (-(-size // self.block_px) for size in (self.planes.grid.height, self.planes.grid.width))
+        if self.probability.shape != (len(self.planes), h, w) or self.no_surface.shape != (h, w):
+            raise InputError(
+                f"probability, no_surface: expected ({len(self.planes)}, {h}, {w}) and ({h}, {w}), got "
+                f"{self.probability.shape} and {self.no_surface.shape}"
+            )
+        object.__setattr__(self, "probability", read_only(self.probability))
+        object.__setattr__(self, "no_surface", read_only(self.no_surface))
+
+    def _facts(self) -> dict[str, object]:
+        return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
+
+    def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.
+
+        The last, in px of total disparity, is the mean over the plane and two on either side.
+        """
+        near = self.probability.copy()
+        near[1:] += self.probability[:-1]
+        near[:-1] += self.probability[1:]
+        plane = near.argmax(axis=0)
+        confidence = np.minimum(np.take_along_axis(near, plane[None], axis=0)[0], 1.0)
+        at = plane + np.arange(-2, 3)[:, None, None]
+        inside = (at >= 0) & (at < len(self.planes))
+        at = np.clip(at, 0, len(self.planes) - 1)
+        weight = np.where(inside, np.take_along_axis(self.probability, at, axis=0), 0).astype(np.float64)
+        weight[2] += np.finfo(np.float32).tiny  # where all are 0 the plane itself is the mean
+        total_px = (weight * self.planes.total_disparity_px[at]).sum(axis=0) / weight.sum(axis=0)
+        return plane, confidence, total_px
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function, package_of, registered
-from pcii.core.estimates import DepthMap
+from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
@@ -46,11 +46,11 @@ def estimate_depth(
     """Depth per pixel, (H, W) float64 in mm within `z_range_mm`, NaN where the method abstains.
 
     `method` is one of `pcii.depth_methods()`, or a function that returns a `DepthMap` for the data and the
-    range. "posterior", the default, is the posterior probability of a piecewise smooth surface by the texture
-    that sections show (docs/theory.md); its `confidence` is honest where surfaces have texture, and too high
-    on plain ones (docs/experiments/depth.md). "focus", of photon counts, compares how well planes predict the
-    photons, and abstains more. "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance,
-    "structure-tensor" are textbook methods to compare with, which answer wherever there are samples.
+    range. "posterior", the default, is the posterior probability of depth by the texture that sections show,
+    by the smoothness of surfaces and by a network that has seen many (docs/theory.md); `depth_posterior` has
+    all of it. "focus", of photon counts, compares how well planes predict the photons, and abstains more.
+    "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
+    methods to compare with, which answer wherever there are samples.
 
     Raises `InputError` for a range that is not 0 < near < far, a single view, or a method that is not known
     or cannot take the data.
@@ -65,15 +65,29 @@ def estimate_depth(
     >>> depth.z_mm.shape, bool(np.isnan(depth.z_mm).all()), float(depth.confidence.max())
     ((16, 16), True, 0.0)
     """
-    if not isinstance(data, PhotonCounts | Views):
-        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
-    z_range_mm = check_range_mm(data.grid, z_range_mm)
-    if data.grid.view_count < 2:
-        raise InputError("data: one view has no depth; at least 2 cameras are needed")
+    z_range_mm = _checked_range_mm(data, z_range_mm)
     if method is None:
         method = next(iter(FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS))
     estimate = method if callable(method) else find_depth_method(method, data)
     return estimate(data, z_range_mm)
+
+
+def depth_posterior(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
+    """Probability of each depth in `z_range_mm`, and of no surface there, for blocks of 2 x 2 pixels or more.
+
+    It is what the method "posterior" of `estimate_depth` reads its depths and confidences from, and has a
+    value everywhere: where no photon is, that of scenes on average. Raises `InputError` as `estimate_depth`.
+    """
+    z_range_mm = _checked_range_mm(data, z_range_mm)
+    return PosteriorDepth().posterior(data, z_range_mm)
+
+
+def _checked_range_mm(data: object, z_range_mm: tuple[float, float]) -> tuple[float, float]:
+    if not isinstance(data, PhotonCounts | Views):
+        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
+    if data.grid.view_count < 2:
+        raise InputError("data: one view has no depth; at least 2 cameras are needed")
+    return check_range_mm(data.grid, z_range_mm)
 
 
 def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:

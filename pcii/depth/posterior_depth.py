@@ -1,4 +1,4 @@
-"""Depth from the posterior probability of a piecewise smooth surface, by the evidence of texture.
+"""Depth from its posterior probability: evidence of texture, smooth surfaces, and a network that corrects it.
 
 Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
 largest value. So whether a surface is seen is decided apart: there are photons, and two halves of the cameras
@@ -9,19 +9,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pcii.core.estimates import DepthMap
+from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
+from pcii.depth.network_inputs import NetworkInputs, network_inputs
+from pcii.depth.smooth_surface import SurfacePrior
+from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of, least_agreement
 from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureModel, evidence_of_texture
+from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.sections.photon_statistics import cells_to_pixels
 
-MOST_VALUES = 1 << 26
+MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
 
 
@@ -38,24 +40,55 @@ class PosteriorDepth:
     """Standard deviation of the window in which there are to be photons."""
     least_photons: float = 10.0
     """Their least number, in a Gaussian of weight 1 at its centre."""
+    region_px: float = 64.0
+    """Standard deviation of the window that is seen as a whole if the halves of the cameras agree on much of
+    it: so large that a chance agreement, which reaches as far as the windows of its test, is little of it."""
+    least_share: float = 0.25
+    """How much, of what the posterior calls a surface there."""
 
     def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
+        data = _without_faults(data)
+        posterior, photons = self._posterior(data, z_range_mm)
+        plane, confidence, total_px = posterior.most_probable()
+        seen = self._has_photons(photons, plane, posterior.block_px)
+        if isinstance(data, PhotonCounts):
+            agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
+            seen &= agree | self._in_agreeing_region(agree, posterior)
+        depth = np.where(seen, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
+        maps = depth, np.where(seen, confidence, 0.0)
+        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
+
+    def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
+        """The posterior of planes through the range."""
+        return self._posterior(_without_faults(data), z_range_mm)[0]
+
+    def _posterior(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
+    ) -> tuple[DepthPosterior, np.ndarray]:
+        """The posterior, and the photons (Z, h / 4, w / 4) of 4 x 4 blocks."""
         planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
         block_px = self.block_px
         while len(planes) * data.grid.height * data.grid.width / block_px**2 > MOST_VALUES:
             block_px *= 2
-        if isinstance(data, PhotonCounts):
-            data = without_hot_pixels(data)
         evidence = evidence_of_texture(data, planes, block_px, self.model)
-        posterior = surface_posterior(evidence.nats, self.prior)
-        best, confidence, total_px = _most_probable(posterior, planes.total_disparity_px)
-        seen = self._has_photons(evidence.photons, best, block_px)
-        if isinstance(data, PhotonCounts):
-            seen &= _halves_agree(data, planes, best, block_px)
-        depth = np.where(seen, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
-        confidence = np.where(seen, confidence, 0.0)
-        return DepthMap(*(cells_to_pixels(part, block_px, data.grid) for part in (depth, confidence)))
+        h, w = evidence.nats.shape[1:]
+        parts = network_posterior(self.network_inputs(evidence, data, block_px))
+        return DepthPosterior(planes, *(part[..., :h, :w] for part in parts), block_px), evidence.photons
+
+    def network_inputs(
+        self, evidence: TextureEvidence, data: PhotonCounts | Views, block_px: int
+    ) -> NetworkInputs:
+        """What the network is given for the evidence of blocks."""
+        colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
+        return network_inputs(evidence, data.grid.view_count * colours * block_px**2, self.prior, MULTIPLE)
+
+    def _in_agreeing_region(self, agree: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
+        """Surfaces (h, w) bool around which the halves `agree` (h, w) in a share of the blocks."""
+        from scipy.ndimage import gaussian_filter
+
+        share = gaussian_filter(agree.astype(np.float32), self.region_px / posterior.block_px, mode="nearest")
+        return (share >= self.least_share) & (posterior.no_surface < 0.5)
 
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""
@@ -65,6 +98,10 @@ class PosteriorDepth:
         around = gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
         i, j = (np.arange(size) // CELL_BLOCKS for size in best.shape)
         return around[best, i[:, None], j] >= self.least_photons
+
+
+def _without_faults(data: PhotonCounts | Views) -> PhotonCounts | Views:
+    return without_hot_pixels(data) if isinstance(data, PhotonCounts) else data
 
 
 def _halves_agree(counts: PhotonCounts, planes: FocalPlanes, best: np.ndarray, block_px: int) -> np.ndarray:
@@ -81,27 +118,3 @@ def _halves_agree(counts: PhotonCounts, planes: FocalPlanes, best: np.ndarray, b
     t = halves_of(counts, every_other).agreement(plane, np.ones(plane.shape, bool))
     agree = cells_to_pixels(t >= least_agreement(len(every_other)), CELL_PX, counts.grid)
     return agree[::block_px, ::block_px]
-
-
-def _most_probable(posterior: np.ndarray, total_px: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The plane (h, w) most probable with its neighbours, their probability, and the mean disparity there.
-
-    The mean is of two planes on either side.
-    """
-    near = _over_neighbours(posterior)
-    best = near.argmax(axis=-1)
-    at = best[..., None] + np.arange(-2, 3)
-    inside = (at >= 0) & (at < total_px.size)
-    at = np.clip(at, 0, total_px.size - 1)
-    weight = np.where(inside, np.take_along_axis(posterior, at, axis=-1), 0).astype(np.float64)
-    mean_px = (weight * total_px[at]).sum(axis=-1) / weight.sum(axis=-1)
-    confidence = np.take_along_axis(near, best[..., None], axis=-1)[..., 0]
-    return best, np.minimum(confidence, 1.0), mean_px
-
-
-def _over_neighbours(values: np.ndarray) -> np.ndarray:
-    """Sums of each plane and the planes on either side (h, w, Z)."""
-    total = values.copy()
-    total[..., 1:] += values[..., :-1]
-    total[..., :-1] += values[..., 1:]
-    return total

@@ -35,7 +35,7 @@ import numpy as np
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views, binary_scale
 from pcii.core.photon_counts import PhotonCounts
-from pcii.sections.photon_statistics import cell_sums
+from pcii.sections.photon_statistics import cell_sums, sum_of
 from pcii.sections.reconstruction import reconstruct
 
 
@@ -55,11 +55,14 @@ class TextureModel:
 class TextureEvidence(NamedTuple):
     """Evidence at Z planes: `nats` (Z, h, w) float32 for each block of pixels.
 
-    `photons` (Z, h / 4, w / 4, rounded up) is the number of photons in 4 x 4 blocks; of radiance, the square
-    of its mean over the variance of the mean, as it is of photons.
+    `sums` and `samples` (Z, h, w) float32 are the sum over the views' samples in a block, photons or
+    radiance, and their number. `photons` (Z, h / 4, w / 4, rounded up) is the number of photons in 4 x 4
+    blocks; of radiance, the square of its mean over the variance of the mean, as it is of photons.
     """
 
     nats: np.ndarray
+    sums: np.ndarray
+    samples: np.ndarray
     photons: np.ndarray
 
 
@@ -85,18 +88,22 @@ def evidence_of_texture(
     least_samples = chosen.least_coverage * data.grid.view_count * colours * block_px**2
     scale = binary_scale(data) if isinstance(data, Views) else 1.0
 
-    def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray]:
+    h, w = -(-data.grid.height // block_px), -(-data.grid.width // block_px)
+
+    def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
         blocks = _block_sums(data, planes.take([plane]), block_px, scale)
         cells = [cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
-        sums, spread = cells[SUMS], cells[SPREAD]
-        return _of_section(blocks, chosen, least_samples), sums**2 / np.maximum(spread, LEAST_RATE)
+        photons = cells[SUMS] ** 2 / np.maximum(cells[SPREAD], LEAST_RATE)
+        octaves = _of_section(blocks, chosen, least_samples)
+        return octaves, blocks[SUMS][:h, :w], blocks[SAMPLES][:h, :w], photons
 
     with ThreadPoolExecutor(threads()) as pool:
-        octaves, photons = zip(*pool.map(of_plane, range(len(planes))), strict=True)
+        octaves, *others = zip(*pool.map(of_plane, range(len(planes))), strict=True)
         largest = [np.maximum(np.max(each, axis=0), 0) for each in zip(*octaves, strict=True)]
         nats = pool.map(lambda excess: _summed(_saturated(excess, largest, chosen)), octaves)
-        h, w = -(-data.grid.height // block_px), -(-data.grid.width // block_px)
-        return TextureEvidence(np.stack([each[:h, :w] for each in nats]), np.stack(photons))
+        return TextureEvidence(
+            np.stack([each[:h, :w] for each in nats]), *(np.stack(each) for each in others)
+        )
 
 
 def _block_sums(
@@ -111,7 +118,7 @@ def _block_sums(
     section = reconstruct(data, plane, variance=not is_counted)
 
     def in_blocks(values: np.ndarray) -> np.ndarray:
-        blocks = cell_sums(values.sum(axis=-1), block_px, np.float32)
+        blocks = cell_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
         return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
 
     blocks = [

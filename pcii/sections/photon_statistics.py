@@ -5,6 +5,7 @@ hardly any has two different non-zero samples. So samples are pooled over small 
 is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,9 +56,7 @@ def photons_around_a_photon(sections: Sections) -> float:
     """
     photons = squares = 0.0
     for plane in sections.counts:
-        total = plane[..., 0].astype(np.float64)
-        for colour in range(1, plane.shape[-1]):  # a sum over a last axis of three would take longer
-            total += plane[..., colour]
+        total = sum_of(list(np.moveaxis(plane, -1, 0)), np.float64)  # faster than over a last axis of three
         photons += float(total.sum())
         squares += float(np.vdot(total, total))
     return squares / photons - 1 if photons > 0 else 0.0
@@ -143,9 +142,19 @@ def view_samples(
 def cell_sums(pixels: np.ndarray, cell_px: int, dtype: type) -> np.ndarray:
     """Sums over cells of `cell_px` x `cell_px` pixels (..., H, W); those at the ends may be smaller."""
     *others, H, W = pixels.shape
-    padded = np.pad(pixels, [(0, 0)] * len(others) + [(0, -H % cell_px), (0, -W % cell_px)])
-    h, w = padded.shape[-2] // cell_px, padded.shape[-1] // cell_px
-    return padded.reshape(*others, h, cell_px, w, cell_px).sum(axis=(-3, -1), dtype=dtype)
+    if H % cell_px or W % cell_px:
+        pixels = np.pad(pixels, [(0, 0)] * len(others) + [(0, -H % cell_px), (0, -W % cell_px)])
+    # Strided sums: NumPy's over several short axes take five times as long.
+    rows = sum_of([pixels[..., place::cell_px, :] for place in range(cell_px)], dtype)
+    return sum_of([rows[..., place::cell_px] for place in range(cell_px)], dtype)
+
+
+def sum_of(parts: Sequence[np.ndarray], dtype: type) -> np.ndarray:
+    """Sum of arrays of one shape, added one by one."""
+    total = parts[0].astype(dtype)
+    for part in parts[1:]:
+        total += part
+    return total
 
 
 def cells_to_pixels(cells: np.ndarray, cell_px: int, grid: CameraGrid) -> np.ndarray:

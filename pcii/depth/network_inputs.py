@@ -1,0 +1,65 @@
+"""What the network of depth is given: evidence, the posterior of a surface, brightness, coverage.
+
+All of it is without unit and per plane of 1 px of total disparity, so that other cameras, other numbers of
+planes and any amount of light look alike.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
+from pcii.evidence.texture_evidence import TextureEvidence
+from pcii.sections.photon_statistics import cell_sums
+
+CELL_BLOCKS = 2
+"""Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""
+MOST_RATE = 25.0
+"""Of the mean of the film; brighter blocks are taken as so bright."""
+LEAST_LOG_RATIO, MOST_LOG_RATIO = -8.0, 8.0
+"""Ends of the logarithm of a probability relative to all planes being alike."""
+LEAST_PHOTONS, MOST_PHOTONS = 1e-2, 1e3
+"""Ends of the mean number of photons in a cell."""
+
+
+class NetworkInputs(NamedTuple):
+    """Inputs (Z planes), float32. Numbers of blocks are padded to whole `multiple`s with empty ones.
+
+    `evidence` (Z, h, w): asinh of the nats of a block; `brightness` (Z, h, w): square root of its mean over
+    that of the film; `coverage` (Z, h / 2, w / 2): share of the views' samples that a cell has; `surface`
+    (Z, h / 2, w / 2): logarithm of the posterior of a smooth surface relative to equally likely planes;
+    `light` (1,): log10 of the mean number of photons in a cell.
+    """
+
+    evidence: np.ndarray
+    brightness: np.ndarray
+    coverage: np.ndarray
+    surface: np.ndarray
+    light: np.ndarray
+
+
+def network_inputs(
+    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int
+) -> NetworkInputs:
+    """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples."""
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        return np.pad(values, [(0, 0), *((0, -size % multiple) for size in values.shape[1:])])
+
+    nats, sums, samples = (padded(part) for part in (evidence.nats, evidence.sums, evidence.samples))
+    in_cells = [
+        np.stack([cell_sums(plane, CELL_BLOCKS, np.float32) for plane in part]) for part in (nats, samples)
+    ]
+    posterior = surface_posterior(in_cells[0], prior).transpose(2, 0, 1)
+    ratio = np.log(np.maximum(posterior * len(nats), np.float32(np.exp(LEAST_LOG_RATIO))))
+    total, number = float(evidence.sums.sum(dtype=np.float64)), float(evidence.samples.sum(dtype=np.float64))
+    mean = total / number if total > 0 and number > 0 else 1.0
+    rate = sums / np.maximum(samples, 1e-3) / np.float32(mean)
+    photons = float(evidence.photons.mean(dtype=np.float64)) / 4
+    return NetworkInputs(
+        np.arcsinh(nats),
+        np.sqrt(np.clip(rate, 0, MOST_RATE)),
+        in_cells[1] / np.float32(samples_per_block * CELL_BLOCKS**2),
+        np.minimum(ratio, np.float32(MOST_LOG_RATIO)),
+        np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32),
+    )

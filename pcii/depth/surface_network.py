@@ -1,0 +1,66 @@
+"""The posterior probability of depth by a network that has seen many surfaces (docs/theory.md).
+
+A likelihood says at which depth a block shows texture; that a plain ball bulges between its outlines, that
+an outline belongs to the nearer side, and that blur around bright things is no surface, is learned. The
+network's weights are in `weights`; `training` has the commands that make them. It runs by ONNX Runtime.
+"""
+
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pcii.depth.network_inputs import CELL_BLOCKS, NetworkInputs
+
+if TYPE_CHECKING:
+    from onnxruntime import InferenceSession
+
+WEIGHTS = Path(__file__).parent / "weights"
+MULTIPLE = 32
+"""Blocks of a cell of the network's coarsest level, of which films are whole numbers."""
+BAND_VALUES = 1 << 22
+"""Blocks times planes whose last step is done at once."""
+
+
+def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
+    """Probabilities (Z, h, w) of the planes and (h, w) of no surface, float32, for blocks of the inputs."""
+    from pcii.base.compiled_loops import threads
+
+    trunk, head = _sessions(threads())
+    Z, h, w = inputs.evidence.shape
+    features, cell_logit, cell_nothing = trunk.run(None, inputs._asdict())
+    nothing = cell_nothing[0, 0].repeat(CELL_BLOCKS, axis=0).repeat(CELL_BLOCKS, axis=1)
+    probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
+    rows = max(1, BAND_VALUES // (Z * w)) * CELL_BLOCKS
+    for top in range(0, h, rows):
+        end = min(top + rows, h)
+        # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
+        first, last = max(top - CELL_BLOCKS, 0), min(end + CELL_BLOCKS, h)
+        cells = np.s_[:, :, first // CELL_BLOCKS : last // CELL_BLOCKS]
+        blocks = np.s_[:, first:last]
+        parts = features[cells], cell_logit[cells], inputs.evidence[blocks], inputs.brightness[blocks]
+        names = [argument.name for argument in head.get_inputs()]
+        (logit,) = head.run(None, dict(zip(names, parts, strict=True)))
+        own = logit[:, top - first : end - first]
+        largest = np.maximum(own.max(axis=0), nothing[top:end])
+        own = np.exp(own - largest)
+        none[top:end] = np.exp(nothing[top:end] - largest)
+        total = own.sum(axis=0) + none[top:end]
+        probability[:, top:end] = own / total
+        none[top:end] /= total
+    return probability, none
+
+
+@cache
+def _sessions(threads: int) -> "tuple[InferenceSession, InferenceSession]":
+    """The network up to cells of 4 px, and its last step, on so many threads."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    trunk, head = (
+        onnxruntime.InferenceSession(WEIGHTS / f"{name}.onnx", options, providers=["CPUExecutionProvider"])
+        for name in ("trunk", "head")
+    )
+    return trunk, head

@@ -1,0 +1,114 @@
+"""What the network of depth is given and gives, whatever its weights are."""
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.base.compiled_loops import threads, use_threads
+from pcii.core.estimates import DepthPosterior
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
+from pcii.depth import surface_network
+from pcii.depth.network_inputs import NetworkInputs, network_inputs
+from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.depth.smooth_surface import SurfacePrior
+from pcii.depth.surface_network import network_posterior
+from pcii.evidence.texture_evidence import evidence_of_texture
+
+METHOD = PosteriorDepth()
+
+
+def random_inputs(Z: int = 5, h: int = 64, w: int = 96, seed: int = 0) -> NetworkInputs:
+    rng = np.random.default_rng(seed)
+
+    def normal(*shape: int) -> np.ndarray:
+        return rng.normal(size=shape).astype(np.float32)
+
+    cells = Z, h // 2, w // 2
+    return NetworkInputs(
+        normal(Z, h, w),
+        abs(normal(Z, h, w)),
+        np.ones(cells, np.float32),
+        normal(*cells),
+        np.ones(1, np.float32),
+    )
+
+
+def test_it_gives_a_distribution_for_each_block() -> None:
+    probability, nothing = network_posterior(random_inputs())
+    assert probability.shape == (5, 64, 96)
+    assert probability.min() >= 0
+    np.testing.assert_allclose(probability.sum(axis=0) + nothing, 1, rtol=1e-5)
+
+
+def test_bands_of_the_film_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = network_posterior(random_inputs())
+    monkeypatch.setattr(surface_network, "BAND_VALUES", 5 * 96 * 7)
+    for own, expected in zip(network_posterior(random_inputs()), whole, strict=True):
+        # The runtime may order sums otherwise for another size.
+        np.testing.assert_allclose(own, expected, rtol=1e-4, atol=1e-6)
+
+
+def test_the_number_of_threads_does_not_show() -> None:
+    before = threads()
+    results = []
+    try:
+        for count in (1, 2):
+            use_threads(count)
+            results.append(network_posterior(random_inputs())[0])
+    finally:
+        use_threads(before)
+    assert np.array_equal(*results)
+
+
+def test_inputs_have_no_unit_of_light_and_tell_how_much_there_is(two_squares) -> None:
+    grid = two_squares.counts.grid
+    planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
+    views = two_squares.counts.dense[..., None] / 1.0
+
+    def of(data) -> NetworkInputs:
+        evidence = evidence_of_texture(data, planes, METHOD.block_px, METHOD.model)
+        return METHOD.network_inputs(evidence, data, METHOD.block_px)
+
+    own, brighter = of(Views(views, grid)), of(Views(views * 1024, grid))
+    for part, other in zip(own, brighter, strict=True):
+        np.testing.assert_allclose(part, other, rtol=1e-5, atol=1e-5)
+    few = two_squares.counts.subsample(two_squares.counts.total / 4, np.random.default_rng(0))
+    assert float(of(two_squares.counts).light[0] - of(few).light[0]) == pytest.approx(np.log10(4), abs=0.05)
+
+
+def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
+    grid = two_squares.counts.grid
+    planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
+    evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
+    samples = grid.view_count * METHOD.block_px**2
+    own = network_inputs(evidence, samples, SurfacePrior(), 1)
+    turned = network_inputs(
+        evidence._replace(
+            nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
+        ),
+        samples,
+        SurfacePrior(),
+        1,
+    )
+    for part, other in zip(own[:4], turned[:4], strict=True):
+        np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
+
+
+def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() -> None:
+    grid = unit_grid(1, 3, 2, 4)
+    planes = FocalPlanes.at_total_disparity(grid, [4.0, 5.0, 6.0, 7.0])
+    probability = np.zeros((4, 1, 2), np.float32)
+    probability[:, 0, 0] = [0.0, 0.25, 0.5, 0.0]
+    probability[:, 0, 1] = [0.4, 0.1, 0.0, 0.0]
+    posterior = DepthPosterior(planes, probability, 1 - probability.sum(axis=0), block_px=2)
+    plane, confidence, total_px = posterior.most_probable()
+    assert plane.tolist() in ([[1, 0]], [[2, 0]])
+    np.testing.assert_allclose(confidence, [[0.75, 0.5]])
+    np.testing.assert_allclose(total_px, [[(5 * 0.25 + 6 * 0.5) / 0.75, (4 * 0.4 + 5 * 0.1) / 0.5]])
+
+
+def test_a_posterior_that_does_not_cover_the_film_is_refused() -> None:
+    planes = FocalPlanes.at_total_disparity(unit_grid(1, 3, 4, 5), [4.0, 5.0])
+    with pytest.raises(ValueError, match=r"probability, no_surface: expected \(2, 2, 3\) and \(2, 3\), got"):
+        DepthPosterior(planes, np.zeros((2, 2, 2), np.float32), np.zeros((2, 2), np.float32), block_px=2)
