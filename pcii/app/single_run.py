@@ -36,5 +36,5 @@ def run(
         results.save_depth(outcome.depth)
         results.save_score(outcome.score)
         with results.replacing("report.html") as page:
-            write_report(page, outcome)
+            write_report(page, outcome, report)
     return outcome

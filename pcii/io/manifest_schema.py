@@ -144,6 +144,7 @@ class DatasetManifest(_Model):
     photons: PhotonLog | None = None
     skipped: list[str | SkippedWork] = []  # sentences in older manifests
     timings_s: dict[str, Seconds] = {}
+    versions: dict[str, Text] = {}
     files: dict[FileName, FileEntry]
 
 
