@@ -69,9 +69,25 @@ def crop_of(outcome: Outcome) -> Crop:
 
 
 def block_estimate(sections: Sections, plane: int, crop: Crop) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples."""
+    """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples.
+
+    At some depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the
+    estimate is that of the 3 x 3 blocks around, so that no depth has a tint.
+    """
     counts, samples = crop.sums(sections.counts[plane]), crop.sums(sections.coverage[plane])
-    return counts / np.maximum(samples, 1), samples
+    around = (_sums_around(values) for values in (counts, samples))
+    counts, weights = (
+        np.where(samples > 0, own, near) for own, near in zip((counts, samples), around, strict=True)
+    )
+    return counts / np.maximum(weights, 1), samples
+
+
+def _sums_around(blocks: np.ndarray) -> np.ndarray:
+    """Sums over each block (h, w, C) and the eight around it."""
+    height, width = blocks.shape[:2]
+    padded = np.pad(blocks, ((1, 1), (1, 1), (0, 0)))
+    rows = sum(padded[a : a + height] for a in range(3))
+    return sum(rows[:, b : b + width] for b in range(3))  # type: ignore[index]
 
 
 def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
@@ -115,7 +131,10 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
 
 
 def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
-    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison."""
+    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison.
+
+    Without truth all are in one row.
+    """
     truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
     by_object = object_masks(grid, truth, z_mm) if truth else None
     by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
@@ -125,7 +144,8 @@ def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
         for plane, z in enumerate(z_mm):
             kept = crop.middles(focus.in_focus[plane])
             image = sections[plane] * kept[..., None]
-            panels = [_photo(image, f"{focus.method}, {z:g} mm: after removal")]
+            empty = "" if focus.in_focus[plane].any() else ", nothing is kept"
+            panels = [_photo(image, f"{focus.method}, {z:g} mm: after removal{empty}")]
             if by_object is not None and by_pixel is not None:
                 true = crop.middles(by_object[plane])
                 image = picture.mask_image(true)
@@ -133,7 +153,7 @@ def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
                 panels.append(_drawing(image, f"truth at {z:g} mm"))
                 panels.append(_drawing(picture.agreement_image(kept, true), f"comparison at {z:g} mm"))
             rows.append(panels)
-    return rows
+    return rows if truth else [[panel for row in rows for panel in row]]
 
 
 def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:

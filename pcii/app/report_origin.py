@@ -61,9 +61,7 @@ def _of_dataset(manifest: Mapping[str, Any], name: str) -> list[tuple[str, str]]
     if manifest.get("identity"):
         rows.append(("identity", manifest["identity"]))
     files = len(manifest["files"])
-    rows.append(("files", f"{files:,}, each with its SHA-256 in manifest.json; `pcii verify` compares them"))
-    if manifest.get("sha256"):
-        rows.append(("SHA-256 of the manifest", manifest["sha256"]))
+    rows.append(("files", f"{files:,}, each with its SHA-256 in manifest.json; pcii verify compares them"))
     return rows
 
 

@@ -38,7 +38,8 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
             row["iou"] for row in _rows_of(score.planes, focus.method, "object") if row["object"] is not None
         ]
         if ious and None not in ious:
-            facts.append((f"IoU of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
+            name = "IoU" if len(ious) == 1 else "mean IoU"
+            facts.append((f"{name} of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
     if score.depth["median_mm"] is not None:
         facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
         facts.append(("depths off by more than 1 px", _percent(score.depth["bad_1px"])))

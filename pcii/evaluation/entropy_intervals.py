@@ -11,6 +11,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.evaluation.paired_tests import mean_interval
+from pcii.imaging.bright_regions import box_around
 from pcii.metrics.scoring import entropy_region
 from pcii.sections.photon_statistics import (
     pooled_estimate,
@@ -43,6 +44,7 @@ def entropy_half_widths(
     if not GROUPS <= counts.total or counts.events.n.size > MOST_EVENTS:
         return []
     regions = [entropy_region(sections.grid, truth, number, sections.z_mm) for number in sorted(truth.names)]
+    boxes = [box_around(region, (0, 0)) for region in regions]  # a small part of a large frame
     window_px = section_window_px(sections)
     samples = pooled_samples(sections, window_px)
 
@@ -50,7 +52,10 @@ def entropy_half_widths(
         """Entropies (objects, planes) of Eq. 9, as `score` finds them."""
         pooled = pooled_estimate(of, window_px, samples)
         tops = pooled.max(axis=1).max(axis=(0, 1))
-        return np.array([[region_entropy_bits(plane, region, tops) for plane in pooled] for region in regions])
+        parts = zip(boxes, regions, strict=True)
+        return np.array(
+            [[region_entropy_bits(plane[box], region[box], tops) for plane in pooled] for box, region in parts]
+        )
 
     whole = entropies(sections)
     others: list[np.ndarray] = []

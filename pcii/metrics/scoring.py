@@ -154,10 +154,11 @@ def _object_rows(focus: Segmented, pooled: np.ndarray, truth: Truth) -> list[dic
 
 def entropy_region(grid: CameraGrid, truth: Truth, number: int, z_mm: np.ndarray) -> np.ndarray:
     """Region (H, W) bool of an object for Table 1: where it is seen, and its blur at any of the planes."""
-    from scipy.ndimage import binary_dilation
+    from scipy.ndimage import distance_transform_cdt
 
     mask = truth.object_id == number
     if not mask.any():
         return mask
     blur = max(float(blur_half_extent_px(grid, truth.z_mm[mask], z).mean()) for z in z_mm)
-    return np.asarray(binary_dilation(mask, iterations=max(1, round(2 * blur))), dtype=bool)
+    # What as many dilations by the four neighbours would reach, in one pass.
+    return np.asarray(distance_transform_cdt(~mask, metric="taxicab") <= max(1, round(2 * blur)))

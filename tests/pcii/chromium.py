@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,19 +31,18 @@ class Page:
         """The answer to one command of the protocol; events that come before it are noted."""
         self._number += 1
         number = self._number
-        self._run(
-            self._socket.write_message(json.dumps({"id": number, "method": method, "params": parameters}))
-        )
+        command = json.dumps({"id": number, "method": method, "params": parameters})
+        self._run(lambda: self._socket.write_message(command))
         while True:
-            message = json.loads(self._run(self._socket.read_message()))
+            message = json.loads(self._run(self._socket.read_message))
             if message.get("id") == number:
                 assert "error" not in message, message
                 return message["result"]
             self._note(message)
 
-    def _run(self, step: Any) -> Any:
+    def _run(self, step: Callable[[], Awaitable[Any]]) -> Any:
         async def within() -> Any:
-            return await asyncio.wait_for(step, LONGEST_S)
+            return await asyncio.wait_for(step(), LONGEST_S)
 
         return self._loop.run_until_complete(within())
 
