@@ -1,4 +1,4 @@
-"""report.html: pictures, a slider through the depths, Figures 6 and 7 and Table 1 of one dataset with its truth.
+"""report.html: a slider through the depths, and the paper's figures and table for one dataset with its truth.
 
 A single file that fetches nothing, which can be mailed, archived and printed. Its pictures and text need no
 script; the slider and the read-out are by the one in `pcii/evaluation/templates/report.js`.

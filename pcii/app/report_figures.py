@@ -46,10 +46,11 @@ class Crop:
         return self.cols.stop - self.cols.start
 
     def middles(self, image: np.ndarray) -> np.ndarray:
-        """The pixel in the middle of each block of an image (H, W, ...), for what has no mean: ids, depths."""
+        """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
         part, step = image[self.rows, self.cols], self.step_px
         rows, cols = (
-            np.minimum(np.arange(0, size, step) + step // 2, size - 1) for size in (self.height_px, self.width_px)
+            np.minimum(np.arange(0, size, step) + step // 2, size - 1)
+            for size in (self.height_px, self.width_px)
         )
         return part[rows][:, cols]
 
@@ -126,7 +127,9 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
     if dataset.truth is not None:
         near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
         image = picture.depth_image(crop.middles(depth_of_objects(dataset.truth)), near, far)
-        panels.append(_drawing(image, f"({next(letters)}) true depth of the objects (colour scale under Depth)"))
+        panels.append(
+            _drawing(image, f"({next(letters)}) true depth of the objects (colour scale under Depth)")
+        )
     return panels
 
 

@@ -1,7 +1,7 @@
 """Sections through the whole depth range, for the slider of a report, and what is read out at a pixel.
 
-Lights (photon counts, full light) have a picture at every plane of the slider. Points (all, those that a method
-keeps, those that are true) have masks at the planes of the analysis, which are among them.
+Lights (photon counts, full light) have a picture at every plane of the slider. Points (those that a method
+keeps, those in focus in truth) have masks at the planes of the analysis, which are among them.
 """
 
 import base64
@@ -105,7 +105,7 @@ def _each(source: PhotonCounts | Views, planes: FocalPlanes) -> Iterator[tuple[S
 
 
 def _points(outcome: Outcome, crop: Crop, own: dict[int, int]) -> list[dict[str, Any]]:
-    """For each method and the truth: which points are kept at each plane, and the comparison with the truth."""
+    """For each method and the truth: masks at each plane, and their comparison with the truth."""
     truth = outcome.dataset.truth
     true = None if truth is None else object_masks(outcome.dataset.grid, truth, outcome.sections.z_mm)
     points: list[dict[str, Any]] = []

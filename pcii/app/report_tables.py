@@ -53,7 +53,7 @@ def _rows_of(planes: Sequence[Row], method: str, kind: str) -> list[Row]:
 
 
 def table1(outcome: Outcome) -> dict[str, Any] | None:
-    """Entropies of the objects with their intervals, and whether each is lowest at its plane; None of none."""
+    """Entropies of the objects with their intervals, and whether each is lowest at its plane."""
     objects, truth = outcome.score.objects, outcome.dataset.truth
     if truth is None or all(bits is None for row in objects for bits in row["entropy"].values()):
         return None

@@ -36,4 +36,3 @@ def page(template: str, content: dict[str, Any], script: str | None = None) -> b
         digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
         own = {"script": Markup(text), "script_hash": Markup(f"'sha256-{digest}'")}
     return environment.get_template(template).render(content, **own).encode()
-

@@ -63,9 +63,7 @@ def photons_around_a_photon(sections: Sections) -> float:
     return squares / photons - 1 if photons > 0 else 0.0
 
 
-def pooled_estimate(
-    sections: Sections, window_px: int, samples: np.ndarray | None = None
-) -> np.ndarray:
+def pooled_estimate(sections: Sections, window_px: int, samples: np.ndarray | None = None) -> np.ndarray:
     """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
 
     Sums are divided, so all samples have the same weight; a window that no sample reaches is 0. `samples` are
