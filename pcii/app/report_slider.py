@@ -24,8 +24,8 @@ from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.true_masks import object_masks
 from pcii.sections.reconstruction import reconstruct
 
-MOST_PLANES = 24
-"""Planes of the slider beside those of the analysis: pictures of 1024 x 1024 pixels then take some MB."""
+MOST_PLANES = 20
+"""Planes of the slider beside those of the analysis. A report of 1024 x 1024 bright pixels is then below 8 MB."""
 FINEST_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 MOST_VOXELS = 40_000_000
