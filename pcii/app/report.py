@@ -7,6 +7,8 @@ script; the slider and the read-out are by the one in `pcii/evaluation/templates
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pcii.app.pipeline import Outcome
 from pcii.app.report_figures import Crop, crop_of, depth_error_mm, depth_panels, figure6, figure7
 from pcii.app.report_origin import origin
@@ -55,6 +57,7 @@ def _content(outcome: Outcome, report: Report) -> dict[str, Any]:
         "figure6": figure6(outcome, crop),
         "figure7": figure7(outcome, crop),
         "depth": depth_panels(outcome, crop),
+        "has_depths": bool(np.isfinite(outcome.depth.z_mm).any()),
         "depth_range": [f"{z:g}" for z in depth_range_of(dataset, z_mm)],
         "error_limit": f"{depth_error_mm(outcome, crop)[1]:g}" if truth is not None else None,
         "depth_table": depth_table(outcome),

@@ -128,7 +128,9 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
         near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
         image = picture.depth_image(crop.middles(depth_of_objects(dataset.truth)), near, far)
         panels.append(
-            _drawing(image, f"({next(letters)}) true depth of the objects (colour scale under Depth)")
+            _drawing(
+                image, f"({next(letters)}) {_true_depth_words(dataset.truth)} (colour scale under Depth)"
+            )
         )
     return panels
 
@@ -168,7 +170,7 @@ def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:
     panels = [_drawing(image, "estimated depth, darker where less sure")]
     if truth is not None:
         true = crop.middles(depth_of_objects(truth))
-        panels.append(_drawing(picture.depth_image(true, near, far), "true depth of the objects"))
+        panels.append(_drawing(picture.depth_image(true, near, far), _true_depth_words(truth)))
         error, limit = depth_error_mm(outcome, crop)
         image = picture.error_image(error, limit)
         image[np.isfinite(true) & np.isnan(error)] = 110
@@ -196,6 +198,11 @@ def depth_of_objects(truth: Truth) -> np.ndarray:
     """True depth of the objects, +inf elsewhere; of everything, if the truth knows no objects."""
     has_objects = (truth.object_id > 0).any()
     return np.where(truth.object_id > 0, truth.z_mm, np.inf) if has_objects else truth.z_mm
+
+
+def _true_depth_words(truth: Truth) -> str:
+    """What a picture of `depth_of_objects` shows."""
+    return "true depth of the objects" if (truth.object_id > 0).any() else "true depth"
 
 
 def _section_panels(sections: Sections, crop: Crop, light: str, letters: Iterator[str]) -> list[Panel]:

@@ -25,7 +25,7 @@ from pcii.metrics.true_masks import object_masks
 from pcii.sections.reconstruction import reconstruct
 
 MOST_PLANES = 20
-"""Planes of the slider beside those of the analysis. A report of 1024 x 1024 bright pixels is then below 8 MB."""
+"""Planes of the slider beside those of the analysis: a report of 1024 x 1024 pixels is then below 8 MB."""
 FINEST_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 MOST_VOXELS = 40_000_000
@@ -81,6 +81,7 @@ def slider(outcome: Outcome, crop: Crop, report: Report) -> dict[str, Any]:
         images = [picture.photo_uri(image) for image in encoded(shown)]
         lights.append({"label": label, "images": images})
     maps = _maps(outcome, blocks)
+    step_mm = max(each["step"] for each in maps if each["name"] in ("estimate", "truth"))
     return {
         "z_mm": [f"{z:g}" for z in planes.z_mm],
         "own": sorted(own),
@@ -88,8 +89,8 @@ def slider(outcome: Outcome, crop: Crop, report: Report) -> dict[str, Any]:
         "points": _points(outcome, crop, own),
         "crop": blocks,
         "readings": _readings(outcome),
-        "resolution": _resolution(outcome, blocks, maps[0]["step"]),
-        "digits": int(np.clip(np.ceil(-np.log10(maps[0]["step"])) - 1, 0, 3)),
+        "resolution": _resolution(outcome, blocks, step_mm),
+        "digits": int(np.clip(np.ceil(-np.log10(step_mm)) - 1, 0, 3)),
         "maps": maps,
         "planes": [_coded("counts", values, 0.0 if dataset.has_counts else None) for values in _alike(read)],
         "names": ["none", *_names(outcome).values()],
@@ -198,7 +199,7 @@ def _coded(name: str, values: np.ndarray, whole_from: float | None = None) -> di
     if whole_from is not None:
         low, step, high = whole_from, 1.0, min(high, whole_from + 65_534)
     else:
-        step = (high - low) / 65_534 or 1.0
+        step = (high - low) / 65_534 or 1e-3
     codes = np.zeros(values.shape, np.int64)
     codes[known] = 1 + np.round((np.minimum(finite, high) - low) / step)
     size = 1 if codes.max(initial=0) < 256 else 2

@@ -64,7 +64,10 @@ def table1(outcome: Outcome) -> dict[str, Any] | None:
             continue
         lowest = min(row["entropy"].values())
         cells = [
-            {"text": f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else ""), "lowest": bits == lowest}
+            {
+                "text": f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else ""),
+                "lowest": bits == lowest and len(row["entropy"]) > 1,
+            }
             for z, bits in row["entropy"].items()
         ]
         rows.append({"name": row["name"], "cells": cells})

@@ -1,4 +1,4 @@
-"""report.html in headless Chromium: the slider moves, toggles toggle, and the read-out says what the arrays say."""
+"""report.html in headless Chromium: slider, toggles, and a read-out that says what the arrays say."""
 
 from collections.abc import Iterator
 from pathlib import Path
