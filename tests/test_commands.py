@@ -85,7 +85,7 @@ def test_the_report_is_one_file_with_everything_in_it(results: Path) -> None:
     assert "Table 1" in page
     assert len(re.findall("data:image/(?:png|webp);base64,", page)) >= 8 + 4 * 3 + 3 + 24
     assert page.count("<script") == 1  # that of the slider; tests of pages compare it with its source
-    assert "None" not in page
+    assert "None" not in re.sub("[A-Za-z0-9+/=]{60,}", "", page)  # pictures may spell anything
     assert "://" not in page
     assert str(results.parent) not in page
 

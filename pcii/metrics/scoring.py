@@ -161,4 +161,5 @@ def entropy_region(grid: CameraGrid, truth: Truth, number: int, z_mm: np.ndarray
         return mask
     blur = max(float(blur_half_extent_px(grid, truth.z_mm[mask], z).mean()) for z in z_mm)
     # What as many dilations by the four neighbours would reach, in one pass.
-    return np.asarray(distance_transform_cdt(~mask, metric="taxicab") <= max(1, round(2 * blur)))
+    distance_px = np.asarray(distance_transform_cdt(~mask, metric="taxicab"))
+    return distance_px <= max(1, round(2 * blur))

@@ -87,8 +87,7 @@ def pooled_samples(sections: Sections, window_px: int) -> np.ndarray:
 def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
     from scipy.ndimage import uniform_filter
 
-    size = (window_px, window_px)
-    return uniform_filter(values.astype(np.float64), size, axes=(1, 2), mode="constant")
+    return uniform_filter(values.astype(np.float64), window_px, axes=(1, 2), mode="constant")
 
 
 def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:

@@ -149,7 +149,9 @@ def test_entropies_have_intervals(full: Outcome, tmp_path: Path) -> None:
     bits = full.score.objects[0]["entropy"]["500"]
     assert re.search(rf"ball {bits:.3f} ± \d\.\d\d\d ", words)
     assert "unseen" not in words.split("How this was made")[0].split("Entropy of the objects")[1]
-    few = PhotonCounts.from_events([0], [0], [20], [12], [3], GRID, cfa="GRBG")
+    one = np.zeros(GRID.shape_KLHW, dtype=int)
+    one[0, 0, 20, 12] = 3
+    few = PhotonCounts.from_dense(one, GRID, cfa="GRBG")
     words = words_of(page_of(outcome_of(tmp_path / "few", few, TRUTH), tmp_path))
     assert "There are no intervals" in words
     assert "±" not in words

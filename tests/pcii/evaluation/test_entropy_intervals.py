@@ -59,7 +59,9 @@ def test_every_photon_is_in_one_group() -> None:
 
 
 def test_without_photons_or_with_very_many_events_there_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    few = PhotonCounts.from_events([0], [0], [20], [20], [9], GRID)
+    dense = np.zeros(GRID.shape_KLHW, dtype=int)
+    dense[0, 0, 20, 20] = entropy_intervals.GROUPS - 1
+    few = PhotonCounts.from_dense(dense, GRID)
     assert entropy_half_widths(few, reconstruct(few, 500), TRUTH) == []
     counts = drawn(0)
     monkeypatch.setattr(entropy_intervals, "MOST_EVENTS", counts.events.n.size - 1)
