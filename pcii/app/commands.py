@@ -32,12 +32,10 @@ def run(
     What earlier runs finished, interrupted ones too, is kept where dataset, options and software are the
     same: the command goes on from there.
 
-    Examples:
+    Examples of use:
 
         pcii run out/paper -o out/paper-results
-
         pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood
-
         pcii run out/paper -o out/paper-300 --budget 300
 
     Parameters
@@ -56,6 +54,8 @@ def run(
 
     with Stages() as report:
         outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None)
+    if outcome.kept:
+        say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -69,10 +69,9 @@ def run(
 def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False) -> None:
     """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
-    Examples:
+    Examples of use:
 
         pcii score out/paper out/paper-results
-
         pcii score out/paper out/depth --json
 
     Parameters
@@ -130,10 +129,9 @@ def evaluate(
     Writes evaluation.json, evaluation.html and evaluation.md, and each score, as it is measured, to
     rows.jsonl.
 
-    Examples:
+    Examples of use:
 
         pcii evaluate out/twenty -o out/compared
-
         pcii evaluate out/twenty out/slats -o out/compared --method depth:focus --budget 300 --workers 2
 
     Parameters
@@ -162,10 +160,9 @@ def verify(folder: Path, *, json: Json = False) -> None:
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Examples:
+    Examples of use:
 
         pcii verify out/paper-results
-
         pcii verify out/paper --json
 
     Parameters

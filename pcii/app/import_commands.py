@@ -51,18 +51,14 @@ def import_dataset(
 
     Says at which depths things are sharpest, and warns if the views fit together better in another order.
 
-    Examples:
+    Examples of use:
 
         pcii import photos -o out/mine --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 --sensor-mm 36
-
-        pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 --sensor-mm 36
-        --cfa GRBG --photons 1000 --z-range-mm 30 200
-
+        pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
+          --sensor-mm 36 --cfa GRBG --photons 1000 --z-range-mm 30 200
         pcii import cotton -o out/cotton
-
-        pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3
-        --pixel-mm 0.01
-
+        pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3 \\
+          --pixel-mm 0.01
         pcii import frames.npy -o out/spad --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
 
     Parameters

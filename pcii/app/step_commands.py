@@ -24,10 +24,9 @@ def reconstruct(
 ) -> None:
     """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
 
-    Examples:
+    Examples of use:
 
         pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
-
         pcii reconstruct out/paper --z-mm 500:700:20 -o out/sections
 
     Parameters
@@ -67,7 +66,9 @@ def reconstruct(
 def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget = None) -> None:
     """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
-    Example:  pcii depth out/paper --method focus -o out/depth
+    Example of use:
+
+        pcii depth out/paper --method focus -o out/depth
 
     Parameters
     ----------
@@ -106,10 +107,9 @@ def segment(
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
 
-    Examples:
+    Examples of use:
 
         pcii segment out/paper --z-mm 540 --method three-step -o out/removed
-
         pcii segment out/paper --method three-step --without entropy --subpixel 2 -o out/removed
 
     Parameters

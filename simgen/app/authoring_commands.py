@@ -11,10 +11,9 @@ from pcii.base.command_output import say, say_next
 def new_scene(name: str, *, from_: Annotated[str | None, Parameter(name="--from")] = None) -> None:
     """Write scenes/NAME/scene.toml: a commented scene that works as it is written.
 
-    Examples:
+    Examples of use:
 
         simgen new-scene mine
-
         simgen new-scene my-desk --from desk
 
     Parameters
@@ -33,10 +32,9 @@ def new_scene(name: str, *, from_: Annotated[str | None, Parameter(name="--from"
 def new_recipe(name: str, *, scene: str | None = None) -> None:
     """Write data_recipes/NAME.toml: a commented recipe that works as it is written, in seconds.
 
-    Examples:
+    Examples of use:
 
         simgen new-recipe mine
-
         simgen new-recipe my-desk-dim --scene my-desk
 
     Parameters
@@ -61,7 +59,9 @@ def draw(
 ) -> None:
     """Write one draw of a distribution of scenes as a scene of its own, with the files that it names.
 
-    Example:  simgen draw drawn_solids --scene 17 -o scenes/mine
+    Example of use:
+
+        simgen draw drawn_solids --scene 17 -o scenes/mine
 
     Parameters
     ----------

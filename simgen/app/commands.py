@@ -29,10 +29,9 @@ for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, 
 def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
     """Say which backend will run and why, and what to install for a faster one.
 
-    Examples:
+    Examples of use:
 
         simgen doctor
-
         simgen doctor --json
 
     Parameters
@@ -77,16 +76,12 @@ def generate(
     A field that takes one value may have a list, any field { each = [...] } or { range = [first, end] }:
     OUT then has a folder for each combination, and an index of them.
 
-    Examples:
+    Examples of use:
 
         simgen generate data_recipes/paper.toml -o out/paper
-
         simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
-
         simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
-
         simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
-
         simgen generate drawn_crossing -o out/crossings --scenes 1000
 
     Parameters
@@ -149,7 +144,9 @@ def _made(folder: Path, manifest: dict[str, Any]) -> str:
 def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))]) -> None:
     """Draw a contact sheet of a finished dataset: truth, photons of all views, full light, facts.
 
-    Example:  simgen sheet out/paper -o paper.png
+    Example of use:
+
+        simgen sheet out/paper -o paper.png
 
     Parameters
     ----------
@@ -178,12 +175,10 @@ def export(
     hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
     events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view.
 
-    Examples:
+    Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
-
         simgen export out/small --format hci -o out/hci/small
-
         simgen export out/paper --format saii --budget 300 -o out/paper-300
 
     Parameters
@@ -210,10 +205,9 @@ def verify(dataset: Path, *, json: Json = False) -> None:
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Examples:
+    Examples of use:
 
         simgen verify out/paper
-
         simgen verify out/paper --json
 
     Parameters

@@ -16,10 +16,9 @@ def scenes(*, json: Json = False) -> None:
 
     Of a distribution of scenes a number says which one is meant: `--scene 17`.
 
-    Examples:
+    Examples of use:
 
         simgen scenes
-
         simgen scenes --json
 
     Parameters
@@ -41,10 +40,9 @@ def scenes(*, json: Json = False) -> None:
 def recipes(*, json: Json = False) -> None:
     """List the recipes that ship or stand in the working directory's `data_recipes/`, one line each.
 
-    Examples:
+    Examples of use:
 
         simgen recipes
-
         simgen recipes --json
 
     Parameters
@@ -66,11 +64,15 @@ def recipes(*, json: Json = False) -> None:
 def schema(what: Literal["scene", "recipe"]) -> None:
     """Print the JSON Schema of scene or recipe files, for completion in editors.
 
-    Examples:
+    Examples of use:
 
         simgen schema scene > scene.schema.json
-
         simgen schema recipe > recipe.schema.json
+
+    Parameters
+    ----------
+    what
+        Which kind of file.
     """
     from simgen.base.strict_models import schema_of
     from simgen.spec.distribution_schema import scene_schema
@@ -92,12 +94,10 @@ def check(
     object and voxel, size, memory and time. Leaves with exit code 0 if nothing is bad, 1 if something
     is, 2 for a file that is not valid.
 
-    Examples:
+    Examples of use:
 
         simgen check two_objects
-
         simgen check paper --set grid.pitch_mm=[2.5,2.5]
-
         simgen check drawn_solids --scene 17
 
     Parameters
@@ -140,10 +140,9 @@ def preview(
 
     In full light and in sRGB, whatever the recipe's camera and photons.
 
-    Examples:
+    Examples of use:
 
         simgen preview two_objects -o look.png
-
         simgen preview drawn_solids --scene 17 -o look.png
 
     Parameters
