@@ -10,7 +10,7 @@ from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
 from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
-from pcii.base.command_output import answer_json, say, say_next, say_next_page
+from pcii.base.command_output import answer_json, results_beside, say, say_next, say_next_page
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 
@@ -21,6 +21,26 @@ app = command_line.command_app(
 app.command(import_dataset, name="import")
 for command in (reconstruct, depth, segment):
     app.command(command)
+
+
+@app.command
+def sample(*, out: Out) -> None:
+    """Copy the sample dataset that comes with the package: ball and bird, 5 x 5 views, 2000 photons in each.
+
+    Example of use:
+
+        pcii sample -o out/sample
+
+    Parameters
+    ----------
+    out
+        Folder for the dataset: new or empty.
+    """
+    from pcii.io.sample_dataset import copy_sample
+
+    copy_sample(out)
+    say(f"{out}")
+    say_next("pcii", "run", out, "-o", results_beside(out))
 
 
 @app.command
