@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import Parameter
+from cyclopts import CoercionError, Parameter
 
 from pcii.io.dataset import Dataset, open_dataset
 
@@ -45,7 +45,13 @@ def depths_mm(text: str) -> list[float]:
 
 
 def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
-    return tuple(depth for token in tokens for depth in depths_mm(token.value))
+    depths: list[float] = []
+    for token in tokens:
+        try:
+            depths += depths_mm(token.value)
+        except ValueError as fault:  # with the token, so that the option is named whichever value is wrong
+            raise CoercionError(msg=str(fault), token=token) from None
+    return tuple(depths)
 
 
 def opened(dataset: Path, budget: float | None) -> Dataset:
