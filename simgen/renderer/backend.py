@@ -12,7 +12,6 @@ with the libraries.
 import contextlib
 import ctypes.util
 import hashlib
-import importlib.util
 import json
 import os
 import platform
@@ -30,6 +29,7 @@ from typing import Any, Literal
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_json_safely
+from simgen.renderer.installation import check_installed
 
 Kind = Literal["cuda", "llvm", "scalar"]
 KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")
@@ -90,7 +90,7 @@ def choose() -> Backend:
 
     Raises `InputError` if Mitsuba is not installed, and if `SIMGEN_BACKEND` asks for what does not work.
     """
-    _check_installed()
+    check_installed()
     asked = os.environ.get("SIMGEN_BACKEND", "").strip().lower()
     if asked and asked not in KINDS:
         raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(KINDS)}, not {asked!r}")
@@ -109,17 +109,8 @@ def choose() -> Backend:
 
 def survey() -> list[Candidate]:
     """Every candidate on this machine with its verdict, best first; for `simgen doctor`."""
-    _check_installed()
+    check_installed()
     return [candidate for kind in KINDS for candidate in _candidates(kind)]
-
-
-def _check_installed() -> None:
-    missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"{' and '.join(missing)}: not installed, and rendering needs it; type:  "
-            "pip install 'photon-integral-imaging[render]'"
-        )
 
 
 def advice() -> str | None:
