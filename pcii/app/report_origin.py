@@ -51,7 +51,7 @@ def _of_dataset(manifest: Mapping[str, Any], name: str) -> list[tuple[str, str]]
     elif method == "dense" and _has(photons, "samples_per_pixel", "rendering_noise"):
         value = (
             f"drawn from rendered views of {photons['samples_per_pixel']} samples per pixel, whose noise "
-            f"adds about {100 * photons['rendering_noise']:.2g} % to the variance of the counts"
+            f"adds at most {100 * photons['rendering_noise']:.2g} % to the variance of the counts"
         )
         rows.append(("photons", value))
     if manifest.get("timings_s"):
