@@ -1,0 +1,46 @@
+"""Whole processes: how long they take, and how much memory at most."""
+
+import subprocess
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+POLL_S = 0.02
+
+
+@dataclass(frozen=True)
+class Finished:
+    """Wall seconds, peak resident memory in MB (None where the system does not tell), standard output."""
+
+    seconds: float
+    peak_mb: float | None
+    output: str
+
+
+def run_process(command: Sequence[str]) -> Finished:
+    """Run a command to its end; `CalledProcessError` with its messages if it fails.
+
+    The peak is of the process itself. The system's count of children would not do: it hands on the peak of
+    the process that started them.
+    """
+    start, peak = time.perf_counter(), None
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None:
+            peak = _peak_mb(process.pid) or peak
+            time.sleep(POLL_S)
+        seconds = time.perf_counter() - start
+        output, messages = process.communicate()
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, list(command), output, messages)
+    return Finished(seconds, peak, output)
+
+
+def _peak_mb(pid: int) -> float | None:
+    try:
+        status = Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return None
+    return next(
+        (int(line.split()[1]) / 1024 for line in status.splitlines() if line.startswith("VmHWM")), None
+    )
