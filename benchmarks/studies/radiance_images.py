@@ -63,8 +63,7 @@ def measure(
             if has("mitsuba-oidn"):
                 rows.append(_denoised_row(scene, kind, number, seconds, images, truth))
         if kind != "scalar":
-            for number in samples[:3]:
-                seconds, images = _by_scalar_mode(recipe, side_px, number, repeats)
+            for number, (seconds, images) in _by_scalar_mode(recipe, side_px, samples[:3], repeats).items():
                 rows.append(_row(scene, "scalar", number, seconds, images, truth))
         del setup  # before another variant is set
     ratios = _ratios(rows)
@@ -87,22 +86,27 @@ def rendered(setup: Setup, samples: int, repeats: int, seed: int = 1) -> tuple[l
     return seconds, np.array(images[1:])
 
 
-def _by_scalar_mode(recipe: str, side_px: int, samples: int, repeats: int) -> tuple[list[float], Images]:
-    call = f"scalar_images({recipe!r}, {side_px}, {samples}, {repeats})"
+def _by_scalar_mode(
+    recipe: str, side_px: int, samples: Sequence[int], repeats: int
+) -> dict[int, tuple[list[float], Images]]:
+    """Seconds and images of each number of samples, by a process of its own."""
+    call = f"scalar_images({recipe!r}, {side_px}, {tuple(samples)}, {repeats})"
     code = f"from benchmarks.studies.radiance_images import scalar_images; {call}"
     environment = os.environ | {"SIMGEN_BACKEND": "scalar"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, env=environment)
     head, _, body = done.stdout.partition(b"\n")
-    told = json.loads(head)
-    return told["seconds"], np.frombuffer(body, np.float32).reshape(told["shape"])
+    shape = (len(samples), repeats, side_px, side_px, 3)
+    images = np.frombuffer(body, np.float32).reshape(shape)
+    return dict(zip(samples, zip(json.loads(head), images, strict=True), strict=True))
 
 
-def scalar_images(recipe: str, side_px: int, samples: int, repeats: int) -> None:
-    """Write seconds and images of this process's backend on standard output."""
+def scalar_images(recipe: str, side_px: int, samples: Sequence[int], repeats: int) -> None:
+    """Write seconds and then images of this process's backend on standard output."""
     setup = setup_of(load_recipe(recipe, [*VIEW, *film(side_px)])[0])
-    seconds, images = rendered(setup, samples, repeats)
-    head = json.dumps({"seconds": seconds, "shape": images.shape}).encode()
-    sys.stdout.buffer.write(head + b"\n" + images.astype(np.float32).tobytes())
+    found = [rendered(setup, number, repeats) for number in samples]
+    head = json.dumps([seconds for seconds, _ in found]).encode()
+    body = np.array([images for _, images in found], np.float32).tobytes()
+    sys.stdout.buffer.write(head + b"\n" + body)
 
 
 def denoise(image: np.ndarray) -> np.ndarray:

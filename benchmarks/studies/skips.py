@@ -25,7 +25,7 @@ LITTLE_PERCENT = 5.0
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
-    "quick": {"scenes": 6, "side_px": 96},
+    "quick": {"scenes": 4, "side_px": 96},
     "full": {"scenes": 1000, "side_px": 96},
 }
 
