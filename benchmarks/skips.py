@@ -49,7 +49,7 @@ class World:
 
     def prepare_all(self) -> None:
         """Make all that pairs have in common, so that neither of a pair is charged for it."""
-        for name in ("reuse", "explored", "images", "few", "known"):
+        for name in ("reuse", "explored", "images", "known"):
             getattr(self, name)
 
     @cached_property
@@ -85,9 +85,15 @@ class World:
         return np.random.default_rng(self.recipe.seed).poisson(0.01, self.setup.grid.shape_KLHW)
 
     @cached_property
+    def events(self) -> PhotonCounts:
+        """The same as events."""
+        places = np.nonzero(self.few)
+        return PhotonCounts.from_events(*places, self.few[places], self.setup.grid, cfa=self.recipe.cfa)
+
+    @cached_property
     def known(self) -> Sections:
         """Sections of little light at the first half of `planes`."""
-        return reconstruct(_events(self, self.few), self.planes.take(slice(0, len(self.planes) // 2)))
+        return reconstruct(self.events, self.planes.take(slice(0, len(self.planes) // 2)))
 
     @cached_property
     def reuse(self) -> Reuse:
@@ -120,32 +126,21 @@ class Skip:
     exact: bool = True
 
 
-def content_of(folder: Path, parts: str = "*") -> Arrays:
-    """Bytes of the files of a dataset but its manifest, by name."""
-    files = sorted(file for file in folder.rglob("*") if file.is_file() and file.name != MANIFEST)
-    named = {file.relative_to(folder).as_posix(): file for file in files}
-    return {
-        name: np.frombuffer(file.read_bytes(), np.uint8)
-        for name, file in named.items()
-        if parts == "*" or name.startswith(parts)
-    }
+def content_of(folder: Path, part: str = "") -> Arrays:
+    """Bytes of the files of a dataset, or of a part of it, but its manifest; by name."""
+    files = sorted(file for file in (folder / part).rglob("*") if file.is_file() and file.name != MANIFEST)
+    return {str(file.relative_to(folder)): np.frombuffer(file.read_bytes(), np.uint8) for file in files}
 
 
-def _sums(counts: PhotonCounts, planes: object, **options: object) -> Arrays:
-    sections = reconstruct(counts, planes, **options)  # pyright: ignore[reportArgumentType]
+def _sums(sections: Sections) -> Arrays:
     return {"counts": sections.counts.astype(np.int64), "coverage": sections.coverage}
 
 
-def _events(world: World, images: np.ndarray) -> PhotonCounts:
-    places = np.nonzero(images)
-    return PhotonCounts.from_events(*places, images[places], world.setup.grid, cfa=world.recipe.cfa)
-
-
-def _by_images(world: World, share: float) -> Arrays:
+def _of_dense(world: World, images: np.ndarray, share: float) -> Arrays:
     """Sections of dense counts, added as images if more than this share of the pixels has photons."""
-    counts = PhotonCounts.from_dense(world.images, world.setup.grid, cfa=world.recipe.cfa)
+    counts = PhotonCounts.from_dense(images, world.setup.grid, cfa=world.recipe.cfa)
     with patch.object(reconstruction, "DENSE_SHARE", share):
-        return _sums(counts, world.planes)
+        return _sums(reconstruct(counts, world.planes))
 
 
 def _visible(world: World, *, tests_all: bool) -> Arrays:
@@ -176,18 +171,6 @@ def _dense(world: World) -> Arrays:
     return {
         "n": np.array([drawn_counts(m, world.recipe.cfa, world.recipe.photons.budget, rng) for m in mosaics])
     }
-
-
-def _as_floats(world: World) -> Arrays:
-    """Sections of few photons by adding whole images, and their coverage."""
-    counts = PhotonCounts.from_dense(world.few, world.setup.grid, cfa=world.recipe.cfa)
-    with patch.object(reconstruction, "DENSE_SHARE", -1.0):
-        return _sums(counts, world.planes)
-
-
-def _extended(world: World) -> Arrays:
-    sections = extend(world.known, _events(world, world.few), world.planes)
-    return {"counts": sections.counts.astype(np.int64), "coverage": sections.coverage}
 
 
 def _second(world: World, name: str, reuse: Reuse) -> Arrays:
@@ -247,17 +230,17 @@ SKIPS = (
     Skip("datasets that are finished", lambda w, _: _finished(w), lambda w, n: content_of(w.made(n))),
     Skip(
         "empty pixels: sections from events instead of images",
-        lambda w, _: _sums(_events(w, w.few), w.planes),
-        lambda w, _: _as_floats(w),
+        lambda w, _: _sums(reconstruct(w.events, w.planes)),
+        lambda w, _: _of_dense(w, w.few, -1.0),
     ),
     Skip(
         "events one by one: images of dense counts instead",
-        lambda w, _: _by_images(w, 0.0),
-        lambda w, _: _by_images(w, 1.0),
+        lambda w, _: _of_dense(w, w.images, 0.0),
+        lambda w, _: _of_dense(w, w.images, 1.0),
     ),
     Skip(
         "planes that are known: extend instead of anew",
-        lambda w, _: _extended(w),
-        lambda w, _: _sums(_events(w, w.few), w.planes),
+        lambda w, _: _sums(extend(w.known, w.events, w.planes)),
+        lambda w, _: _sums(reconstruct(w.events, w.planes)),
     ),
 )

@@ -5,32 +5,28 @@ channels, and the colours (CIEDE2000) that the matrix makes of them which fits t
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.colour_chart import WHITE, Chart, colours, difference, integrated, lab, render_chart
 from benchmarks.figures import bars
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
 from benchmarks.timing import median_of, ratio_of, timed
-from pcii.core.camera_grid import CameraGrid
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import Scene
 from simgen.spectral.camera_curves import sensitivity
-from simgen.spectral.spectra import PATCHES, illuminant, integral, patch, patch_names
+from simgen.spectral.spectra import illuminant, integral, patch, patch_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CAMERAS = ("Nikon 5100 (NPL)", "Sigma SDMerill (NPL)")
 LAMPS = ("D65", "A")
-ACROSS, DOWN, SIDE_PX, BORDER_PX = 6, 4, 16, 2
 RAW, COLOURS = (
     "Raw channels: mean error over patches and channels",
     "Colours of the chart after the best matrix",
@@ -38,98 +34,8 @@ RAW, COLOURS = (
 PATCH, TIMES = "Colours patch by patch", "Time of both modes"
 RGB_MODE, SPECTRAL_MODE = "RGB mode", "spectral mode"
 DENSE, PHOTONS = "a view of 256 x 256 pixels, 16 samples", "100 000 photons by thinning"
-WHITE, GREEN = 18, 1
-"""The patch and the channel that all raw channels are told relative to."""
-
-
-@dataclass(frozen=True)
-class Chart:
-    """Channels (24, C) of the patches, and the standard error of each that rendering leaves."""
-
-    channels: np.ndarray
-    error: np.ndarray
-
-
-def render_chart(lamp: str, camera: str | None, samples: int) -> Chart:
-    """The chart fills the view, evenly lit; in the camera's raw channels, or in linear sRGB without one."""
-    mi = backend.load(spectral=camera is not None)
-    curves = None if camera is None else sensitivity(camera, Path())
-    grid = CameraGrid(
-        rows=1,
-        cols=1,
-        pitch_mm=(1.0, 1.0),
-        focal_mm=50.0,
-        pixel_mm=0.2,
-        height=DOWN * SIDE_PX,
-        width=ACROSS * SIDE_PX,
-    )
-    built = build(mi, _chart(lamp, SIDE_PX * grid.pixel_mm * 10), Path(), 2, curves)
-    view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=1).astype(np.float64)
-    inner = slice(BORDER_PX, -BORDER_PX)
-    pixels = view.reshape(DOWN, SIDE_PX, ACROSS, SIDE_PX, -1)[:, inner, :, inner]
-    number = (SIDE_PX - 2 * BORDER_PX) ** 2
-    mean, spread = pixels.mean(axis=(1, 3)), pixels.std(axis=(1, 3)) / np.sqrt(number)
-    return Chart(mean.reshape(24, -1), spread.reshape(24, -1))
-
-
-def _chart(lamp: str, side_mm: float) -> Scene:
-    """Patches of this side, edge to edge, at 500 mm: ten times the focal length."""
-    cards = [
-        {
-            "name": f"patch{number}",
-            "position_mm": (
-                (number % ACROSS - (ACROSS - 1) / 2) * side_mm,
-                (number // ACROSS - (DOWN - 1) / 2) * side_mm,
-                500.0,
-            ),
-            "shape": {"type": "card", "width_mm": side_mm, "height_mm": side_mm},
-            "material": {"reflectance": name},
-        }
-        for number, name in enumerate(patch_names())
-    ]
-    light = {"type": "uniform", "luminance_cd_m2": 100.0, "illuminant": lamp}
-    return Scene.model_validate({"title": "chart", "objects": cards, "lights": [light]})
-
-
-def integrated(lamp: str, camera: str | None) -> np.ndarray:
-    """Raw channels (24, 3) of the patches, or CIE XYZ without a camera, by integration in colour-science."""
-    import colour
-
-    shape = colour.SpectralShape(380, 780, 1)
-    if camera is None:
-        curves = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape)
-    else:
-        nothing = {"method": "Constant", "left": 0, "right": 0}
-        sensitivities = colour.MSDS_CAMERA_SENSITIVITIES[camera].copy()
-        curves = sensitivities.align(shape, extrapolator_kwargs=nothing)
-    light = colour.SDS_ILLUMINANTS[lamp].copy().align(shape)
-    patches = [one.copy().align(shape) for one in colour.SDS_COLOURCHECKERS[PATCHES].values()]
-    seen = [colour.sd_to_XYZ(one, cmfs=curves, illuminant=light, method="Integration") for one in patches]
-    return np.array(seen) / 100
-
-
-def colours(channels: np.ndarray, lamp: str) -> np.ndarray:
-    """CIE Lab (24, 3) of the chart: by least squares a matrix from white balanced channels to CIE XYZ."""
-    balanced, xyz = channels / channels[WHITE], integrated(lamp, None)
-    return _lab(balanced @ np.linalg.lstsq(balanced, xyz, rcond=None)[0], lamp)
-
-
-def _lab(xyz: np.ndarray, lamp: str) -> np.ndarray:
-    """With the lamp's own white, at luminance 1."""
-    import colour
-
-    shape = colour.SpectralShape(380, 780, 1)
-    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape).values
-    light = colour.SDS_ILLUMINANTS[lamp].copy().align(shape).values
-    white = light @ observer
-    return colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white / white[1]))
-
-
-def _difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """CIEDE2000 (24,)."""
-    import colour
-
-    return colour.delta_E(one, other, method="CIE 2000")
+GREEN = 1
+"""The channel of the white patch that all raw channels are told relative to."""
 
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
@@ -163,7 +69,7 @@ def _raw_row(charts: dict[tuple[str, str | None], Chart], lamp: str, camera: str
         "rgb_mode_and_matrix_percent": plain @ _relative_fit(plain, balanced) / balanced - 1,
     }
     values = {name: mean_of(100 * abs(errors).mean(axis=1)) for name, errors in found.items()}
-    values["rgb_to_camera_ciede2000"] = mean_of(_difference(colours(plain, lamp), colours(exact, lamp)))
+    values["rgb_to_camera_ciede2000"] = mean_of(difference(colours(plain, lamp), colours(exact, lamp)))
     return Row(RAW, camera, {"lamp": lamp}, values)
 
 
@@ -181,12 +87,12 @@ def _relative_fit(channels: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 def _colour_rows(chart: Chart, lamp: str, camera: str | None, *, each: bool) -> list[Row]:
     """Colours after the fitted matrix against those of the patches; a camera's own, integrated, beside."""
-    truth, name = _lab(integrated(lamp, None), lamp), camera or RGB_MODE
-    errors = _difference(colours(chart.channels, lamp), truth)
+    truth, name = lab(integrated(lamp, None), lamp), camera or RGB_MODE
+    errors = difference(colours(chart.channels, lamp), truth)
     values = {"ciede2000": mean_of(errors), "largest_ciede2000": Value(float(errors.max()))}
     if camera is not None:
         values["camera_itself_ciede2000"] = mean_of(
-            _difference(colours(integrated(lamp, camera), lamp), truth)
+            difference(colours(integrated(lamp, camera), lamp), truth)
         )
     rows = [Row(COLOURS, name, {"lamp": lamp}, values)]
     if each:
@@ -248,10 +154,9 @@ def reading(measured: Measured) -> str:
         "Are colours right, and what does that cost? Raw channels of the spectral mode are off by"
         f" {row['spectral_mode_percent'].value:.2f} % on average, of which rendering noise is"
         f" {row['rendering_noise_percent'].value:.2f} %, those of RGB mode by"
-        f" {row['rgb_mode_percent'].value:.0f} % (lamp"
-        f" {lamp}, {CAMERAS[0]}). After the best matrix the colours of the chart differ by {own:.1f}"
-        " CIEDE2000 from the"
-        f" patches' own as that camera sees them, and by {rgb:.1f} in RGB mode, which sees as eyes do"
+        f" {row['rgb_mode_percent'].value:.0f} % (lamp {lamp}, {CAMERAS[0]}). After the best matrix the"
+        f" colours of the chart differ by {own:.1f} CIEDE2000 from the patches' own as that camera sees"
+        f" them, and by {rgb:.1f} in RGB mode, which sees as eyes do"
     )
     if not measured.ratios:
         return text + "."

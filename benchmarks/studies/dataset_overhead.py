@@ -84,10 +84,8 @@ def reading(measured: Measured) -> str:
     )
     return (
         f"What does a dataset cost beside its light? In a collection of {most} the smallest datasets there"
-        " are take"
-        f" {made:.0f} ms each to make, and {found:.1f} ms to be found finished, {tasks:.1f} ms as tasks of"
-        " Dask. Flat"
-        " lines mean that nothing grows with the size of the collection."
+        f" are take {made:.0f} ms each to make, and {found:.1f} ms to be found finished, {tasks:.1f} ms as"
+        " tasks of Dask. Flat lines mean that nothing grows with the size of the collection."
     )
 
 

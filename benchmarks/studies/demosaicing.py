@@ -147,13 +147,10 @@ def reading(measured: Measured) -> str:
     )
     return (
         "Which interpolation of colours is worth its time? Higher CPSNR and lower CIEDE2000 are better; on"
-        " the texture"
-        f" {best[FULL_LIGHT].name} is closest at full light with"
-        f" {best[FULL_LIGHT].values['cpsnr_db'].value:.1f} dB, and"
-        f" {best[least].name} with {best[least].values['cpsnr_db'].value:.1f} dB at {least:g} photons per"
-        " pixel, where"
-        f" photon noise leaves all near {spread:.1f} dB. Laroche and Prescott's takes {own:.1f} ms for an"
-        " image of the"
+        f" the texture {best[FULL_LIGHT].name} is closest at full light with"
+        f" {best[FULL_LIGHT].values['cpsnr_db'].value:.1f} dB, and {best[least].name} with"
+        f" {best[least].values['cpsnr_db'].value:.1f} dB at {least:g} photons per pixel, where photon noise"
+        f" leaves all near {spread:.1f} dB. Laroche and Prescott's takes {own:.1f} ms for an image of the"
         f" paper's size, the slowest {slowest:.0f} ms."
     )
 

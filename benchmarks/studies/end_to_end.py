@@ -118,14 +118,12 @@ def reading(measured: Measured) -> str:
     """How to read it: both totals, and what the plain one leaves out."""
     own, plain = (measured.one(WHOLE, name).values["time_s"].value for name in (OWN, PLAIN))
     return (
-        "What does the whole job take, from a recipe to a report with masks, depth and scores?"
-        f" {own:.1f} s where a plain script takes {plain:.1f} s,"
-        f" {measured.ratio(f'{OWN} against {PLAIN}'):.2f} times as"
-        " fast; bars are the median run, with the least and the most where runs are few. The plain script"
-        " does less for"
-        " its time: its counts have rendering noise, its masks are a threshold and its depth is a plane"
-        " sweep by variance,"
-        " nothing is checked, hashed or can be resumed, and photons do not know where they came from."
+        f"What does the whole job take, from a recipe to a report with masks, depth and scores? {own:.1f} s"
+        f" where a plain script takes {plain:.1f} s, {measured.ratio(f'{OWN} against {PLAIN}'):.2f} times"
+        " as fast; bars are the median run, with the least and the most where runs are few. The plain"
+        " script does less for its time: its counts have rendering noise, its masks are a threshold and"
+        " its depth is a plane sweep by variance, nothing is checked, hashed or can be resumed, and"
+        " photons do not know where they came from."
     )
 
 

@@ -240,20 +240,17 @@ def reading(measured: Measured) -> str:
     samples = max(int(row.parameters["samples"]) for row in measured.of(IMAGES, scene="matt"))
     text = (
         "What does an image without photon noise cost? Errors of plain path tracing fall with the square"
-        " root of the"
-        f" samples and so of the time: in the matt scene {one(kind, 1, 'rmse_percent'):.0f} % of the mean"
-        " light with 1"
-        f" sample and {one(kind, samples, 'rmse_percent'):.1f} % with {samples}."
+        f" root of the samples and so of the time: in the matt scene {one(kind, 1, 'rmse_percent'):.0f} %"
+        f" of the mean light with 1 sample and {one(kind, samples, 'rmse_percent'):.1f} % with {samples}."
     )
     way = f"{kind} {DENOISED}"
     if not any(row.name == way for row in measured.of(IMAGES)):
         return text + " The denoiser was not installed."
     return text + (
         f" OIDN brings 1 sample to {one(way, 1, 'rmse_percent'):.0f} %, but"
-        f" {one(way, 1, 'bias_percent'):.1f} % of the"
-        f" light is bias that no repeat averages out (with {samples} samples"
-        f" {one(way, samples, 'bias_percent'):.1f} %):"
-        " it is for pictures to look at, never for data that counts are drawn from."
+        f" {one(way, 1, 'bias_percent'):.1f} % of the light is bias that no repeat averages out (with"
+        f" {samples} samples {one(way, samples, 'bias_percent'):.1f} %): it is for pictures to look at,"
+        " never for data that counts are drawn from."
     )
 
 

@@ -191,14 +191,10 @@ def reading(measured: Measured) -> str:
     dense = measured.one(GROWTH, "dense", axis="views").values["exponent"].value
     return (
         "What does a section cost at the paper's size, and what makes it cost more? A ratio says how often"
-        " ours could"
-        f" be made while the other makes one: three colours with their coverage {fastest.ratio.value:.0f}"
-        " times for"
-        f" {fastest.name}, which makes one channel's mean. An exponent of 1 is time in proportion: sections"
-        " from"
-        f" events grow with the power {photons_:.2f} of the photons and {pixels:.2f} of the pixels, dense"
-        " ones with the"
-        f" power {dense:.2f} of the views."
+        " ours could be made while the other makes one: three colours with their coverage"
+        f" {fastest.ratio.value:.0f} times for {fastest.name}, which makes one channel's mean. An exponent"
+        f" of 1 is time in proportion: sections from events grow with the power {photons_:.2f} of the"
+        f" photons and {pixels:.2f} of the pixels, dense ones with the power {dense:.2f} of the views."
     )
 
 

@@ -165,16 +165,14 @@ def reading(measured: Measured) -> str:
     whole = measured.one(ONE_COLOUR, "nearest", disparity_px=13.0).values
     few, *_, many = (row.values["rmse_percent"].value for row in measured.of(BY_PHOTONS))
     return (
-        "Does interpolation pay? Further left and further down is better: with 100 cameras the roundings of"
-        " nearest"
-        f" shifts cancel, so that they have an error of {own['rmse_percent'].value:.1f} % of the texture's"
-        " contrast in"
-        f" {own['time_ms'].value:.1f} ms where bilinear ones have {bilinear['rmse_percent'].value:.1f} % in"
-        f" {bilinear['time_ms'].value:.1f} ms and SciPy {peer['rmse_percent'].value:.1f} % in"
-        f" {peer['time_ms'].value:.0f} ms; at a whole disparity, where all round alike, nearest shifts are"
-        " off by"
-        f" {whole['rmse_percent'].value:.0f} %. Sections of photon counts have errors of {few:.0f} % down to"
-        f" {many:.0f} % as photons grow, beside which those of shifts are small."
+        "Does interpolation pay? Further left and further down is better: with 100 cameras the roundings"
+        f" of nearest shifts cancel, so that they have an error of {own['rmse_percent'].value:.1f} % of the"
+        f" texture's contrast in {own['time_ms'].value:.1f} ms where bilinear ones have"
+        f" {bilinear['rmse_percent'].value:.1f} % in {bilinear['time_ms'].value:.1f} ms and SciPy"
+        f" {peer['rmse_percent'].value:.1f} % in {peer['time_ms'].value:.0f} ms; at a whole disparity,"
+        f" where all round alike, nearest shifts are off by {whole['rmse_percent'].value:.0f} %. Sections"
+        f" of photon counts have errors of {few:.0f} % down to {many:.0f} % as photons grow, beside which"
+        " those of shifts are small."
     )
 
 

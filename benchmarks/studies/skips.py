@@ -83,10 +83,14 @@ def random_world(number: int, side_px: int, folder: Path) -> World:
 
 
 def are_same(one: Arrays, other: Arrays) -> bool:
-    """Whether both have the same arrays, byte by byte."""
-    return one.keys() == other.keys() and all(
-        one[name].shape == other[name].shape and np.array_equal(one[name], other[name], equal_nan=True)
-        for name in one
+    """Whether both have the same arrays, byte by byte, and any at all."""
+    return (
+        bool(one)
+        and one.keys() == other.keys()
+        and all(
+            one[name].shape == other[name].shape and np.array_equal(one[name], other[name], equal_nan=True)
+            for name in one
+        )
     )
 
 
@@ -137,12 +141,10 @@ def reading(measured: Measured) -> str:
     )
     return (
         f"Is skipped work really not missed? Of {len(exact)} skips that claim the same bytes, {hold} gave"
-        " them in all"
-        f" {scenes} random scenes; the other draws anew from the same distribution. Bars are the share of"
-        " the time saved"
-        f" on these small scenes, where fixed costs weigh most, and the dotted line is {LITTLE_PERCENT:g}"
-        f" %: {told}."
-        " Memory is that of Python and NumPy, without the renderer's own."
+        f" them in all {scenes} random scenes; the other draws anew from the same distribution. Bars are"
+        " the share of the time saved on these small scenes, where fixed costs weigh most, and the dotted"
+        f" line is {LITTLE_PERCENT:g} %: {told}. Memory is that of Python and NumPy, without the renderer's"
+        " own."
     )
 
 

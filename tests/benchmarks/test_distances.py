@@ -15,7 +15,8 @@ BUDGET = 5.0 * 64**2
 def counts_of(rates: np.ndarray, repeats: int, noise: float) -> np.ndarray:
     """Poisson counts (R, V, H, W) whose rates are off by this standard deviation relative to them."""
     rng = np.random.default_rng(7)
-    off = rng.gamma(1 / noise**2, noise**2, (repeats, *rates.shape)) if noise else 1.0
+    size = repeats, *rates.shape
+    off = rng.gamma(1 / noise**2, noise**2, size) if noise else np.ones(size)
     return rng.poisson(BUDGET * rates * off)
 
 
