@@ -1,5 +1,7 @@
 """Pictures whose every pixel is known in closed form, and views of a plane that shows one."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pcii.core.bayer import mosaic
@@ -34,8 +36,10 @@ class Texture:
         return 0.5 + np.stack(colours, axis=-1)
 
 
-def plane_views(texture: Texture, disparity_px: float, side_px: int, cfa: str | None) -> Views:
-    """100 images of the plane, whose disparity this is at 1 mm: mosaics, or its green without a pattern."""
+def plane_views(
+    texture: Texture, disparity_px: float, side_px: int, cfas: Sequence[str | None]
+) -> list[Views]:
+    """100 images of the plane of this disparity at 1 mm: mosaics for each pattern, its green for None."""
     grid = CameraGrid(
         rows=10,
         cols=10,
@@ -45,8 +49,9 @@ def plane_views(texture: Texture, disparity_px: float, side_px: int, cfa: str | 
         height=side_px,
         width=side_px,
     )
-    pixels, images = np.arange(side_px), np.empty((*grid.shape_KLHW, 1), dtype=np.float32)
+    pixels, images = np.arange(side_px), np.empty((len(cfas), *grid.shape_KLHW, 1), dtype=np.float32)
     for k, l in np.ndindex(10, 10):
         seen = texture.seen_at(pixels + (k - 4.5) * disparity_px, pixels + (l - 4.5) * disparity_px)
-        images[k, l, ..., 0] = seen[..., 1] if cfa is None else mosaic(seen, cfa)
-    return Views(images, grid, cfa)
+        for own, cfa in zip(images, cfas, strict=True):
+            own[k, l, ..., 0] = seen[..., 1] if cfa is None else mosaic(seen, cfa)
+    return [Views(own, grid, cfa) for own, cfa in zip(images, cfas, strict=True)]

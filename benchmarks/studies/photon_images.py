@@ -91,7 +91,7 @@ def measure(
             )
         )
         rows += _crossovers(scene, samples, seconds)
-    return Measured(rows, ratios, range(1, repeats + 1))
+    return Measured(rows, ratios, list(range(1, repeats + 1)))
 
 
 def dense_name(samples: int) -> str:

@@ -69,7 +69,7 @@ def measure(
     ratios = _ratios(rows)
     rows += _depth_rows(side_px, samples[-1], repeats, depths)
     rows += _spectral_rows(side_px, samples[:3], repeats)
-    return Measured(rows, ratios, range(1, repeats + 1))
+    return Measured(rows, ratios, list(range(1, repeats + 1)))
 
 
 def rendered(setup: Setup, samples: int, repeats: int, seed: int = 1) -> tuple[list[float], Images]:

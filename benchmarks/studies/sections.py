@@ -51,13 +51,13 @@ def measure(side_px: int, repeats: int, disparities: Sequence[float], budgets: S
     """Every way on the same views, of planes of these disparities in px."""
     texture, rows = Texture(), list[Row]()
     for disparity in disparities:
-        plain, bayer = (plane_views(texture, disparity, side_px, cfa) for cfa in (None, CFA))
+        plain, bayer = plane_views(texture, disparity, side_px, (None, CFA))
         truths = {M: texture.seen_at(*[_centres(side_px, M)] * 2) for M in (1, 2, 4)}
         green = {M: truth[..., 1:2] for M, truth in truths.items()}
         rows += _rows(ONE_COLOUR, _plain_ways(plain), green, disparity, repeats)
         rows += _rows(THREE_COLOURS, _bayer_ways(bayer), truths, disparity, repeats)
     rows += _photon_rows(texture, side_px, budgets, repeats)
-    return Measured(rows, seeds=range(1, repeats + 1))
+    return Measured(rows, seeds=list(range(1, repeats + 1)))
 
 
 def _plain_ways(views: Views) -> dict[str, Way]:
@@ -126,7 +126,7 @@ def _centres(side_px: int, M: int) -> np.ndarray:
 
 def _photon_rows(texture: Texture, side_px: int, budgets: Sequence[float], repeats: int) -> list[Row]:
     """Errors of sections from events follow from the photons, and nothing is sharper than they are."""
-    views, rows = plane_views(texture, SHOWN_PX, side_px, None), list[Row]()
+    (views,), rows = plane_views(texture, SHOWN_PX, side_px, [None]), list[Row]()
     rates = np.asarray(views.radiance)[..., 0].astype(np.float64)
     truth = texture.seen_at(*[_centres(side_px, 1)] * 2)[..., 1:2]
     for budget in budgets:

@@ -53,7 +53,7 @@ def measure(scenes: int, side_px: int, skips: Sequence[Skip] = SKIPS) -> Measure
                 same[skip.name] += not skip.exact or are_same(found[0], found[1])
     rows = [_row(skip, *seconds[skip.name], *peaks[skip.name], same[skip.name]) for skip in skips]
     ratios = [ratio_of(skip.name, seconds[skip.name][1], seconds[skip.name][0]) for skip in skips]
-    return Measured(rows, ratios, range(1, scenes + 1))
+    return Measured(rows, ratios, list(range(1, scenes + 1)))
 
 
 def random_world(number: int, side_px: int, folder: Path) -> World:

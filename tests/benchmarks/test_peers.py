@@ -41,7 +41,7 @@ def test_the_plain_script_has_the_same_bayer_pattern() -> None:
 
 def test_views_of_the_texture_meet_at_its_depth() -> None:
     texture = Texture()
-    views = plane_views(texture, 3.0, 48, None)
+    (views,) = plane_views(texture, 3.0, 48, [None])
     pixels = np.arange(48)
     # With ten cameras and a whole disparity, nearest shifts round half up: half a pixel in each axis.
     found = reconstruct(views, 1.0, shifts="bilinear").estimate[0, ..., 0]
