@@ -42,7 +42,7 @@ def read_reference(path: Path = REFERENCE) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
         for entry in content.values():
-            entry["size"], entry["ratios"].items()
+            _ = entry["size"], entry["ratios"].items()
     except FileNotFoundError:
         raise InputError(
             f"{path}: there is no table to compare with; make one by `make bench-publish`"

@@ -6,14 +6,14 @@ words.
 
 import csv
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_json_safely
-from pcii.evaluation.paired_tests import mean_interval
+from pcii.evaluation.paired_tests import positive_mean_interval
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,9 +124,12 @@ def label(quantity: str) -> str:
     return text
 
 
-def mean_of(samples: Sequence[float]) -> Value:
-    """Mean of samples with its interval by Student's t; without an interval for a single one."""
-    mean = mean_interval(samples)
+def mean_of(samples: Iterable[float]) -> Value:
+    """Mean of samples that are never negative, with its interval; without one for a single sample.
+
+    The interval is Student's of the mean's logarithm, so that it stays above 0.
+    """
+    mean = positive_mean_interval(list(samples))
     return Value(mean.mean, mean.low, mean.high)
 
 

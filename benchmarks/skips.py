@@ -87,8 +87,9 @@ class World:
     @cached_property
     def events(self) -> PhotonCounts:
         """The same as events."""
-        places = np.nonzero(self.few)
-        return PhotonCounts.from_events(*places, self.few[places], self.setup.grid, cfa=self.recipe.cfa)
+        k, l, i, j = np.nonzero(self.few)
+        n = self.few[k, l, i, j]
+        return PhotonCounts.from_events(k, l, i, j, n, self.setup.grid, cfa=self.recipe.cfa)
 
     @cached_property
     def known(self) -> Sections:

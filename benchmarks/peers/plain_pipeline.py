@@ -96,7 +96,7 @@ def shifted(view: np.ndarray, down: float, right: float) -> np.ndarray:
 def stack(counts: np.ndarray, z_mm: float, pitch_px: float) -> tuple[np.ndarray, np.ndarray]:
     """Sum and sum of squares of all views, moved to focus at a depth; `pitch_px` is the disparity at 1 mm."""
     rows, cols = counts.shape[:2]
-    total, squares = np.zeros((2, *counts.shape[2:]))
+    total, squares = np.zeros(counts.shape[2:]), np.zeros(counts.shape[2:])
     for k, l in np.ndindex(rows, cols):
         view = shifted(
             counts[k, l], *((n - (size - 1) / 2) * pitch_px / z_mm for n, size in ((k, rows), (l, cols)))
@@ -124,10 +124,10 @@ def run(folder: Path, rows: int, side_px: int, samples: int, out: Path) -> dict[
     pitch_px = pitch_mm * FOCAL_MM / (FIELD_MM / side_px)
     scene = load_scene(mi, folder)
     done("load")
-    radiance = np.empty((rows, rows, side_px, side_px), np.float32)
+    radiance = np.empty((rows, rows, side_px, side_px), dtype=np.float32)
     for k, l in np.ndindex(rows, rows):
-        place = [(n - (rows - 1) / 2) * pitch_mm for n in (l, k)]
-        sensor = camera(mi, *place, side_px)
+        x_mm, y_mm = ((n - (rows - 1) / 2) * pitch_mm for n in (l, k))
+        sensor = camera(mi, x_mm, y_mm, side_px)
         radiance[k, l] = bayer(np.array(mi.render(scene, sensor=sensor, spp=samples, seed=1 + k * rows + l)))
     np.save(out / "radiance.npy", radiance)
     done("radiance")

@@ -5,6 +5,7 @@ A texture in closed form and the paper's scene, rendered, through a Bayer patter
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
@@ -115,22 +116,24 @@ def _by_opencv(raw: np.ndarray, code: str) -> np.ndarray:
 
 
 def draw(figure: "Figure", measured: Measured) -> None:
-    """Both errors of the rendered picture against time."""
+    """Both errors of each picture against time, a line for each light."""
     times = {row.name: row.values["time_ms"] for row in measured.of(TIMES)}
-    left, right = figure.subplots(1, 2)
-    for axes, quantity in ((left, "cpsnr_db"), (right, "ciede2000")):
-        for number, method in enumerate(METHODS):
-            rows = [row for row in measured.of(ERRORS, picture="two objects, rendered") if row.name == method]
-            curve(axes, rows, lambda row: times[row.name], quantity, method, number)
-            for row in rows:
-                light = (
-                    "full light"
-                    if row.parameters["photons"] == FULL_LIGHT
-                    else f"{row.parameters['photons']} ph."
-                )
-                place = times[method].value, row.values[quantity].value
-                axes.annotate(light, place, (4, 3), textcoords="offset points", fontsize=6)
-        frame(axes, "time_ms", quantity, "two objects, rendered", log="x")
+    shown = list(dict.fromkeys(str(row.parameters["picture"]) for row in measured.of(ERRORS)))
+    lights = list(dict.fromkeys(int(row.parameters["photons"]) for row in measured.of(ERRORS)))
+    panels = figure.subplots(2, len(shown), sharex=True)
+    for (line, quantity), (column, picture) in product(
+        enumerate(("cpsnr_db", "ciede2000")), enumerate(shown)
+    ):
+        axes = panels[line, column]
+        for number, light in enumerate(lights):
+            rows = measured.of(ERRORS, picture=picture, photons=light)
+            rows = sorted(rows, key=lambda row: times[row.name].value)
+            name = "full light" if light == FULL_LIGHT else f"{light} photons"
+            curve(axes, rows, lambda row: times[row.name], quantity, name, number)
+        frame(axes, "time_ms", quantity, picture if line == 0 else "", log="x")
+        for name in METHODS:
+            style = {"fontsize": 7, "rotation": 90, "va": "bottom", "color": "#5b6475"}
+            axes.text(times[name].value, 0.02, name, transform=axes.get_xaxis_transform(), **style)
 
 
 def reading(measured: Measured) -> str:
@@ -155,4 +158,4 @@ def reading(measured: Measured) -> str:
     )
 
 
-STUDY = Study("demosaicing", "Demosaicing", SIZES, measure, draw, reading, width_in=9.0, height_in=3.8)
+STUDY = Study("demosaicing", "Demosaicing", SIZES, measure, draw, reading, width_in=9.0, height_in=6.0)

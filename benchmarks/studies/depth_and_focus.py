@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.corpus import load_corpus, make, named_scenes, work_list
 from benchmarks.figures import curve, frame
-from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
+from benchmarks.results import Measured, Parameter, Ratio, Row, Size, Study, Value
 from benchmarks.scenes import film
 from pcii.base.progress import Stages
 from pcii.evaluation.comparison import evaluate
@@ -80,9 +80,9 @@ def measure(
 def _rows(group: Mapping[str, Any]) -> list[Row]:
     """Rows of one scene."""
     rows: list[Row] = []
-    bounds: dict[float, Row] = {}
+    bounds: dict[tuple[float, str], Row] = {}
     for result in group["results"]:
-        where = {"scene": group["title"], "photons_per_view": float(result["budget"])}
+        where: dict[str, Parameter] = {"scene": group["title"], "photons_per_view": float(result["budget"])}
         is_depth = estimator_of(result["method"]) is not None
         values = {"time_ms": _value(result["seconds"], 1e3)}
         for name, path in (MEASURES if is_depth else MASKS).items():
@@ -96,7 +96,7 @@ def _rows(group: Mapping[str, Any]) -> list[Row]:
             if sigma is not None:
                 parameters = where | {"object": bound["name"]}
                 row = Row(BOUND, "Cramer-Rao bound", parameters, {"sigma_px": sigma})
-                bounds.setdefault((where["photons_per_view"], bound["name"]), row)
+                bounds.setdefault((result["budget"], bound["name"]), row)
     return [*rows, *bounds.values()]
 
 

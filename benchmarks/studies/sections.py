@@ -134,8 +134,8 @@ def _photon_rows(texture: Texture, side_px: int, budgets: Sequence[float], repea
         seconds, error = [], []
         for seed in range(repeats):
             images = np.random.default_rng(seed).poisson(scale * rates)
-            places = np.nonzero(images)
-            counts = PhotonCounts.from_events(*places, images[places], views.grid)
+            k, l, i, j = np.nonzero(images)
+            counts = PhotonCounts.from_events(k, l, i, j, images[k, l, i, j], views.grid)
             taken = side_by_side({"events": lambda _, counts=counts: _estimate(counts)}, 1)
             seconds += taken["events"]
             found = _estimate(counts) / scale
