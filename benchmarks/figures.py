@@ -1,5 +1,6 @@
 """One figure for each study, readable in print: values with their intervals against time or size."""
 
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +10,10 @@ from pcii.evaluation.plots import COLOURS, MARKERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 DPI = 160
+SHORT_DECADES = 2.5
 Quantity = str | Callable[[Row], Value | Parameter]
 
 
@@ -44,6 +47,7 @@ def curve(axes: "Axes", rows: Sequence[Row], x: Quantity, y: Quantity, name: str
         label=name,
         color=COLOURS[number % len(COLOURS)],
         marker=MARKERS[number % len(MARKERS)],
+        markerfacecolor="white" if number >= len(COLOURS) else None,
         linestyle=("-", "--", ":")[number // len(COLOURS) % 3],
         markersize=4,
         linewidth=1.2,
@@ -58,22 +62,34 @@ def bars(axes: "Axes", names: Sequence[str], values: Sequence[Value], unit: str)
     axes.barh(places, [value.value for value in values], xerr=_bars(values), **colour)
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlabel(unit)
+    axes.set_xlabel(unit, fontsize=9)
     _plain(axes)
 
 
 def frame(axes: "Axes", x: str, y: str, title: str = "", *, log: str = "xy") -> None:
     """Name the axes by quantities, make those of `log` logarithmic, draw a grid and a legend."""
-    axes.set_xlabel(label(x))
-    axes.set_ylabel(label(y))
+    axes.set_xlabel(label(x), fontsize=9)
+    axes.set_ylabel(label(y), fontsize=9)
     axes.set_title(title, fontsize=10)
     if "x" in log:
         axes.set_xscale("log")
+        _few_ticks(axes.xaxis, axes.get_xlim())
     if "y" in log:
         axes.set_yscale("log")
+        _few_ticks(axes.yaxis, axes.get_ylim())
     _plain(axes)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=7.5)
+
+
+def _few_ticks(axis: "Axis", ends: tuple[float, float]) -> None:
+    """Name whole powers of ten, and of short axes 2 and 5 between them."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    decades = math.log10(ends[1] / ends[0])
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < SHORT_DECADES else (1.0,)))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def _plain(axes: "Axes") -> None:

@@ -148,12 +148,12 @@ def _photon_rows(texture: Texture, side_px: int, budgets: Sequence[float], repea
 def draw(figure: "Figure", measured: Measured) -> None:
     """Error against time: of one colour beside other packages, and of three colours."""
     left, middle, right = figure.subplots(1, 3)
-    for axes, table in ((left, ONE_COLOUR), (middle, THREE_COLOURS)):
+    for axes, table, title in ((left, ONE_COLOUR, "one colour"), (middle, THREE_COLOURS, "three colours")):
         for number, row in enumerate(measured.of(table, disparity_px=SHOWN_PX)):
             curve(axes, [row], "time_ms", "rmse_percent", row.name, number)
-        frame(axes, "time_ms", "rmse_percent", f"{table}, disparity {SHOWN_PX:g} px")
+        frame(axes, "time_ms", "rmse_percent", f"{title}, disparity {SHOWN_PX:g} px")
     curve(right, measured.of(BY_PHOTONS), "photons_per_view", "rmse_percent", "events", 0)
-    frame(right, "photons_per_view", "rmse_percent", BY_PHOTONS)
+    frame(right, "photons_per_view", "rmse_percent", "photon counts")
 
 
 def reading(measured: Measured) -> str:
