@@ -44,7 +44,7 @@ def curve(axes: "Axes", rows: Sequence[Row], x: Quantity, y: Quantity, name: str
         [value.value for value in up],
         xerr=_bars(across),
         yerr=_bars(up),
-        label=name,
+        label=name or None,
         color=COLOURS[number % len(COLOURS)],
         marker=MARKERS[number % len(MARKERS)],
         markerfacecolor="white" if number >= len(COLOURS) else None,

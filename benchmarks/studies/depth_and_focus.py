@@ -72,7 +72,8 @@ def measure(
         works = work_list(named_scenes(load_corpus(), names), Path(folder), seeds, list(budgets), settings)
         make(works, progress)
         folders = [work.folder for work in works]
-        evaluation = evaluate(folders, Path(folder) / "scores", methods=methods, report=progress)
+        scores = Path(folder) / "scores"
+        evaluation = evaluate(folders, scores, methods=methods, budgets=budgets, report=progress)
     found = [row for group in evaluation["groups"] for row in _rows(group)]
     return Measured(found, _ratios(found), sorted({work.recipe.seed for work in works}))
 

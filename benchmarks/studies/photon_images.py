@@ -180,18 +180,21 @@ def _crossovers(
 
 
 def draw(figure: "Figure", measured: Measured) -> None:
-    """Dispersion against time for each scene, a line for each way, from few photons to many."""
+    """Time and dispersion of each scene by photons, a line for each way."""
     scenes = dict.fromkeys(str(row.parameters["scene"]) for row in measured.of(DISTANCES))
-    panels = figure.subplots(1, len(scenes), sharey=True, squeeze=False)[0]
-    for axes, scene in zip(panels, scenes, strict=True):
+    panels = figure.subplots(2, len(scenes), sharex=True, squeeze=False)
+    for (times, excesses), scene in zip(panels.T, scenes, strict=True):
         rows = measured.of(DISTANCES, scene=scene)
         ways = dict.fromkeys((row.name, row.parameters["samples"]) for row in rows)
         for number, (name, samples) in enumerate(ways):
             own = [row for row in rows if (row.name, row.parameters["samples"]) == (name, samples)]
-            curve(axes, own, "photons_per_view", _excess, f"{name}, {samples}" if samples else name, number)
-        axes.axhline(EXCESS, color="#8a94a6", linewidth=0.8, linestyle=":")
-        frame(axes, "photons_per_view", "dispersion - 1", scene)
-        axes.set_yscale("symlog", linthresh=1e-2)
+            told = f"{name}, samples: {samples}" if samples else name
+            curve(times, own, "photons_per_view", "time_ms", told, number)
+            curve(excesses, own, "photons_per_view", _excess, "", number)
+        excesses.axhline(EXCESS, color="#8a94a6", linewidth=0.8, linestyle=":")
+        frame(times, "photons_per_view", "time_ms", scene)
+        frame(excesses, "photons_per_view", "dispersion - 1", log="x")
+        excesses.set_yscale("symlog", linthresh=EXCESS)
 
 
 def _excess(row: Row) -> Value:
@@ -226,4 +229,4 @@ def reading(measured: Measured) -> str:
     )
 
 
-STUDY = Study("photons", "Photon images", SIZES, measure, draw, reading, width_in=10.5, height_in=4.2)
+STUDY = Study("photons", "Photon images", SIZES, measure, draw, reading, width_in=11.0, height_in=6.5)
