@@ -1,6 +1,7 @@
 """Whole processes: how long they take, and how much memory at most."""
 
 import subprocess
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,15 +26,19 @@ def run_process(command: Sequence[str]) -> Finished:
     the process that started them.
     """
     start, peak = time.perf_counter(), None
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        while process.poll() is None:
-            peak = _peak_mb(process.pid) or peak
-            time.sleep(POLL_S)
-        seconds = time.perf_counter() - start
-        output, messages = process.communicate()
-    if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, list(command), output, messages)
-    return Finished(seconds, peak, output)
+    # Files, since a pipe that nobody reads stops who writes much into it.
+    with tempfile.TemporaryFile("w+") as output, tempfile.TemporaryFile("w+") as messages:
+        with subprocess.Popen(command, stdout=output, stderr=messages) as process:
+            while process.poll() is None:
+                peak = _peak_mb(process.pid) or peak
+                time.sleep(POLL_S)
+            seconds = time.perf_counter() - start
+        output.seek(0)
+        messages.seek(0)
+        if process.returncode:
+            fault = process.returncode, list(command), output.read(), messages.read()
+            raise subprocess.CalledProcessError(*fault)
+        return Finished(seconds, peak, output.read())
 
 
 def _peak_mb(pid: int) -> float | None:

@@ -119,6 +119,7 @@ def run(folder: Path, rows: int, side_px: int, samples: int, out: Path) -> dict[
     import mitsuba as mi
 
     mi.set_variant("llvm_ad_rgb", "scalar_rgb")
+    mi.set_log_level(mi.LogLevel.Error)  # warnings go to standard output
     out.mkdir(parents=True, exist_ok=True)
     rng, pitch_mm = np.random.default_rng(2017), 45 / (rows - 1)
     pitch_px = pitch_mm * FOCAL_MM / (FIELD_MM / side_px)
