@@ -23,6 +23,11 @@ Parameter = str | int | float
 UNITS = {
     "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "bytes": "bytes",
 }  # fmt: skip
+SPELLINGS = {
+    "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000", "cpsnr": "CPSNR",
+    "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
+}  # fmt: skip
+"""Words that are not written in small letters."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +124,8 @@ def label(quantity: str) -> str:
     """
     *words, last = quantity.split("_")
     text = " ".join(words) + f", {UNITS[last]}" if words and last in UNITS else " ".join((*words, last))
-    for name in ("rmse", "flip", "iou", "cpsnr", "oidn", "ciede2000"):
-        text = text.replace(name, name.upper())
+    for name, written in SPELLINGS.items():
+        text = text.replace(name, written)
     return text
 
 

@@ -164,13 +164,13 @@ def reading(measured: Measured) -> str:
 
     few, many = budgets[0], budgets[-1]
     return (
-        "How good are depth and masks for their time, and how far from what light allows? In depth, less"
-        " is better: the default posterior is wrong by more than 1 px, or silent, in"
-        f" {of(DEPTH, DEFAULT, few, 'bad_1px_percent'):.0f} % of the objects' pixels with {few:g} photons"
-        f" per view and in {of(DEPTH, DEFAULT, many, 'bad_1px_percent'):.0f} % with {many:g}; bounds are"
-        " for whole objects of known texture at one depth, so that no method of single pixels comes near."
-        f" Of masks more is better: IoU by likelihood goes from {of(REMOVAL, 'likelihood', few, 'iou'):.2f}"
-        f" to {of(REMOVAL, 'likelihood', many, 'iou'):.2f}, by the paper's three steps from"
+        "How good are depth and masks for their time, and how far from what light allows? In depth, less is"
+        " better: the default posterior is wrong by more than 1 px, or silent, in"
+        f" {of(DEPTH, DEFAULT, few, 'bad_1px_percent'):.0f} % of the objects' pixels with {few:g} photons per"
+        f" view and in {of(DEPTH, DEFAULT, many, 'bad_1px_percent'):.0f} % with {many:g}; dashed bounds are"
+        " standard deviations of whoever knows an object's texture and that all of it lies at one depth. Of"
+        f" masks more is better: IoU by likelihood goes from {of(REMOVAL, 'likelihood', few, 'iou'):.2f} to"
+        f" {of(REMOVAL, 'likelihood', many, 'iou'):.2f}, by the paper's three steps from"
         f" {of(REMOVAL, 'three-step', few, 'iou'):.2f} to {of(REMOVAL, 'three-step', many, 'iou'):.2f}."
     )
 

@@ -49,6 +49,8 @@ def test_labels_have_units_and_abbreviations() -> None:
     assert label("peak_mb") == "peak, MB"
     assert label("samples") == "samples"
     assert label("ms") == "ms"
+    assert label("badpix_007_percent") == "BadPix(0.07), %"
+    assert [label(name) for name in ("iou", "mse_x100", "rmse_percent")] == ["IoU", "MSE x100", "RMSE, %"]
 
 
 def test_works_take_turns_and_the_first_round_is_not_counted() -> None:
