@@ -20,7 +20,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import sense
 from pcii.core.section_stack import Sections
 from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import MANIFEST
+from pcii.io.dataset_layout import COUNTS, MANIFEST, TRUTH
 from pcii.sections import reconstruction
 from pcii.sections.reconstruction import extend, reconstruct
 from simgen.dataset.generation import generate, make
@@ -35,6 +35,8 @@ from simgen.truth import visibility
 from simgen.truth.first_hits import first_hits_at_centre
 
 Arrays = Mapping[str, np.ndarray]
+DEPTH = f"{TRUTH}/z_mm"
+"""Part of a dataset that holds the depth."""
 BRIGHT = 2.0
 """Photons per pixel of counts that are kept as images."""
 
@@ -200,8 +202,8 @@ SKIPS = (
     ),
     Skip(
         "radiance images that nobody asked for",
-        lambda w, n: content_of(w.made(n, radiance="none"), "counts"),
-        lambda w, n: content_of(w.made(n, radiance="rgb"), "counts"),
+        lambda w, n: content_of(w.made(n, radiance="none"), COUNTS),
+        lambda w, n: content_of(w.made(n, radiance="rgb"), COUNTS),
     ),
     Skip(
         "colours that the Bayer pattern hides",
@@ -210,13 +212,13 @@ SKIPS = (
     ),
     Skip(
         "visibility that nobody asked for",
-        lambda w, n: content_of(w.made(n, visibility=False), "truth/z_mm"),
-        lambda w, n: content_of(w.made(n, visibility=True), "truth/z_mm"),
+        lambda w, n: content_of(w.made(n, visibility=False), DEPTH),
+        lambda w, n: content_of(w.made(n, visibility=True), DEPTH),
     ),
     Skip(
         "truth of every view that nobody asked for",
-        lambda w, n: content_of(w.made(n), "truth/z_mm"),
-        lambda w, n: content_of(w.made(n, view_truth=("z_mm", "object_id")), "truth/z_mm"),
+        lambda w, n: content_of(w.made(n), DEPTH),
+        lambda w, n: content_of(w.made(n, view_truth=("z_mm", "object_id")), DEPTH),
     ),
     Skip(
         "shadow rays of points that nothing can hide",

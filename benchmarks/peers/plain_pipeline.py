@@ -146,7 +146,7 @@ def run(folder: Path, rows: int, side_px: int, samples: int, out: Path) -> dict[
     done("sections")
     sigma = 4 * side_px / 1024
     smooth = np.array([gaussian_filter(section, sigma) for section in sections])
-    masks = (smooth == smooth.max(axis=0)) & (smooth > 4 * np.median(smooth))
+    masks = (smooth == smooth.max(axis=0)) & (smooth > smooth.max() / 4)
     done("removal")
     depths = 1 / np.linspace(1 / RANGE_MM[0], 1 / RANGE_MM[1], 64)
     best, cost = np.zeros((side_px, side_px)), np.full((side_px, side_px), np.inf)
