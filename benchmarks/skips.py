@@ -20,7 +20,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import sense
 from pcii.core.section_stack import Sections
 from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import COUNTS, MANIFEST, TRUTH
+from pcii.io.dataset_layout import MANIFEST, TRUTH
 from pcii.sections import reconstruction
 from pcii.sections.reconstruction import extend, reconstruct
 from simgen.dataset.generation import generate, make
@@ -202,8 +202,8 @@ SKIPS = (
     ),
     Skip(
         "radiance images that nobody asked for",
-        lambda w, n: content_of(w.made(n, radiance="none"), COUNTS),
-        lambda w, n: content_of(w.made(n, radiance="rgb"), COUNTS),
+        lambda w, n: content_of(w.made(n, radiance="none"), TRUTH),
+        lambda w, n: content_of(w.made(n, radiance="rgb"), TRUTH),
     ),
     Skip(
         "colours that the Bayer pattern hides",
