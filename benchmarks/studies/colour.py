@@ -12,9 +12,9 @@ import numpy as np
 
 from benchmarks.colour_chart import WHITE, Chart, colours, difference, integrated, lab, render_chart
 from benchmarks.figures import bars
-from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
+from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
-from benchmarks.timing import median_of, ratio_of, timed
+from benchmarks.timing import median_of, timed
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
@@ -52,8 +52,7 @@ def measure(samples: int, repeats: int, each_patch: bool) -> Measured:
     rows += [row for pair in pairs for row in _colour_rows(charts[pair], *pair, each=each_patch)]
     if backend.choose().kind == "scalar":  # there it takes minutes
         return Measured(rows, seeds=[1])
-    times, ratios = _times(repeats)
-    return Measured([*rows, *times], ratios, [1])
+    return Measured([*rows, *_times(repeats)], seeds=[1])
 
 
 def _raw_row(charts: dict[tuple[str, str | None], Chart], lamp: str, camera: str) -> Row:
@@ -103,7 +102,7 @@ def _colour_rows(chart: Chart, lamp: str, camera: str | None, *, each: bool) -> 
     return rows
 
 
-def _times(repeats: int) -> tuple[list[Row], list[Ratio]]:
+def _times(repeats: int) -> list[Row]:
     """Both modes on the paper's recipe: a dense view, and photons by thinning."""
     rows: list[Row] = []
     taken: dict[tuple[str, str], list[float]] = {}
@@ -122,11 +121,7 @@ def _times(repeats: int) -> tuple[list[Row], list[Ratio]]:
             Row(TIMES, what, {"mode": mode}, {"time_ms": median_of(taken[what, mode], 1e3)})
             for what in (DENSE, PHOTONS)
         ]
-    ratios = [
-        ratio_of(f"{what}: {RGB_MODE} to {SPECTRAL_MODE}", taken[what, RGB_MODE], taken[what, SPECTRAL_MODE])
-        for what in (DENSE, PHOTONS)
-    ]
-    return rows, ratios
+    return rows
 
 
 def draw(figure: "Figure", measured: Measured) -> None:
@@ -158,9 +153,12 @@ def reading(measured: Measured) -> str:
         f" colours of the chart differ by {own:.1f} CIEDE2000 from the patches' own as that camera sees"
         f" them, and by {rgb:.1f} in RGB mode, which sees as eyes do"
     )
-    if not measured.ratios:
+    if not measured.of(TIMES):
         return text + "."
-    slower = 1 / measured.ratios[0].ratio.value
+    plain, spectral = (
+        measured.one(TIMES, DENSE, mode=mode).values["time_ms"].value for mode in (RGB_MODE, SPECTRAL_MODE)
+    )
+    slower = spectral / plain
     return text + f"; a dense view takes {slower:.1f} times as long with spectra."
 
 

@@ -18,7 +18,7 @@ from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.photon_distance import Rates, distances
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
 from benchmarks.scenes import film, setup_of
-from benchmarks.timing import median_of, ratio_of
+from benchmarks.timing import median_of, ratio_of, side_by_side
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
 from simgen.sensor.photon_table import PhotonTable
@@ -84,14 +84,29 @@ def measure(
                 seconds[dense_name(number), budget] = times
                 rows.append(_row(scene, DENSE, number, budget, times, counts, rates))
         ratios.append(
-            ratio_of(
+            _ratio(
                 f"{scene}: thinning against dense with {max(samples)} samples, {usual:g} photons per view",
-                seconds[dense_name(max(samples)), usual],
-                seconds[THINNING, usual],
+                setup,
+                recipe.photons.model_copy(update={"budget": usual}),
+                max(samples),
+                repeats,
             )
         )
         rows += _crossovers(scene, samples, seconds)
     return Measured(rows, ratios, list(range(1, repeats + 1)))
+
+
+def _ratio(name: str, setup: Setup, photons: Photons, samples: int, repeats: int) -> Ratio:
+    """Both ways in turns."""
+
+    def dense(number: int) -> None:
+        for view in range(setup.grid.view_count):
+            mosaic, rng = rendered_mosaic(setup, view, samples, number), np.random.default_rng(number)
+            drawn_counts(mosaic, setup.cfa, photons.budget, rng)
+
+    works = {THINNING: lambda n: thin_photons(setup, photons, seed=n), DENSE: dense}
+    seconds = side_by_side(works, repeats)
+    return ratio_of(name, seconds[DENSE], seconds[THINNING])
 
 
 def dense_name(samples: int) -> str:
