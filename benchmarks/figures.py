@@ -55,14 +55,19 @@ def curve(axes: "Axes", rows: Sequence[Row], x: Quantity, y: Quantity, name: str
     )
 
 
-def bars(axes: "Axes", names: Sequence[str], values: Sequence[Value], unit: str) -> None:
-    """Draw horizontal bars with intervals, the first on top."""
+def bars(
+    axes: "Axes", names: Sequence[str], values: Sequence[Value], unit: str, *, log: bool = False
+) -> None:
+    """Draw horizontal bars with intervals, the first on top; with `log` on a logarithmic axis."""
     places = range(len(names))
     colour = {"color": COLOURS[5], "ecolor": "#1d2330", "capsize": 2}
     axes.barh(places, [value.value for value in values], xerr=_bars(values), **colour)
     axes.set_yticks(places, names, fontsize=8)
     axes.invert_yaxis()
     axes.set_xlabel(unit, fontsize=9)
+    if log:
+        axes.set_xscale("log")
+        _few_ticks(axes.xaxis, axes.get_xlim())
     _plain(axes)
 
 

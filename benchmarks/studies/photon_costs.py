@@ -74,7 +74,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], lis
         own_setup = setup_of(own)
         works[name] = lambda n, name=name, own=own, s=own_setup: thinning(name, own, s, n)
     for samples in (1, 16):
-        works[f"{DENSE}, {samples}"] = lambda n, samples=samples: dense(samples, n)
+        works[f"{DENSE}, samples: {samples}"] = lambda n, samples=samples: dense(samples, n)
     seconds = side_by_side(works, repeats)
     scale = setup.grid.view_count / dense_views
     rows: list[Row] = []
@@ -88,7 +88,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], lis
     ratios = [
         ratio_of(
             f"thinning against dense with {samples} samples, the paper's recipe",
-            seconds[f"{DENSE}, {samples}"],
+            seconds[f"{DENSE}, samples: {samples}"],
             seconds[BASE],
             scale=scale,
         )
@@ -101,7 +101,7 @@ def _costs(seconds: dict[str, list[float]], scale: float, grid: CameraGrid) -> l
     """What `simgen.photons.counting_plan` chooses by."""
     pixels = grid.view_count * grid.height * grid.width
     base, more = (np.array(seconds[name]) for name in (BASE, "thinning, 10 000 photons per view"))
-    one, sixteen = (scale * np.array(seconds[f"{DENSE}, {samples}"]) for samples in (1, 16))
+    one, sixteen = (scale * np.array(seconds[f"{DENSE}, samples: {samples}"]) for samples in (1, 16))
     sample = (sixteen - one) / (15 * pixels)
     found = {
         "a photon more, by thinning": (more - base) / (9000 * grid.view_count),
@@ -164,8 +164,8 @@ def draw(figure: "Figure", measured: Measured) -> None:
     """Time of the paper's counts, and growth with the photons."""
     left, right = figure.subplots(1, 2)
     rows = measured.of(PAPER)
-    bars(left, [row.name for row in rows], [row.values["time_ms"] for row in rows], "time of 100 views, ms")
-    left.set_xscale("log")
+    times = [row.values["time_ms"] for row in rows]
+    bars(left, [row.name for row in rows], times, "time of 100 views, ms", log=True)
     left.set_title("the paper's recipe", fontsize=10)
     curve(right, measured.of(GROWTH), "photons_per_view", "time_ms", "thinning, two views", 0)
     frame(right, "photons_per_view", "time_ms", "growth with the photons")
