@@ -234,9 +234,9 @@ def reading(measured: Measured) -> str:
     one = _one_of(measured.rows)
     samples = max(int(row.parameters["samples"]) for row in measured.of(IMAGES, scene="matt"))
     text = (
-        "What does an image without photon noise cost? Errors of plain path tracing fall with the square"
-        f" root of the samples and so of the time: in the matt scene {one(kind, 1, 'rmse_percent'):.0f} %"
-        f" of the mean light with 1 sample and {one(kind, samples, 'rmse_percent'):.1f} % with {samples}."
+        "What does an image without photon noise cost? Errors fall with the samples and so with the time: in"
+        f" the matt scene from {one(kind, 1, 'rmse_percent'):.0f} % of the mean light with 1 sample to"
+        f" {one(kind, samples, 'rmse_percent'):.1f} % with {samples}."
     )
     way = f"{kind} {DENOISED}"
     if not any(row.name == way for row in measured.of(IMAGES)):
