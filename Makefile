@@ -1,8 +1,12 @@
 # make demo   the paper's experiment, from scene to report
 # make test   style, types and tests
 # make stress  numerical limits: full sizes, and 10 000 random cases of each property; about 20 minutes
-# make bench  run time against error; TABLES="sections" for one table, TABLES=removal BENCH_SEEDS=3 to
-#             compare methods over scenes and seeds, TABLES=depth those of depth
+# make bench  run time against error, in minutes: tables, figures and a page in out/bench; TABLES="sections"
+#             for one study, TABLES=removal BENCH_SEEDS=3 to compare methods over scenes and seeds, TABLES=depth
+#             those of depth
+# make bench-full     the same at full size: hours
+# make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
+# make bench-publish  make bench, then docs/benchmarks.md and the committed ratios from it; on an idle machine
 # make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
@@ -12,7 +16,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 TRAIN_MINUTES ?= 90
 
-.PHONY: demo test stress bench train gallery format clean llvm
+.PHONY: demo test stress bench bench-full bench-guard bench-publish bench-setup train gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -46,9 +50,22 @@ test: llvm
 stress: llvm
 	$(BIN)/python -m pytest -n 2 -m "stress or hypothesis" --hypothesis-profile=stress
 
-bench: llvm
+bench-setup: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'
-	$(BIN)/python -m benchmarks $(TABLES)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[denoiser]' \
+	  || echo "the denoiser could not be installed; its rows are left out"
+
+bench: bench-setup
+	$(BIN)/python -m benchmarks $(TABLES) --out $(OUT)/bench
+
+bench-full: bench-setup
+	$(BIN)/python -m benchmarks $(TABLES) --full --out $(OUT)/bench-full
+
+bench-guard: $(VENV)/.ready
+	$(BIN)/python -m benchmarks guard --out $(OUT)/bench
+
+bench-publish: bench
+	$(BIN)/python -m benchmarks publish --out $(OUT)/bench
 
 train: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[train]'

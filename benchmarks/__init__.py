@@ -1,1 +1,6 @@
-"""Run time against error, side by side in one run; `make bench` prints the tables."""
+"""Run time against error, side by side in one run; `make bench` measures, draws and prints it.
+
+Every study of `studies` gives rows and ratios (`results`, `timing`, `machine`), a figure (`figures`) and a
+part of the page (`page`); `guard` compares ratios. `peers` holds what ours is compared with. The tables of
+removal and depth over the corpus of scenes (`corpus`, `drawn`) take days and are printed alone.
+"""

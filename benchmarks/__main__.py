@@ -1,25 +1,118 @@
-"""Print the tables; `make bench` calls this, with names of tables for some of them.
+"""The command behind `make bench`: run studies, compare their ratios, publish the page."""
 
-Without names all but "removal", "depth" and "depth-constants", which take days (corpus.py says how to make
-them smaller).
-"""
-
+import argparse
 import sys
+import time
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
 
-from benchmarks import accuracy, collections, colour, depth, depth_constants, photons, removal, sections
+from benchmarks import depth, depth_constants, removal
+from benchmarks.figures import draw
+from benchmarks.guard import losses, read_reference, write_reference
+from benchmarks.machine import machine, versions, was_busy
+from benchmarks.page import tables_of, write_html, write_markdown
+from benchmarks.results import Record, Size, Study, read_record, write_record
+from benchmarks.studies import STUDIES
+from pcii.base.errors import InputError
+from pcii.evaluation.tables import markdown
 
-TABLES = {
-    "sections": sections.table,
-    "accuracy": accuracy.table,
-    "photons": photons.table,
-    "colour": colour.table,
-    "collections": collections.table,
+LONG_TABLES = {
     "removal": removal.table,
     "depth": depth.table,
     "depth-constants": depth_constants.table,
 }
-LONG = ("removal", "depth", "depth-constants")
-for name in sys.argv[1:] or (name for name in TABLES if name not in LONG):
-    for line in TABLES[name]():
-        print(line, flush=True)
-    print()
+"""Tables over the corpus of scenes, which take days (corpus.py says how to make them smaller)."""
+PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
+
+
+def main() -> int:
+    """Run the command line; gives the exit code: 1 for a lost ratio, 2 for bad input."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    names = (*(study.name for study in STUDIES), *LONG_TABLES)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(names)}; guard; publish")
+    parser.add_argument("--full", action="store_true", help="full size: hours instead of minutes")
+    parser.add_argument("--out", type=Path, default=Path("out/bench"), help="folder of results (%(default)s)")
+    given = parser.parse_args()
+    try:
+        if given.names == ["guard"]:
+            return guard(given.out)
+        if given.names == ["publish"]:
+            return publish(given.out)
+        for name in given.names:
+            if name not in names:
+                raise InputError(f"NAME: there is no study named {name!r}; use {', '.join(names)}")
+        run(given.names or [study.name for study in STUDIES], "full" if given.full else "quick", given.out)
+    except InputError as fault:
+        print(f"error: {fault}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def run(names: Iterable[str], size: Size, out: Path) -> None:
+    """Measure the studies of these names and make the page anew; print the tables of long ones."""
+    studies = {study.name: study for study in STUDIES}
+    for name in names:
+        if name in LONG_TABLES:
+            for line in LONG_TABLES[name]():
+                print(line, flush=True)
+            print()
+        else:
+            measure(studies[name], size, out)
+    if any(name in studies for name in names):
+        write_html(out / "benchmarks.html", STUDIES, records_in(out))
+        print(f"The page is {out / 'benchmarks.html'}.")
+
+
+def measure(study: Study, size: Size, out: Path) -> Record:
+    """Run one study and write its results and figure; print its tables as Markdown."""
+    print(f"{study.title} ({study.name}, {size}) ...", flush=True)
+    place, start = machine(), time.perf_counter()
+    if was_busy(place):
+        print(f"the machine is busy (load {place['load']}): seconds will be too long", flush=True)
+    date = datetime.now(UTC).isoformat(timespec="seconds")
+    measured = study.measure(**study.sizes[size])
+    record = Record(study.name, size, date, time.perf_counter() - start, place, versions(), measured)
+    write_record(out, record)
+    draw(study, measured, out / f"{study.name}.png")
+    for table in tables_of(measured.rows):
+        print(f"\n{table.title}\n\n{markdown(table)}", flush=True)
+    print(f"\n{study.reading(measured)}\n", flush=True)
+    return record
+
+
+def records_in(out: Path) -> list[Record]:
+    """Records of all studies that have run; `InputError` if none has."""
+    paths = [out / f"{study.name}.json" for study in STUDIES]
+    records = [read_record(path) for path in paths if path.is_file()]
+    if not records:
+        raise InputError(f"{out}: there are no results of studies; make them by `make bench`")
+    return records
+
+
+def guard(out: Path) -> int:
+    """Compare the ratios of the results with the committed table; 1 if one was lost."""
+    records, reference = records_in(out), read_reference()
+    for record in records:
+        entry = reference.get(record.study)
+        if entry is not None and entry["size"] != record.size:
+            print(f"{record.study}: is of {record.size} size, and the table of {entry['size']}; not compared")
+    lost = losses(records, reference)
+    for sentence in lost:
+        print(f"lost: {sentence}")
+    if not lost:
+        print("no ratio has lost more than 25 %")
+    return 1 if lost else 0
+
+
+def publish(out: Path) -> int:
+    """Write the page of the guide and the table of ratios from the results."""
+    records = records_in(out)
+    write_markdown(PAGE, STUDIES, records)
+    write_reference(records)
+    print(f"wrote {PAGE.name}, its figures and the reference of the guard")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

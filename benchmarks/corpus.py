@@ -98,14 +98,21 @@ def named_scenes(entries: Sequence[Entry], names: Sequence[str]) -> tuple[Entry,
     return tuple(entry for entry in entries if not names or entry.name in names)
 
 
-def work_list(entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int]) -> list[Work]:
-    """Every dataset, seed by seed, so that what is done early tells of all scenes."""
+def work_list(
+    entries: Sequence[Entry], out: Path, seeds: int, budgets: list[int], settings: Sequence[str] = ()
+) -> list[Work]:
+    """Every dataset, seed by seed, so that what is done early tells of all scenes.
+
+    `settings` change the recipes of all, as `--set` does.
+    """
     *fewer, most = sorted(set(budgets))
     light = [f"photons.budget={most}", f"photons.nested={fewer}"]
     nothing_more = ["products.radiance=none", "products.visibility=false", "products.view_truth=false"]
     series: list[list[Work]] = []
     for entry in entries:
-        sweep = load_sweep(entry.recipe, [*light, *nothing_more, f"title={entry.name}"], seeds=seeds)
+        sweep = load_sweep(
+            entry.recipe, [*light, *nothing_more, f"title={entry.name}", *settings], seeds=seeds
+        )
         folder = out / "data" / entry.name
         series.append(
             [

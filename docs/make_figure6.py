@@ -13,7 +13,7 @@ from pathlib import Path
 from matplotlib import get_data_path
 from PIL import Image, ImageDraw, ImageFont
 
-PANEL = re.compile(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"')
+PANEL = re.compile(r'<img src="data:image/(?:png|webp);base64,([^"]+)" alt="([^"]+)"')
 PANELS, COLUMNS = 8, 2
 WIDTH_PX, CAPTION_PX, GAP_PX = 432, 28, 12
 INK = (75, 85, 99)

@@ -29,6 +29,7 @@ from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_writer import save_dataset
+from pcii.io.sample_dataset import sample
 from pcii.metrics.scoring import score
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
@@ -71,6 +72,7 @@ __all__ = [
     "reconstruct",
     "reconstruct_each",
     "removal_methods",
+    "sample",
     "save_dataset",
     "score",
     "segment",

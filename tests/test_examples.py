@@ -9,8 +9,12 @@ import pytest
 EXAMPLES = sorted((Path(__file__).resolve().parent.parent / "examples").glob("*.py"))
 
 
-@pytest.mark.renders
-@pytest.mark.parametrize("example", EXAMPLES, ids=[example.stem for example in EXAMPLES])
+def _case(example: Path) -> object:
+    marks = [pytest.mark.renders] if "import simgen" in example.read_text() else []
+    return pytest.param(example, id=example.stem, marks=marks)
+
+
+@pytest.mark.parametrize("example", [_case(example) for example in EXAMPLES])
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, str(example), str(tmp_path / "out")], capture_output=True, text=True, check=False

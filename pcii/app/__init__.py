@@ -1,14 +1,25 @@
 """The `pcii` command: order of the analysis, folder of results, report.
 
+command_options  Options that several commands take: folder of results, depths, a smaller photon budget.
 commands         The `pcii` command.
 import_commands  The command `pcii import`: images made by others become a dataset.
 import_source    What `pcii import` was told to read, read, and how to mend it if the views do not fit
                  together.
+long_steps       The long steps of an analysis; what an earlier run did is kept if nothing that it follows
+                 from has changed.
 pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2
                  and 3.
-report           report.html: the paper's Figures 6 and 7 and Table 1 for one dataset, with the truth
-                 beside them.
+report           report.html: a slider through the depths, and the paper's figures and table for one
+                 dataset with its truth.
+report_figures   Pictures of a report: the panels of the paper's Figures 6 and 7, and the depth map with its
+                 error.
+report_origin    How a report was made: commands, dates, machine, recipe, versions, hashes, and what was
+                 skipped.
+report_slider    Sections through the whole depth range, for the slider of a report, and what is read out at a
+                 pixel.
+report_tables    Numbers of a report as text: key facts, Table 1, scores of the masks and of the depth map.
 results          The folder of results that commands write and later commands read.
 single_run       Analysis of one dataset with all its results written: sections, masks, depth, scores and
                  report.
+step_commands    Commands for single steps of the analysis: sections, depth, removal.
 """

@@ -1,37 +1,46 @@
 """The `pcii` command."""
 
-from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
+from pcii.app.command_options import Budget, Depths, Json, Out, opened
 from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
+from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
-from pcii.base.command_line import say
+from pcii.base.command_output import answer_json, results_beside, say, say_next, say_next_page
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
-from pcii.io.dataset import Dataset, open_dataset
 
-app = App(
-    name="pcii",
-    help="Reconstruct photon-counted integral images, remove defocused points, and score the result.",
-    version=lambda: version("photon-integral-imaging"),
-    default_parameter=Parameter(converter=command_line.converted),
+app = command_line.command_app(
+    "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."
 )
 
 app.command(import_dataset, name="import")
-
-Out = Annotated[Path, Parameter(name=("--out", "-o"))]
-Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm")]
-Without = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(negative="")]
-Budget = Annotated[float | None, Parameter(help="Use the photons of this smaller, nested budget.")]
+for command in (reconstruct, depth, segment):
+    app.command(command)
 
 
-def _open(dataset: Path, budget: float | None) -> Dataset:
-    data = open_dataset(dataset)
-    return data if budget is None else data.at_budget(budget)
+@app.command
+def sample(*, out: Out) -> None:
+    """Copy the sample dataset that comes with the package: ball and bird, 5 x 5 views, 2000 photons in each.
+
+    Example of use:
+
+        pcii sample -o out/sample
+
+    Parameters
+    ----------
+    out
+        Folder for the dataset: new or empty.
+    """
+    from pcii.io.sample_dataset import copy_sample
+
+    copy_sample(out)
+    say(f"{out}")
+    say_next("pcii", "run", out, "-o", results_beside(out))
 
 
 @app.command
@@ -40,7 +49,14 @@ def run(
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
-    Example:  pcii run out/paper -o out/paper-results
+    What earlier runs finished, interrupted ones too, is kept where dataset, options and software are the
+    same: the command goes on from there.
+
+    Examples of use:
+
+        pcii run out/paper -o out/paper-results
+        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood
+        pcii run out/paper -o out/paper-300 --budget 300
 
     Parameters
     ----------
@@ -49,158 +65,34 @@ def run(
     out
         Folder for the results: new, empty, or that of earlier results of the same dataset.
     z_mm
-        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
+        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that the recipe
+        names.
     method
         A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     """
     from pcii.app.single_run import run as run_all
 
     with Stages() as report:
-        outcome = run_all(_open(dataset, budget), out, z_mm, report, method or None)
+        outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None)
+    if outcome.kept:
+        say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
     say(f"report: {out / 'report.html'}")
+    say_next_page(out / "report.html")
 
 
 @app.command
-def reconstruct(
-    dataset: Path,
-    *,
-    out: Out,
-    z_mm: Depths = (),
-    subpixel: int = 1,
-    shifts: Literal["nearest", "even"] = "nearest",
-    budget: Budget = None,
-) -> None:
-    """Reconstruct sections from the photon counts, or else the radiance, with a picture of each.
-
-    Example:  pcii reconstruct out/paper --z-mm 540 --z-mm 620 -o out/sections
-
-    Parameters
-    ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    z_mm
-        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
-    subpixel
-        Divide each pixel into this many voxels per axis.
-    shifts
-        `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
-    """
-    from pcii.imaging.pictures import to_srgb8, white_level, write_png
-    from pcii.io.suggested_depths import planes_of
-    from pcii.sections.demosaicing import demosaic
-    from pcii.sections.reconstruction import reconstruct as make
-
-    data = _open(dataset, budget)
-    sections = make(data.counts_or_views, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_sections(sections)}")
-        for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
-            if sections.cfa is not None:
-                estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
-            picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))
-            with results.replacing(f"section_{z:g}mm.png") as path:
-                write_png(path, picture)
-            say(f"{out / path.name}")
-
-
-@app.command
-def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget = None) -> None:
-    """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
-
-    Example:  pcii depth out/paper --method focus -o out/depth
-
-    Parameters
-    ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    method
-        posterior (default) or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
-        structure-tensor; or one that a package registers.
-    """
-    from pcii.depth.methods import estimate_depth
-    from pcii.imaging.pictures import depth_image, write_png
-    from pcii.io.suggested_depths import depth_range_of
-
-    data = _open(dataset, budget)
-    z_range = depth_range_of(data)
-    depth_map = estimate_depth(data.counts_or_views, z_range, method=method)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_depth(depth_map)}")
-        with results.replacing("depth.png") as path:
-            write_png(path, depth_image(depth_map.z_mm, *z_range, depth_map.confidence))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, darker where less sure")
-
-
-@app.command
-def segment(
-    dataset: Path,
-    *,
-    out: Out,
-    z_mm: Depths = (),
-    method: str = "likelihood",
-    without: Without = (),
-    subpixel: int = 1,
-    budget: Budget = None,
-) -> None:
-    """Remove defocused points from sections, with a picture of each mask.
-
-    Example:  pcii segment out/paper --z-mm 540 --method three-step -o out/removed
-
-    Example:  pcii segment out/paper --method three-step --without entropy --subpixel 2 -o out/removed
-
-    Parameters
-    ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    z_mm
-        Depth of a section in mm; repeat for more. Default: the depths that the recipe names.
-    method
-        three-step (of the paper), likelihood (Poisson), brightness, variance or shape-from-focus (for
-        comparison), or a method that an installed package registers.
-    without
-        Leave out one of the three steps; repeat for more.
-    subpixel
-        Find the outlines of the three steps on this many voxels per pixel and axis.
-    """
-    from pcii.base.errors import InputError
-    from pcii.imaging.pictures import mask_image, write_png
-    from pcii.io.suggested_depths import planes_of
-    from pcii.removal.methods import find_method
-    from pcii.removal.methods import segment as remove
-    from pcii.removal.three_step.three_step_method import ThreeStep
-
-    if method != "three-step" and (without or subpixel != 1):
-        option = "--without" if without else "--subpixel"
-        raise InputError(f"{option}: is for --method three-step, not {method}")
-    chosen = find_method(method)
-    if method == "three-step":
-        chosen = ThreeStep(subpixel, **dict.fromkeys(without, False))
-    data = _open(dataset, budget)
-    focus = remove(data.counts, planes_of(data, z_mm), method=chosen)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_segmented(focus)}")
-        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
-            with results.replacing(f"in_focus_{focus.method}_{z:g}mm.png") as path:
-                write_png(path, mask_image(mask))
-            say(f"{out / path.name}: {mask.mean():.2%} of the section in focus")
-
-
-@app.command
-def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
+def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False) -> None:
     """Compare the results in a folder with the dataset's truth, and write score.json into it.
 
-    Example:  pcii score out/paper out/paper-results
+    Examples of use:
+
+        pcii score out/paper out/paper-results
+        pcii score out/paper out/depth --json
 
     Parameters
     ----------
@@ -208,13 +100,15 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
         The dataset folder, with truth.
     out
         The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
+    json
+        Print the score too, as score.json has it.
     """
     from pcii.app.pipeline import full_light_sections
     from pcii.base.errors import InputError
     from pcii.core.focal_planes import FocalPlanes
     from pcii.metrics.scoring import score as compare
 
-    data = _open(dataset, budget)
+    data = opened(dataset, budget)
     if not out.is_dir():
         raise InputError(f"{out}: there is no such folder of results")
     results = Results(out, data)
@@ -233,16 +127,21 @@ def score(dataset: Path, out: Path, *, budget: Budget = None) -> None:
             full_light = full_light_sections(data, planes, report)
     result = compare(focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name)
     with results.writing():
-        say(f"{results.save_score(result)}")
+        path = results.save_score(result)
+    if json:
+        answer_json(result.to_dict())
+    else:
+        say(f"{path}")
+        say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
 
 
 @app.command
 def evaluate(
-    datasets: Annotated[tuple[Path, ...], Parameter(negative=())],
+    datasets: tuple[Path, ...],
     *,
     out: Out,
-    method: Annotated[tuple[str, ...], Parameter(negative=())] = (),
-    budget: Annotated[tuple[str, ...], Parameter(negative=())] = (),
+    method: tuple[str, ...] = (),
+    budget: tuple[str, ...] = (),
     crew: Annotated[Crew, Parameter(name="*")] = ALONE,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
@@ -250,10 +149,9 @@ def evaluate(
     Writes evaluation.json, evaluation.html and evaluation.md, and each score, as it is measured, to
     rows.jsonl.
 
-    Examples:
+    Examples of use:
 
         pcii evaluate out/twenty -o out/compared
-
         pcii evaluate out/twenty out/slats -o out/compared --method depth:focus --budget 300 --workers 2
 
     Parameters
@@ -273,28 +171,32 @@ def evaluate(
     with Stages() as report:
         compare(datasets, out, methods=method, budgets=budget, crew=crew, report=report)
     say(f"report: {out / 'evaluation.html'}")
+    say_next_page(out / "evaluation.html")
 
 
 @app.command
-def verify(folder: Path) -> None:
+def verify(folder: Path, *, json: Json = False) -> None:
     """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Example:  pcii verify out/paper-results
+    Examples of use:
+
+        pcii verify out/paper-results
+        pcii verify out/paper --json
 
     Parameters
     ----------
     folder
         Folder of a dataset, of a collection, of results or of an evaluation.
+    json
+        Print the number of files, or what is wrong, as JSON.
     """
-    from pcii.io.verification import verify as compare
+    from pcii.io.verification import verify_and_tell
 
-    with Stages() as report:
-        count = compare(folder, report)
-    say(f"{folder}: {count} files match the manifest")
+    verify_and_tell(folder, as_json=json)
 
 
 def main() -> int:
     """Entry point of the `pcii` command."""
-    return command_line.run(app, resuming=("evaluate",))
+    return command_line.run(app, resuming=("run", "evaluate"))

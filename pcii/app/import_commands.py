@@ -1,11 +1,9 @@
 """The command `pcii import`: images made by others become a dataset."""
 
 from pathlib import Path
-from typing import Annotated
 
-from cyclopts import Parameter
-
-from pcii.base.command_line import say
+from pcii.app.command_options import Depths, Out
+from pcii.base.command_output import answer, results_beside, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.core.images import Views
@@ -13,11 +11,8 @@ from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.lens_arrays import LensArray
 from pcii.importing.light_encoding import Encoding, check_encoding
 
-Out = Annotated[Path, Parameter(name=("--out", "-o"))]
-Flag = Annotated[bool, Parameter(negative="")]
-Pair = Annotated[tuple[float, float] | None, Parameter(negative="")]
-WholePair = Annotated[tuple[int, int] | None, Parameter(negative="")]
-Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm", negative="")]
+Pair = tuple[float, float] | None
+WholePair = tuple[int, int] | None
 
 
 def import_dataset(
@@ -31,17 +26,17 @@ def import_dataset(
     sensor_mm: float | None = None,
     pixel_mm: float | None = None,
     shear_px: Pair = None,
-    swap_axes: Flag = False,
-    flip_rows: Flag = False,
-    flip_cols: Flag = False,
+    swap_axes: bool = False,
+    flip_rows: bool = False,
+    flip_cols: bool = False,
     lens_array: WholePair = None,
     lens_pitch_px: Pair = None,
     lens_offset_px: Pair = None,
-    inverted: Flag = False,
+    inverted: bool = False,
     array: str | None = None,
-    counts: Flag = False,
-    srgb: Flag = False,
-    linear: Flag = False,
+    counts: bool = False,
+    srgb: bool = False,
+    linear: bool = False,
     gamma: float | None = None,
     cfa: str | None = None,
     photons: float | None = None,
@@ -56,18 +51,14 @@ def import_dataset(
 
     Says at which depths things are sharpest, and warns if the views fit together better in another order.
 
-    Examples:
+    Examples of use:
 
         pcii import photos -o out/mine --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 --sensor-mm 36
-
-        pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 --sensor-mm 36
-        --cfa GRBG --photons 1000 --z-range-mm 30 200
-
+        pcii import photos -o out/dim --pattern "{col}_{row}.png" --pitch-mm 2 2 --focal-mm 35 \\
+          --sensor-mm 36 --cfa GRBG --photons 1000 --z-range-mm 30 200
         pcii import cotton -o out/cotton
-
-        pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3
-        --pixel-mm 0.01
-
+        pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3 \\
+          --pixel-mm 0.01
         pcii import frames.npy -o out/spad --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
 
     Parameters
@@ -124,7 +115,8 @@ def import_dataset(
     seed
         Seed of these counts.
     z_mm
-        Depth to look at in mm, kept as a suggestion; repeat for more. Default: where things are sharpest.
+        Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: where
+        things are sharpest.
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
     title
@@ -188,7 +180,9 @@ def import_dataset(
     elif warning is None:
         say("nothing is clearly sharp at any depth that was looked at")
     if warning is not None:
-        say(f"warning: {warning}; then delete {out} and import again")
+        answer(f"warning: {warning}; then delete {out} and import again")
+    else:
+        say_next("pcii", "run", out, "-o", results_beside(out))
 
 
 def _optics(

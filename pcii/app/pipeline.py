@@ -1,10 +1,11 @@
 """Analysis of a dataset, from sections to scores, in the order of the paper's sections 2 and 3."""
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
+from pcii.app.long_steps import ALL_STEPS, DEPTH_STEP, Made, Steps, removal_step, timed
 from pcii.base.progress import Report, silent
 from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.focal_planes import FocalPlanes
@@ -32,6 +33,8 @@ class Outcome:
     depth: DepthMap
     score: Score
     timings_s: dict[str, float] = field(default_factory=dict)
+    kept: tuple[str, ...] = ()
+    """Steps whose results are those of an earlier run; `timings_s` is how long they took then."""
 
 
 def analyse(
@@ -39,13 +42,14 @@ def analyse(
     z_mm: Sequence[float] | None,
     report: Report = silent,
     methods: Sequence[str] | None = None,
+    steps: Steps = ALL_STEPS,
 ) -> Outcome:
     """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
 
     `z_mm` defaults to the depths in the dataset's recipe, `methods` to `DEFAULT_METHODS`. Of a dataset
-    without photon counts sections and depth are those of its radiance, and nothing is removed. Raises
-    `InputError` without depths, without both counts and radiance, and for an unknown method or one of which
-    there are no counts.
+    without photon counts sections and depth are those of its radiance, and nothing is removed. `steps` does
+    the long steps, and may know results of earlier runs. Raises `InputError` without depths, without both
+    counts and radiance, and for an unknown method or one of which there are no counts.
     """
     seconds: dict[str, float] = {}
     planes, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
@@ -57,43 +61,32 @@ def analyse(
     total = 4 + len(chosen)
     done = 0
 
-    def finished(name: str, start: float) -> None:
+    def finished(name: str, result: tuple[Made, float]) -> Made:
         nonlocal done
+        made, seconds[name] = result[0], round(result[1], 3)
         done += 1
-        seconds[name] = round(time.perf_counter() - start, 3)
         report("analysis", done, total)
+        return made
 
-    start = time.perf_counter()
-    full_light = full_light_sections(dataset, planes, report)
-    finished("sections at full light", start)
-
-    start = time.perf_counter()
+    full_light = finished(
+        "sections at full light", timed(lambda: full_light_sections(dataset, planes, report))
+    )
     if counts is None:
         assert full_light is not None
-        sections = full_light
+        sections = finished("sections", (full_light, 0.0))
     else:
-        sections = reconstruct(counts, planes)
-    finished("sections", start)
-
+        sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
     focus: list[Segmented] = []
     for method in chosen:
-        start = time.perf_counter()
         assert counts is not None
-        focus.append(find_method(method)(counts, sections))
-        finished(f"removal, {method}", start)
-
-    start = time.perf_counter()
+        remove = partial(find_method(method), counts, sections)
+        focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
     seen = dataset.views if counts is None else counts
     assert seen is not None
-    depth = estimate_depth(seen, z_range)
-    finished("depth", start)
-
-    start = time.perf_counter()
-    result = score(
-        focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light, dataset=dataset.name
-    )
-    finished("score", start)
-    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds)
+    depth = finished(DEPTH_STEP, steps.depth(z_range, lambda: estimate_depth(seen, z_range)))
+    scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
+    result = finished("score", timed(lambda: scored(dataset=dataset.name)))
+    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, steps.kept())
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = silent) -> Sections | None:

@@ -1,6 +1,7 @@
 """The folder of results that commands write and later commands read.
 
-results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum
+results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum; of
+                         what `pcii run` made, by what (see `pcii.app.long_steps`) and how long it took
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
@@ -14,7 +15,7 @@ ones.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,20 @@ from pcii.sections.reconstruction import reconstruct
 
 REMEDY = "make it again"
 LOCK = ".results.lock"
+DEPTH = "depth.zarr"
+
+
+def masks_name(method: str) -> str:
+    """Name of the folder of a method's masks."""
+    return f"segmented_{method}.zarr"
+
+
+@dataclass(frozen=True)
+class Making:
+    """What a file or folder of results follows from, as a hash, and how long it took to make."""
+
+    key: str
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -84,31 +99,37 @@ class Results:
                 self.check()
                 sweep_temporaries(self.path)
                 if not (self.path / RESULTS).exists():
-                    self._list({})
+                    self._list({}, {})
                 yield self
             finally:
                 (self.path / LOCK).unlink(missing_ok=True)
 
     @contextmanager
-    def replacing(self, name: str) -> Iterator[Path]:
+    def replacing(self, name: str, making: Making | None = None) -> Iterator[Path]:
         """Path at which to write the new file or folder `name`; it is renamed at the end of the block."""
         target = self.path / name
         with temporary_folder(target) as temporary:
             new = temporary / name
             yield new
-            files = read_results(self.path)["files"]
+            held = read_results(self.path)
+            files, made = held["files"], held.get("made", {})
             remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
+            made = {part: how for part, how in made.items() if part != name}
             if len(remaining) < len(files):
-                self._list(remaining)
+                self._list(remaining, made)
             if new.is_dir():
                 replace_folder(new, target)
             else:
                 new.replace(target)
                 sync_folder(self.path)
-            self._list(remaining | list_files(self.path, [name]))
+            if making is not None:
+                made[name] = asdict(making)
+            self._list(remaining | list_files(self.path, [name]), made)
 
-    def _list(self, files: Mapping[str, Any]) -> None:
-        write_results(self.path, {**self._origin, "files": files})
+    def _list(self, files: Mapping[str, Any], made: Mapping[str, Any]) -> None:
+        """Write results.json, the same whatever order the files were made in."""
+        in_order = {"files": dict(sorted(files.items())), "made": dict(sorted(made.items()))}
+        write_results(self.path, self._origin | in_order)
 
     def save_sections(self, sections: Sections) -> Path:
         """Write the counts and the coverage, whose quotient is the estimate."""
@@ -119,18 +140,18 @@ class Results:
             labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
         return self._save("sections.zarr", arrays, labels, pattern)
 
-    def save_segmented(self, focus: Segmented) -> Path:
+    def save_segmented(self, focus: Segmented, making: Making | None = None) -> Path:
         """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
         arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
         if focus.photon_in_focus is not None:
             arrays["photon_in_focus"] = focus.photon_in_focus
-        return self._save(
-            f"segmented_{focus.method}.zarr", arrays, SEGMENTED_LABELS, {"method": focus.method}
-        )
+        attributes = {"method": focus.method}
+        return self._save(masks_name(focus.method), arrays, SEGMENTED_LABELS, attributes, making)
 
-    def save_depth(self, depth: DepthMap) -> Path:
+    def save_depth(self, depth: DepthMap, making: Making | None = None) -> Path:
         """Write the depth map and its confidence."""
-        return self._save("depth.zarr", {"z_mm": depth.z_mm, "confidence": depth.confidence}, DEPTH_LABELS)
+        arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
+        return self._save(DEPTH, arrays, DEPTH_LABELS, making=making)
 
     def save_score(self, result: Score) -> Path:
         """Write score.json."""
@@ -144,8 +165,9 @@ class Results:
         arrays: Mapping[str, np.ndarray],
         labels: Mapping[str, Label],
         attributes: Mapping[str, Any] | None = None,
+        making: Making | None = None,
     ) -> Path:
-        with self.replacing(name) as path:
+        with self.replacing(name, making) as path:
             write_arrays(path, arrays, labels, attributes)
         return self.path / name
 
@@ -158,31 +180,67 @@ class Results:
         for group in sorted(
             name for name in groups if name.startswith("segmented_") and name.endswith(".zarr")
         ):
-            has_photons = lists_part(files, f"{group}/photon_in_focus")
-            names = ("z_mm", "in_focus", *(["photon_in_focus"] if has_photons else []))
-            arrays = {name: self._read(f"{group}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
-            photons = arrays.pop("photon_in_focus", None)
-            if photons is not None and photons.shape[-1] != self.dataset.counts.events.n.size:
-                raise InputError(f"{self.path / group}: its photon_in_focus is of other counts; {REMEDY}")
+            arrays = self._masks(group, files)
             method = group.removeprefix("segmented_").removesuffix(".zarr")
             try:
-                depths = arrays["z_mm"].tobytes()
-                if depths not in sections:
-                    sections[depths] = reconstruct(self.dataset.counts, arrays["z_mm"])
-                in_focus = arrays["in_focus"]
-                segmented.append(Segmented(in_focus, method, sections[depths], photon_in_focus=photons))
+                depths = arrays.pop("z_mm")
+                if depths.tobytes() not in sections:
+                    sections[depths.tobytes()] = reconstruct(self.dataset.counts, depths)
+                segmented.append(_segmented(arrays, method, sections[depths.tobytes()]))
             except InputError as fault:
                 raise InputError(f"{self.path / group}: {fault}; {REMEDY}") from None
         return segmented
 
+    def _masks(self, group: str, files: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """`z_mm`, `in_focus` and, if the method decides it, `photon_in_focus` of a method."""
+        has_photons = lists_part(files, f"{group}/photon_in_focus")
+        names = ("z_mm", "in_focus", *(["photon_in_focus"] if has_photons else []))
+        arrays = {name: self._read(f"{group}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
+        if has_photons and arrays["photon_in_focus"].shape[-1] != self.dataset.counts.events.n.size:
+            raise InputError(f"{self.path / group}: its photon_in_focus is of other counts; {REMEDY}")
+        return arrays
+
+    def kept_masks(self, method: str, sections: Sections, key: str) -> tuple[Segmented, float] | None:
+        """The masks of a method and how long they took, if they were made by `key` and are undamaged."""
+        seconds = self._made_by(masks_name(method), key)
+        if seconds is None:
+            return None
+        try:
+            arrays = self._masks(masks_name(method), read_results(self.path)["files"])
+            depths = arrays.pop("z_mm")
+            same = np.array_equal(depths, sections.z_mm)
+            return (_segmented(arrays, method, sections), seconds) if same else None
+        except InputError:
+            return None
+
+    def kept_depth(self, key: str) -> tuple[DepthMap, float] | None:
+        """The depth map and how long it took, if it was made by `key` and is undamaged."""
+        seconds = self._made_by(DEPTH, key)
+        try:
+            depth = None if seconds is None else self.load_depth()
+        except InputError:
+            return None
+        return None if depth is None or seconds is None else (depth, seconds)
+
+    def _made_by(self, name: str, key: str) -> float | None:
+        """How long it took to make a part, in s; None if it was not made by `key`, or is not there."""
+        if not (self.path / RESULTS).is_file():
+            return None
+        made = read_results(self.path).get("made", {}).get(name)
+        return made["seconds"] if made is not None and made["key"] == key else None
+
     def load_depth(self) -> DepthMap | None:
         """The depth map in the folder, or None."""
         files = read_results(self.path)["files"]
-        if not lists_part(files, "depth.zarr"):
+        if not lists_part(files, DEPTH):
             return None
-        return DepthMap(**{n: self._read(f"depth.zarr/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
+        return DepthMap(**{n: self._read(f"{DEPTH}/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
 
     def _read(self, name: str, files: Mapping[str, Any], label: Label) -> np.ndarray:
         grid = self.dataset.grid
         sizes = {"row": grid.height, "col": grid.width}
         return read_array(self.path, name, files, label, sizes, REMEDY)
+
+
+def _segmented(arrays: Mapping[str, np.ndarray], method: str, sections: Sections) -> Segmented:
+    return Segmented(arrays["in_focus"], method, sections, photon_in_focus=arrays.get("photon_in_focus"))

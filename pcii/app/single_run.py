@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from pcii.app.long_steps import KeptSteps
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.app.results import Results
@@ -19,7 +20,9 @@ def run(
     report: Report = silent,
     methods: Sequence[str] | None = None,
 ) -> Outcome:
-    """Analyse `dataset` and write all results into `out`.
+    """Analyse `dataset` and write all results into `out`, each of the long steps as soon as it is done.
+
+    Masks and depth maps that an earlier run left there, interrupted or not, are kept if they are valid.
 
     Raises `InputError` if `out` is no folder for results of this dataset, and as `analyse` does.
     """
@@ -28,13 +31,10 @@ def run(
     planes_of(dataset, z_mm)
     results = Results(out, dataset)
     results.check()
-    outcome = analyse(dataset, z_mm, report, methods)
+    outcome = analyse(dataset, z_mm, report, methods, KeptSteps(results))
     with results.writing():
         results.save_sections(outcome.sections)
-        for focus in outcome.focus:
-            results.save_segmented(focus)
-        results.save_depth(outcome.depth)
         results.save_score(outcome.score)
         with results.replacing("report.html") as page:
-            write_report(page, outcome)
+            write_report(page, outcome, report)
     return outcome

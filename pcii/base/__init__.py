@@ -1,6 +1,8 @@
 """Tools that know nothing of imaging: errors, progress, commands, safe files, compiled loops.
 
-command_line      Running of command lines: error messages of one sentence, exit codes, and Ctrl-C.
+command_line      Running of command lines: help, error messages of one sentence, exit codes, --quiet, and
+                  Ctrl-C.
+command_output    What a command prints: what it did, what was asked for, and the next command to type.
 compiled_loops    Compilation of loops with Numba, which needs no system library.
 crew              Who does a job: this process, several of this machine, or a Dask cluster.
 dask_cluster      A job's pieces as tasks of a Dask cluster, all of whose workers see the same file

@@ -1,4 +1,4 @@
-"""Running of command lines: error messages of one sentence, exit codes, and Ctrl-C.
+"""Running of command lines: help, error messages of one sentence, exit codes, --quiet, and Ctrl-C.
 
 Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted, 141 standard output closed by its reader.
 With PCII_TRACEBACK=1 in the environment tracebacks are shown.
@@ -8,18 +8,43 @@ import os
 import signal
 import sys
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from importlib.metadata import version
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pcii.base.errors import InputError
-from pcii.base.progress import Stages, shown_by
+from pcii.base.progress import Stages, quiet, shown_by
 
 if TYPE_CHECKING:
     from cyclopts import App, Token
 
 STOP_AGAIN_S = 1.0
 """An interruption is raised again after this time, in case the first exception was lost."""
+
+
+def command_app(name: str, sentence: str) -> "App":
+    """A command whose subcommands are added by its module; it completes words in shells too.
+
+    Options have no negative form (`--no-json`, `--empty-z-mm`), which would mean what leaving them out means.
+    """
+    from cyclopts import App, Parameter
+
+    app = App(
+        name=name,
+        help=sentence,
+        version=lambda: version("photon-integral-imaging"),
+        default_parameter=Parameter(converter=converted, negative=(), show_default=_shown_default),
+    )
+    app.register_install_completion_command(
+        help="Let the shell complete commands and options: bash, zsh or fish.", show=True
+    )
+    return app
+
+
+def _shown_default(value: Any) -> Any:
+    """A default as help shows it; None for those that say nothing, such as an empty list."""
+    return None if value in ((), False) else value
 
 
 def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collection[str] = ()) -> int:
@@ -30,11 +55,11 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
     """
     from cyclopts import CycloptsError
 
+    _add_common_options(app)
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    app.suppress_keyboard_interrupt = False  # by default cyclopts exits without a message
     with _stops() as stops, shown_by(Stages()):
         try:
-            code = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+            code = _call(app.meta, tokens)
         except (Exception, KeyboardInterrupt) as fault:
             if stops:  # the remaining cleaning up is not interrupted again
                 signal.setitimer(signal.ITIMER_REAL, 0)
@@ -43,9 +68,42 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
                 hint = "; the same command goes on from here" if {*tokens[:1]} & {*resuming} else ""
                 return _leave(130, f"stopped{hint}")
             if isinstance(fault, CycloptsError):
-                return _fail(2, " ".join(str(fault).split()) + f" See: {app.name[0]} --help")
+                command = tokens[:1] if tokens[:1] and tokens[0] in app else []
+                see = " ".join([app.name[0], *command, "--help"])
+                sentence = " ".join(str(fault).split())
+                return _fail(2, f"{sentence}{'' if sentence.endswith('.') else '.'} See: {see}")
             return _failed(fault)
     return code if isinstance(code, int) else 0
+
+
+def _call(app: "App", tokens: Sequence[str]) -> Any:
+    app.suppress_keyboard_interrupt = False  # by default cyclopts exits without a message
+    return app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+
+
+def _add_common_options(app: "App") -> None:
+    """Give all commands of `app` the options that are the same for each."""
+    from cyclopts import Group, Parameter
+
+    if app.meta.default_command is not None:
+        return
+
+    @app.meta.default
+    def with_common_options(
+        *tokens: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+        quiet_: Annotated[
+            bool, Parameter(name=("--quiet", "-q"), negative=(), show_default=False, group=Group("Common"))
+        ] = False,
+    ) -> Any:
+        """Run a command.
+
+        Parameters
+        ----------
+        quiet_
+            Print only what was asked for, warnings and errors: no progress, nothing on what was done.
+        """
+        with quiet() if quiet_ else nullcontext():
+            return _call(app, tokens)
 
 
 @contextmanager
@@ -82,7 +140,7 @@ def _stops() -> Iterator[list[int]]:
 def _failed(fault: Exception) -> int:
     """Print a message for the exception and return the exit code."""
     if isinstance(fault, InputError):
-        return _fail(2, str(fault))
+        return _fail(2, "\n".join([str(fault), *getattr(fault, "__notes__", ())]))
     if isinstance(fault, BrokenPipeError):  # the reader closed the pipe, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
@@ -116,8 +174,3 @@ def converted(kind: Any, tokens: Sequence["Token"]) -> Any:
         return int(text)
     except ValueError:
         raise ValueError(f"expected a whole number, got {text!r}") from None
-
-
-def say(text: str) -> None:
-    """Print one line of a result or a log on standard output."""
-    print(text, flush=True)

@@ -4,7 +4,8 @@
 class InputError(ValueError):
     """Invalid input, described in one sentence that names the argument, field or file and what is expected.
 
-    The commands print the sentence and exit with code 2.
+    Where a file has several faults the sentence is of the first, and notes (`add_note`) tell the others. The
+    commands print both and exit with code 2.
     """
 
 

@@ -28,7 +28,7 @@ class Stages(AbstractContextManager["Stages"]):
 
     def __enter__(self) -> "Stages":
         self._shown.enter_context(shown_by(self))
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not is_quiet():
             from rich.console import Console
             from rich.progress import (
                 BarColumn,
@@ -62,6 +62,8 @@ class Stages(AbstractContextManager["Stages"]):
             self._rich.stop()
 
     def __call__(self, stage: str, done: int, total: int) -> None:
+        if is_quiet():
+            return
         if self._rich is not None:
             if stage not in self._tasks:
                 self._tasks[stage] = self._rich.add_task(stage, total=total)
@@ -78,6 +80,8 @@ class Stages(AbstractContextManager["Stages"]):
 
     def compiling(self, loops: int, running: bool) -> None:
         """Report how many loops were compiled, the last of which may be `running`; the total is unknown."""
+        if is_quiet():
+            return
         if self._rich is not None:
             if COMPILING not in self._tasks:
                 self._tasks[COMPILING] = self._rich.add_task(COMPILING, total=None)
@@ -113,6 +117,25 @@ def report_compiling(loops: int, *, running: bool) -> None:
     """Report to a running command that loop number `loops` is being compiled (`running`), or has been."""
     for stages in _showing[-1:]:
         stages.compiling(loops, running)
+
+
+_quiet: list[None] = []
+"""Not empty within a command that was told to be quiet."""
+
+
+def is_quiet() -> bool:
+    """Whether the command that runs was told to be quiet; false where `pcii` is used as a library."""
+    return bool(_quiet)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Show no progress within the block."""
+    _quiet.append(None)
+    try:
+        yield
+    finally:
+        _quiet.pop()
 
 
 def silent(stage: str, done: int, total: int) -> None:

@@ -13,6 +13,7 @@ manifest_schema    Pydantic models of the manifests; members that they do not na
                    ignored.
 results_list       The file results.json: the dataset of the results in a folder, and their files with
                    size and SHA-256.
+sample_dataset     The sample dataset that comes with the package, for trying things without a renderer.
 sealed_json        JSON documents that list the files of a folder and end in a checksum of the document
                    itself.
 stored_radiance    Radiance on disk, one EXR file per view, each read when it is used.

@@ -144,6 +144,7 @@ class DatasetManifest(_Model):
     photons: PhotonLog | None = None
     skipped: list[str | SkippedWork] = []  # sentences in older manifests
     timings_s: dict[str, Seconds] = {}
+    versions: dict[str, Text] = {}
     files: dict[FileName, FileEntry]
 
 
@@ -153,12 +154,20 @@ class FileList(_Model):
     files: dict[FileName, FileEntry]
 
 
+class Making(_Model):
+    """What a part of results was made by."""
+
+    key: str
+    seconds: Seconds
+
+
 class ResultsManifest(FileList):
     """The manifest of a folder of results."""
 
     dataset: Text
     identity: str | None
     budget: Photons | None
+    made: dict[FileName, Making] = {}
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:

@@ -4,9 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pcii.base.command_output import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
-from pcii.base.progress import Report, silent
+from pcii.base.progress import Report, Stages, silent
 from pcii.io import dataset_layout, evaluation_layout
 from pcii.io.collection_layout import (
     COLLECTION,
@@ -36,6 +37,21 @@ def verify(path: Path, report: Report = silent) -> int:
     if is_collection(path):
         return _verify_collection(path, report)
     return _verify_folder(path, report)
+
+
+def verify_and_tell(path: Path, *, as_json: bool) -> None:
+    """Verify for a command: print the number of files or, as JSON, that and the fault, also raised."""
+    with Stages() as report:
+        try:
+            files = verify(path, report)
+        except InputError as fault:
+            if as_json:
+                answer_json({"folder": str(path), "files": None, "fault": str(fault)})
+            raise
+    if as_json:
+        answer_json({"folder": str(path), "files": files, "fault": None})
+    else:
+        say(f"{path}: {files} files match the manifest")
 
 
 def _verify_collection(path: Path, report: Report) -> int:

@@ -62,22 +62,31 @@ def photons_around_a_photon(sections: Sections) -> float:
     return squares / photons - 1 if photons > 0 else 0.0
 
 
-def pooled_estimate(sections: Sections, window_px: int) -> np.ndarray:
+def pooled_estimate(sections: Sections, window_px: int, samples: np.ndarray | None = None) -> np.ndarray:
     """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
 
-    Sums are divided, so all samples have the same weight; a window that no sample reaches is 0.
+    Sums are divided, so all samples have the same weight; a window that no sample reaches is 0. `samples` are
+    the `pooled_samples` of other sections with this coverage, which then are not found again.
     """
-    from scipy.ndimage import uniform_filter
-
-    size = (0, window_px, window_px, 0)
-    options = {"size": size[1:3], "axes": (1, 2), "mode": "constant"}
-    counts = uniform_filter(sections.counts.astype(np.float64), **options)
-    samples = uniform_filter(sections.coverage.astype(np.float64), **options)
+    counts = _window_means(sections.counts, window_px)
+    if samples is None:
+        samples = pooled_samples(sections, window_px)
     # The filter's running sums leave rounding errors where the window is empty.
     floor = 0.5 / window_px**2
     mean = np.zeros_like(counts)
     np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
     return mean
+
+
+def pooled_samples(sections: Sections, window_px: int) -> np.ndarray:
+    """Mean samples per voxel over square windows, (Z, H, W, C) float64."""
+    return _window_means(sections.coverage, window_px)
+
+
+def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
+    from scipy.ndimage import uniform_filter
+
+    return uniform_filter(values.astype(np.float64), window_px, axes=(1, 2), mode="constant")
 
 
 def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:

@@ -1,8 +1,13 @@
 """The `simgen` command.
 
+authoring_commands Commands that write files to start from: a scene, a recipe, one draw of a distribution of
+                   scenes.
 commands           The `simgen` command.
 draw_files         One draw of a distribution of scenes, written as a scene of its own.
+listings           Lists of the scenes and recipes that ship or stand in the working directory.
 library            What the commands do, as functions: scenes and recipes by name, datasets, pictures.
 photons_in_memory  Photon counts of a scene and its truth without a file.
-scene_commands     Commands about scenes: list, describe, check, look at, draw.
+scene_commands     Commands about scenes and recipes: list, describe, check, look at.
+starting_points    Scenes and recipes to start from: commented files that work as they are written.
+templates/         What they are written from.
 """

@@ -2,53 +2,61 @@
 
 import math
 import sys
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from cyclopts import App, Parameter
+from cyclopts import Parameter
 
 from pcii.base import command_line
-from pcii.base.command_line import say
+from pcii.base.command_output import answer, answer_json, results_beside, say, say_next
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
-from simgen.app.scene_commands import check, draw, preview, scenes, schema
+from simgen.app.authoring_commands import draw, new_recipe, new_scene
+from simgen.app.scene_commands import Json, check, preview, recipes, scenes, schema
 
-app = App(
-    name="simgen",
-    help="Make photon-limited elemental images from physics, with their truth.",
-    version=lambda: version("photon-integral-imaging"),
-    default_parameter=Parameter(converter=command_line.converted),
+app = command_line.command_app(
+    "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
 MOST_TOLD = 5
 """Faults of datasets that a collection's last lines tell."""
 
-for command in (scenes, schema, check, preview, draw):
+for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, draw):
     app.command(command)
 
 
 @app.command
-def doctor(*, require_compiled: bool = False) -> None:
+def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
     """Say which backend will run and why, and what to install for a faster one.
 
-    Example:  simgen doctor
+    Examples of use:
+
+        simgen doctor
+        simgen doctor --json
 
     Parameters
     ----------
     require_compiled
         Leave with exit code 1 if neither CUDA nor LLVM works (for scripts that install LLVM).
+    json
+        Print the same as JSON.
     """
+    from dataclasses import asdict
+
     from simgen.renderer import backend
 
-    chosen = backend.choose()
-    say(f"Rendering will run with {chosen.line()}")
-    for candidate in backend.survey():
-        mark = "works" if candidate.works else "no"
-        say(f"  {mark:5}  {candidate.kind:6}  {candidate.library or '-'}: {candidate.detail}")
-    hint = backend.advice()
-    if hint:
-        say(hint)
+    chosen, candidates, advice = backend.choose(), backend.survey(), backend.advice()
+    if json:
+        found = [asdict(candidate) for candidate in candidates]
+        answer_json({"chosen": asdict(chosen), "candidates": found, "advice": advice})
+    else:
+        answer(f"Rendering will run with {chosen.line()}")
+        for candidate in candidates:
+            mark = "works" if candidate.works else "no"
+            answer(f"  {mark:5}  {candidate.kind:6}  {candidate.library or '-'}: {candidate.detail}")
+        if advice:
+            answer(advice)
+        say_next("simgen", "scenes")
     if require_compiled and chosen.kind == "scalar":
         raise RuntimeError("no compiled backend works here")
 
@@ -68,16 +76,12 @@ def generate(
     A field that takes one value may have a list, any field { each = [...] } or { range = [first, end] }:
     OUT then has a folder for each combination, and an index of them.
 
-    Examples:
+    Examples of use:
 
         simgen generate data_recipes/paper.toml -o out/paper
-
         simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
-
         simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
-
         simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
-
         simgen generate drawn_crossing -o out/crossings --scenes 1000
 
     Parameters
@@ -108,6 +112,7 @@ def generate(
             manifest = make(sweep.recipe(0), sweep.near, out, report)
             write_card(out, terms)
             say(_made(out, manifest))
+            say_next("pcii", "run", out, "-o", results_beside(out))
             return 0
         faults = generate_collection(sweep, out, crew, report)
         write_card(out, terms)
@@ -116,6 +121,8 @@ def generate(
         print(f"not made: {fault}", file=sys.stderr)
     if len(faults) > MOST_TOLD:
         print(f"and {len(faults) - MOST_TOLD} more were not made", file=sys.stderr)
+    if not faults:
+        say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
     return 1 if faults else 0
 
 
@@ -137,7 +144,9 @@ def _made(folder: Path, manifest: dict[str, Any]) -> str:
 def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))]) -> None:
     """Draw a contact sheet of a finished dataset: truth, photons of all views, full light, facts.
 
-    Example:  simgen sheet out/paper -o paper.png
+    Example of use:
+
+        simgen sheet out/paper -o paper.png
 
     Parameters
     ----------
@@ -150,6 +159,7 @@ def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))
 
     write_sheet(dataset, out)
     say(f"{out}")
+    say_next("pcii", "run", dataset, "-o", results_beside(dataset))
 
 
 @app.command
@@ -165,12 +175,10 @@ def export(
     hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
     events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view.
 
-    Examples:
+    Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
-
         simgen export out/small --format hci -o out/hci/small
-
         simgen export out/paper --format saii --budget 300 -o out/paper-300
 
     Parameters
@@ -192,18 +200,26 @@ def export(
 
 
 @app.command
-def verify(dataset: Path) -> None:
+def verify(dataset: Path, *, json: Json = False) -> None:
     """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Example:  simgen verify out/paper
-    """
-    from pcii.io.verification import verify as compare
+    Examples of use:
 
-    with Stages() as report:
-        count = compare(dataset, report)
-    say(f"{dataset}: {count} files match the manifest")
+        simgen verify out/paper
+        simgen verify out/paper --json
+
+    Parameters
+    ----------
+    dataset
+        Folder of a dataset, of a collection, of results or of an evaluation.
+    json
+        Print the number of files, or what is wrong, as JSON.
+    """
+    from pcii.io.verification import verify_and_tell
+
+    verify_and_tell(dataset, as_json=json)
 
 
 def main() -> int:

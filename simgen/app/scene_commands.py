@@ -1,45 +1,84 @@
-"""Commands about scenes: list, describe, check, look at, draw."""
+"""Commands about scenes and recipes: list, describe, check, look at."""
 
-import json
-import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.base.command_line import say
+from pcii.base.command_output import answer, answer_json, say, say_next
+
+Json = Annotated[bool, Parameter(name="--json")]
 
 
-def scenes() -> None:
+def scenes(*, json: Json = False) -> None:
     """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
 
     Of a distribution of scenes a number says which one is meant: `--scene 17`.
 
-    Example:  simgen scenes
-    """
-    from simgen.spec.scene import is_drawn, load_scene, scene_names
-    from simgen.spec.scene_generators import generators
+    Examples of use:
 
-    for name in scene_names():
-        drawn = is_drawn(name)
-        scene, _ = load_scene(name, number=0 if drawn else None)
-        things = ", ".join(thing.name for thing in scene.objects) or "no objects"
-        say(f"{name:20} {scene.title} ({'a distribution' if drawn else things})")
-    for name, line in generators().items():
-        say(f"{name:20} {line.removesuffix('.')} (a distribution)")
+        simgen scenes
+        simgen scenes --json
+
+    Parameters
+    ----------
+    json
+        Print the same as JSON.
+    """
+    from simgen.app.listings import list_scenes
+
+    listed = list_scenes()
+    if json:
+        answer_json([asdict(scene) for scene in listed])
+        return
+    for scene in listed:
+        answer(scene.line())
+    say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")
+
+
+def recipes(*, json: Json = False) -> None:
+    """List the recipes that ship or stand in the working directory's `data_recipes/`, one line each.
+
+    Examples of use:
+
+        simgen recipes
+        simgen recipes --json
+
+    Parameters
+    ----------
+    json
+        Print the same as JSON.
+    """
+    from simgen.app.listings import list_recipes
+
+    listed = list_recipes()
+    if json:
+        answer_json([asdict(recipe) for recipe in listed])
+        return
+    for recipe in listed:
+        answer(recipe.line())
+    say_next("simgen", "generate", "small", "-o", "out/small")
 
 
 def schema(what: Literal["scene", "recipe"]) -> None:
     """Print the JSON Schema of scene or recipe files, for completion in editors.
 
-    Example:  simgen schema recipe > recipe.schema.json
+    Examples of use:
+
+        simgen schema scene > scene.schema.json
+        simgen schema recipe > recipe.schema.json
+
+    Parameters
+    ----------
+    what
+        Which kind of file.
     """
     from simgen.base.strict_models import schema_of
     from simgen.spec.distribution_schema import scene_schema
     from simgen.spec.recipe import Recipe
 
-    json.dump(scene_schema() if what == "scene" else schema_of(Recipe), sys.stdout, indent=2)
-    say("")
+    answer_json(scene_schema() if what == "scene" else schema_of(Recipe))
 
 
 def check(
@@ -47,7 +86,7 @@ def check(
     *,
     set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
     scene: int | None = None,
-    json_: Annotated[bool, Parameter(name="--json", negative=())] = False,
+    json: Json = False,
 ) -> int:
     """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
 
@@ -55,12 +94,10 @@ def check(
     object and voxel, size, memory and time. Leaves with exit code 0 if nothing is bad, 1 if something
     is, 2 for a file that is not valid.
 
-    Examples:
+    Examples of use:
 
         simgen check two_objects
-
         simgen check paper --set grid.pitch_mm=[2.5,2.5]
-
         simgen check drawn_solids --scene 17
 
     Parameters
@@ -71,23 +108,23 @@ def check(
         Override one value of the recipe, such as photons.budget=300; may be repeated.
     scene
         Which draw of a distribution of scenes; without it the first 20 are looked at, less closely.
-    json_
+    json
         Print the findings as JSON.
     """
-    from dataclasses import asdict
-
     from simgen.check.linter import lint
 
     line, findings = lint(target, set, scene)
     bad = sum(finding.verdict == "bad" for finding in findings)
-    if json_:
-        say(json.dumps([asdict(finding) for finding in findings], indent=2))
+    if json:
+        answer_json([asdict(finding) for finding in findings])
     else:
         warnings = sum(finding.verdict == "warn" for finding in findings)
-        say(line)
+        answer(line)
         for finding in findings:
-            say(finding.line())
-        say(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
+            answer(finding.line())
+        answer(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
+        if not bad:
+            _say_next_after_check(target, set, scene)
     return 1 if bad else 0
 
 
@@ -103,10 +140,9 @@ def preview(
 
     In full light and in sRGB, whatever the recipe's camera and photons.
 
-    Examples:
+    Examples of use:
 
         simgen preview two_objects -o look.png
-
         simgen preview drawn_solids --scene 17 -o look.png
 
     Parameters
@@ -123,30 +159,35 @@ def preview(
         Light paths per pixel; more is slower and less noisy.
     """
     from simgen.figures.preview_picture import write_preview
+    from simgen.spec.recipe import recipe_file
+    from simgen.spec.scene import is_scene
 
     write_preview(target, out, samples_per_pixel, overrides=set, scene_number=scene)
     say(f"{out}")
+    if is_scene(target) and scene is None:
+        name = _name_of(target)
+        if recipe_file(name) is None:
+            say_next("simgen", "new-recipe", name, "--scene", target)
+        else:
+            say_next("simgen", "generate", name, "-o", f"out/{name}")
 
 
-def draw(
-    target: str,
-    *,
-    scene: int,
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
-) -> None:
-    """Write one draw of a distribution of scenes as a scene of its own, with the files that it names.
+def _say_next_after_check(target: str, overrides: tuple[str, ...], scene: int | None) -> None:
+    """Of a scene: look at it. Of a recipe: make it."""
+    from simgen.spec.scene import is_drawn, is_scene
 
-    Example:  simgen draw drawn_solids --scene 17 -o scenes/mine
+    name = _name_of(target)
+    if not is_scene(target):
+        values = [word for text in overrides for word in ("--set", text)]
+        say_next("simgen", "generate", target, "-o", f"out/{name}", *values)
+        return
+    if scene is None and is_drawn(target):
+        scene = 0
+    number = [] if scene is None else ["--scene", scene]
+    say_next("simgen", "preview", target, *number, "-o", f"{name}.png")
 
-    Parameters
-    ----------
-    target
-        The distribution, by name or path.
-    scene
-        Which draw of it.
-    out
-        Folder for scene.toml, new or empty.
-    """
-    from simgen.app.draw_files import write_drawn_scene
 
-    say(f"{write_drawn_scene(target, scene, out)}")
+def _name_of(target: str) -> str:
+    """What a scene or recipe is called: the name of its folder or file."""
+    path = Path(target)
+    return path.resolve().parent.name if path.name == "scene.toml" else path.name.removesuffix(".toml")

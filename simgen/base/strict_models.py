@@ -3,17 +3,22 @@
 import difflib
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, ValidationError
 
 from pcii.base.errors import InputError
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80
 LONGEST_SENTENCE = 400
+MOST_FAULTS = 20
+"""An error tells so many faults of a file."""
 MOST_KEY_PARTS = 32
 # tomllib's time grows with the square of the parts of one key, so such keys are looked for first.
 _LONG_KEY = re.compile(
@@ -62,6 +67,11 @@ Title = Annotated[str, Field(max_length=200, json_schema_extra={"pattern": LINE}
 Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
 
 
+def at_most(most: int) -> BeforeValidator:
+    """Keeps one item more than a list may have, so that no more than these are looked at and told of."""
+    return BeforeValidator(lambda items: items[: most + 1] if isinstance(items, list | tuple) else items)
+
+
 def completed_by(key: Literal["enum", "examples"], names: Callable[[], list[str]]) -> Callable[[Any], None]:
     """Puts names, looked up when it is asked for, into a field's JSON Schema: what editors complete."""
 
@@ -101,13 +111,25 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
-    """Build a model, or raise `InputError` with one sentence that names the field and the remedy."""
+    """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy."""
     try:
         return model.model_validate(values)
     except ValidationError as fault:
-        raise InputError(f"{source}: {shorten(_sentence(model, fault))}") from None
+        raise faults_of(source, *_sentences(model, fault)) from None
     except RecursionError:
         raise InputError(f"{source}: its arrays or tables are nested too deeply") from None
+
+
+def faults_of(source: str, sentences: Sequence[str], number: int) -> InputError:
+    """An error that tells a `number` of faults of a file: the first in its text, the next as notes.
+
+    The first `MOST_FAULTS` of `sentences` are told, each in one line.
+    """
+    first, *others = (shorten(sentence) for sentence in sentences[:MOST_FAULTS])
+    fault = InputError(f"{source}: {first}" + (f" (and {number - 1} more)" if number > 1 else ""))
+    for other in others:
+        fault.add_note(f"  {other}")
+    return fault
 
 
 def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
@@ -131,32 +153,51 @@ def shown_value(value: Any) -> str:
         return f"a {type(value).__name__} that is too long to show"
 
 
-def _sentence(model: type[BaseModel], fault: ValidationError) -> str:
-    """A sentence of the first error, and how many more there are."""
+def _sentences(model: type[BaseModel], fault: ValidationError) -> tuple[list[str], int]:
+    """A sentence for each of the first faults, and the number of all.
+
+    Unknown keys come first, since they are most often the cause of missing ones.
+    """
     errors = fault.errors(include_url=False)
-    # An unknown key is most often the cause of the missing one, so it is named first.
-    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
-    location, known, types = _follow(model, first["loc"])
+    unknown = [error for error in errors if error["type"] == "extra_forbidden"]
+    meant = set[tuple[int | str, ...]]()
+    sentences: list[str] = []
+    for error in unknown[:MOST_FAULTS]:
+        location, known, _ = _follow(model, error["loc"])
+        word = str(location[-1])
+        meant |= {(*location[:-1], near) for near in _nearest(word, known)}
+        sentences.append(f"unknown key '{_dotted(location)}'{suggestion(word, known)}")
+    # What an unknown key is to be called is not missing, and a list of wrong items not too short.
+    parents = {error["loc"][:end] for error in errors for end in range(len(error["loc"]))}
+    others = [
+        error
+        for error in errors
+        if error["type"] != "extra_forbidden"
+        and not (error["type"] == "too_short" and error["loc"] in parents)
+        and not (error["type"] == "missing" and _follow(model, error["loc"])[0] in meant)
+    ]
+    sentences += [_sentence(model, error) for error in others[: MOST_FAULTS - len(sentences)]]
+    return sentences, len(unknown) + len(others)
+
+
+def _sentence(model: type[BaseModel], error: "ErrorDetails") -> str:
+    """A sentence of an error other than an unknown key."""
+    location, _, types = _follow(model, error["loc"])
     where = _dotted(location)
-    if first["type"] == "extra_forbidden":
-        text = f"unknown key '{where}'{suggestion(str(location[-1]), known)}"
-    elif first["type"] == "missing":
-        text = f"'{where}' is missing"
-    elif first["type"] == "union_tag_invalid":
-        given = first.get("ctx", {})["tag"]
-        text = f"'{where}.type': there is no {given!r}{suggestion(given, types)}"
-    elif first["type"] == "union_tag_not_found":
-        text = f"'{where}.type' is missing{suggestion('', types)}"
-    elif first["type"] == "value_error":
+    if error["type"] == "missing":
+        return f"'{where}' is missing"
+    if error["type"] == "union_tag_invalid":
+        given = error.get("ctx", {})["tag"]
+        return f"'{where}.type': there is no {given!r}{suggestion(given, types)}"
+    if error["type"] == "union_tag_not_found":
+        return f"'{where}.type' is missing{suggestion('', types)}"
+    if error["type"] == "value_error":
         text = f"'{where}': " if where else ""
-        text += str(first.get("ctx", {}).get("error"))
-    else:
-        message = first["msg"][0].lower() + first["msg"][1:]
-        for theirs, ours in _IN_TOML.items():
-            message = message.replace(theirs, ours)
-        text = f"'{where}': {message}, got {shown_value(first['input'])}"
-    more = len(errors) - 1
-    return text + (f" (and {more} more)" if more else "")
+        return text + str(error.get("ctx", {}).get("error"))
+    message = error["msg"][0].lower() + error["msg"][1:]
+    for theirs, ours in _IN_TOML.items():
+        message = message.replace(theirs, ours)
+    return f"'{where}': {message}, got {shown_value(error['input'])}"
 
 
 def _dotted(location: Iterable[int | str]) -> str:
@@ -175,10 +216,17 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     words = sorted(known)
     if len(word) > LONGEST_PART:
         return ""
-    near = difflib.get_close_matches(word, words, n=1, cutoff=0.6)
+    near = _nearest(word, words)
     if near:
         return f"; did you mean '{near[0]}'?"
     return f"; known are {', '.join(words)}" if words else ""
+
+
+def _nearest(word: str, known: Iterable[str]) -> list[str]:
+    """The known word that is most like this one, if any is."""
+    if len(word) > LONGEST_PART:
+        return []
+    return difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
 
 
 def _follow(

@@ -2,6 +2,7 @@
 
 backend           The renderer behind everything: the one place that loads Mitsuba and Dr.Jit.
 device_arrays     NumPy's arrays as the renderer's, and parts of those; for compiled backends.
+installation      Whether the renderer is installed, which analysis does without.
 intersection      Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one
                   in scalar mode.
 mitsuba_camera    Cameras as Mitsuba's: its sensors, and rays through points of their films.

@@ -29,6 +29,7 @@ from typing import Any, Literal
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_json_safely
+from simgen.renderer.installation import check_installed
 
 Kind = Literal["cuda", "llvm", "scalar"]
 KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")
@@ -85,7 +86,11 @@ class Backend:
 
 
 def choose() -> Backend:
-    """The fastest backend that works here; `InputError` if `SIMGEN_BACKEND` asks for one that does not."""
+    """The fastest backend that works here.
+
+    Raises `InputError` if Mitsuba is not installed, and if `SIMGEN_BACKEND` asks for what does not work.
+    """
+    check_installed()
     asked = os.environ.get("SIMGEN_BACKEND", "").strip().lower()
     if asked and asked not in KINDS:
         raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(KINDS)}, not {asked!r}")
@@ -104,6 +109,7 @@ def choose() -> Backend:
 
 def survey() -> list[Candidate]:
     """Every candidate on this machine with its verdict, best first; for `simgen doctor`."""
+    check_installed()
     return [candidate for kind in KINDS for candidate in _candidates(kind)]
 
 

@@ -23,6 +23,8 @@ from simgen.base.strict_models import (
     Strict,
     Title,
     Vector,
+    at_most,
+    faults_of,
     read_toml,
     shorten,
     suggestion,
@@ -84,15 +86,15 @@ class Scene(Strict):
     """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """What it is for."""
-    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS, fail_fast=True)] = ()
+    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS), at_most(MOST_OBJECTS)] = ()
     """What truth and scores know by name; none makes an empty scene."""
-    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS, fail_fast=True)]
+    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS), at_most(MOST_LIGHTS)]
     """At least one lamp, or light from all around."""
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
     """A wall behind the objects, which is no object itself."""
-    planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES, fail_fast=True)] = ()
+    planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES), at_most(MOST_PLANES)] = ()
     """Depths at which something is in focus; what a recipe without `analysis.z_mm` looks at."""
 
     @field_validator("lights")
@@ -122,8 +124,14 @@ def load_scene(name_or_path: str, near: Path | None = None, number: int | None =
     """
     values, folder, source = _plain_values(name_or_path, near, number)
     scene = validate(Scene, values, source)
+    faults: list[str] = []
     for where, name in scene_files(scene):
-        asset(folder, name, f"{source}: {where}")
+        try:
+            asset(folder, name, where)
+        except InputError as fault:
+            faults.append(str(fault))
+    if faults:
+        raise faults_of(source, faults, len(faults))
     return scene, folder
 
 

@@ -1,14 +1,16 @@
 """Names of strangers in pages and tables: shown as text, never carried out."""
 
+import base64
+import hashlib
 import html
 import re
-import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+from chromium import CHROMIUM
 from hostile_names import DO, NAMES, RAN
 from jinja2 import UndefinedError
 from tiny_datasets import NESTED, OWN, two_rows, write_dataset
@@ -17,6 +19,7 @@ from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.base.plain_text import in_markdown, visible
 from pcii.core.estimates import Segmented
+from pcii.evaluation import pages as pages_module
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.pages import page
@@ -30,6 +33,17 @@ FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
 ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}
 ELEMENTS |= {"div", "table", "tr", "th", "td", "figure", "img", "figcaption"}
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+SCRIPT = (Path(pages_module.__file__).parent / "templates" / "report.js").read_bytes()
+SCRIPT_HASH = base64.b64encode(hashlib.sha256(SCRIPT).digest()).decode()
+# The report runs its own script, which its policy names by hash, and has controls and lists of numbers.
+OWN_ELEMENTS = {
+    "report.html": {"script", "section", "dl", "dt", "dd", "label", "input", "output", "button", "i"}
+}
+OWN_ELEMENTS["report.html"] |= {"fieldset", "legend", "details", "summary", "pre"}
+POLICIES = {
+    "report.html": POLICY.replace("img-src", f"script-src 'sha256-{SCRIPT_HASH}'; img-src"),
+    "evaluation.html": POLICY,
+}
 
 
 class Read(HTMLParser):
@@ -116,16 +130,36 @@ def rows_of(name: str) -> list[dict[str, Any]]:
 @pytest.mark.parametrize("which", ["report.html", "evaluation.html"])
 def test_a_page_has_nothing_but_its_own_elements(pages: dict[str, str], which: str) -> None:
     read = Read(pages[which])
-    assert {tag for tag, _ in read.elements} <= ELEMENTS
+    assert {tag for tag, _ in read.elements} <= ELEMENTS | OWN_ELEMENTS.get(which, set())
     for tag, attributes in read.elements:
         for name, value in attributes.items():
             assert not name.startswith("on"), tag
             assert name not in ("href", "srcdoc", "action"), tag
             if name == "src":
-                assert (tag, str(value)[:22]) == ("img", "data:image/png;base64,")
+                assert tag == "img"
+                assert re.match(r"data:image/(png|webp);base64,[A-Za-z0-9+/]+=*$", str(value))
     sent = [attributes for tag, attributes in read.elements if tag == "meta" and "http-equiv" in attributes]
-    assert sent == [{"http-equiv": "Content-Security-Policy", "content": POLICY}]
+    assert sent == [{"http-equiv": "Content-Security-Policy", "content": POLICIES[which]}]
     assert pages[which].index("Content-Security-Policy") < pages[which].index("<title>")
+
+
+def test_the_script_of_the_report_is_ours_alone(pages: dict[str, str]) -> None:
+    scripts = re.findall(r"<script[^>]*>(.*?)</script>", pages["report.html"], re.DOTALL | re.IGNORECASE)
+    assert scripts == [SCRIPT.decode()]
+    assert "<script" not in pages["evaluation.html"].lower()
+    # It makes no markup, code or request from what is in the page.
+    for word in (
+        "innerHTML",
+        "outerHTML",
+        "insertAdjacent",
+        "document.write",
+        "eval",
+        "Function(",
+        "setTimeout",
+    ):
+        assert word.encode() not in SCRIPT
+    for word in ("fetch", "XMLHttp", "import", "Storage", "cookie", "://", "Worker", "sendBeacon"):
+        assert word.encode() not in SCRIPT
 
 
 def test_all_names_show_as_text_in_the_report(pages: dict[str, str], outcome: Outcome) -> None:
@@ -189,24 +223,22 @@ def test_names_of_files_that_are_no_characters(tmp_path: Path, monkeypatch: pyte
     assert evaluate([data], tmp_path / "out", methods=["two rows"])["groups"] == [group]
 
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
 def root_element(file: Path) -> str:
     """The root of the page's document after a browser has opened it, for two seconds of its own time."""
-    command = [str(BROWSER), "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=2000"]
+    command = [str(CHROMIUM), "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=2000"]
     command += [f"--user-data-dir={file.parent / 'profile'}", "--dump-dom", file.as_uri()]
     found = subprocess.run(command, capture_output=True, timeout=120, check=False).stdout
     return re.search(rb"<html[^>]*>", found)[0].decode() if found else ""  # type: ignore[index]
 
 
-@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+@pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 def test_a_browser_carries_nothing_out(pages: dict[str, str], tmp_path: Path) -> None:
     torn = "<!doctype html><html><body>{}</body></html>"
     (tmp_path / "torn.html").write_text(torn.format("".join(NAMES[5:7])))
     if RAN not in root_element(tmp_path / "torn.html"):
         pytest.skip("this browser does not open pages here")
     for which in ("report.html", "evaluation.html"):
-        for policy in (POLICY, ""):  # escaping must do without the policy, which older readers ignore
-            (tmp_path / which).write_text(pages[which].replace(POLICY, policy))
+        for policy in (POLICIES[which], ""):  # escaping must do without it: older readers ignore policies
+            assert POLICIES[which] in pages[which]
+            (tmp_path / which).write_text(pages[which].replace(POLICIES[which], policy))
             assert root_element(tmp_path / which) == '<html lang="en">'

@@ -1,0 +1,20 @@
+"""Photon counts by rendering: every pixel with some samples, scaled to the budget, and Poisson draws."""
+
+import numpy as np
+
+from pcii.core.photon_limit import photon_rates, scope_energies, sense
+from simgen.photons.candidates import Setup
+from simgen.renderer.radiance import render_view
+
+
+def rendered_mosaic(setup: Setup, view: int, samples_per_pixel: int, seed: int) -> np.ndarray:
+    """Radiance (H, W) that each pixel of a view sees in its own colour."""
+    k, l = divmod(view, setup.grid.cols)
+    image = render_view(setup.render_scene, setup.grid, k, l, samples_per_pixel=samples_per_pixel, seed=seed)
+    return sense(image, setup.cfa)
+
+
+def drawn_counts(mosaic: np.ndarray, cfa: str | None, budget: float, rng: np.random.Generator) -> np.ndarray:
+    """Counts (H, W) of a view with so many photons on average."""
+    rates = photon_rates(mosaic, cfa, budget, "view", scope_energies(mosaic, cfa, "view"))
+    return rng.poisson(rates)

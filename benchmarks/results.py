@@ -1,0 +1,172 @@
+"""What a study measures: rows of values with intervals, ratios of pairs, and their files.
+
+Names of quantities end in their unit where they have one (`time_ms`, `rmse_percent`); `label` writes them in
+words.
+"""
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import write_json_safely
+from pcii.evaluation.paired_tests import positive_mean_interval
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Size = Literal["quick", "full"]
+Parameter = str | int | float
+UNITS = {
+    "s": "s", "ms": "ms", "us": "µs", "percent": "%", "db": "dB", "mb": "MB", "px": "px", "bytes": "bytes",
+}  # fmt: skip
+SPELLINGS = {
+    "badpix 007": "BadPix(0.07)", "boundary f": "boundary F", "ciede2000": "CIEDE2000", "cpsnr": "CPSNR",
+    "flip": "FLIP", "iou": "IoU", "rgb": "RGB", "rmse": "RMSE", "mse": "MSE",
+}  # fmt: skip
+"""Words that are not written in small letters."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number and its 95 % interval, None where there is none."""
+
+    value: float
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """What was measured of `name` with these parameters; rows of one `table` have the same quantities."""
+
+    table: str
+    name: str
+    parameters: Mapping[str, Parameter]
+    values: Mapping[str, Value]
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """How many times better ours is than what was measured beside it in the same run; more is better.
+
+    `asked` is what the ratio is to be at least, where that was said beforehand.
+    """
+
+    name: str
+    ratio: Value
+    asked: float | None = None
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The rows and ratios of one run of a study, and the seeds that they are of."""
+
+    rows: Sequence[Row]
+    ratios: Sequence[Ratio] = ()
+    seeds: Sequence[int] = ()
+
+    def of(self, table: str, **parameters: Parameter) -> list[Row]:
+        """The rows of a table that have these parameters."""
+        wanted = parameters.items()
+        return [row for row in self.rows if row.table == table and wanted <= dict(row.parameters).items()]
+
+    def one(self, table: str, name: str, **parameters: Parameter) -> Row:
+        """The first of these rows with this name; `KeyError` if there is none."""
+        for row in self.of(table, **parameters):
+            if row.name == name:
+                return row
+        raise KeyError(f"{table}: {name} {parameters}")
+
+    def ratio(self, name: str) -> float:
+        """The ratio of this name."""
+        return next(ratio.ratio.value for ratio in self.ratios if ratio.name == name)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A question, how it is measured and drawn, and how to read what is found.
+
+    `sizes` are the arguments of `measure`. The numbers in the sentences of `reading` come from the results.
+    """
+
+    name: str
+    title: str
+    sizes: Mapping[Size, Mapping[str, Any]]
+    measure: Callable[..., Measured]
+    draw: Callable[["Figure", Measured], None]
+    reading: Callable[[Measured], str]
+    width_in: float = 9.0
+    height_in: float = 3.6
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run of a study with all that is needed to judge it: size, date, wall time, machine, versions."""
+
+    study: str
+    size: Size
+    date: str
+    wall_s: float
+    machine: Mapping[str, Any]
+    versions: Mapping[str, str]
+    measured: Measured = field(repr=False)
+
+
+def label(quantity: str) -> str:
+    """A quantity or parameter in words, its unit after a comma.
+
+    >>> label("time_ms"), label("photons_per_view"), label("rmse_percent")
+    ('time, ms', 'photons per view', 'RMSE, %')
+    """
+    *words, last = quantity.split("_")
+    text = " ".join(words) + f", {UNITS[last]}" if words and last in UNITS else " ".join((*words, last))
+    for name, written in SPELLINGS.items():
+        text = text.replace(name, written)
+    return text
+
+
+def mean_of(samples: Iterable[float]) -> Value:
+    """Mean of samples that are never negative, with its interval; without one for a single sample.
+
+    The interval is Student's of the mean's logarithm, so that it stays above 0.
+    """
+    mean = positive_mean_interval(list(samples))
+    return Value(mean.mean, mean.low, mean.high)
+
+
+def write_record(folder: Path, record: Record) -> None:
+    """Write <study>.json, and <study>.csv with a line for every value."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_json_safely(folder / f"{record.study}.json", asdict(record))
+    rows = record.measured.rows
+    names = list(dict.fromkeys(name for row in rows for name in row.parameters))
+    with (folder / f"{record.study}.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["table", "name", *names, "quantity", "value", "low", "high"])
+        for row in rows:
+            parameters = [row.parameters.get(name, "") for name in names]
+            for quantity, found in row.values.items():
+                writer.writerow(
+                    [row.table, row.name, *parameters, quantity, found.value, found.low, found.high]
+                )
+
+
+def read_record(path: Path) -> Record:
+    """A run as `write_record` wrote it; `InputError` for a file that is something else."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        measured = content.pop("measured")
+        rows = [
+            Row(**row | {"values": {name: Value(**found) for name, found in row["values"].items()}})
+            for row in measured["rows"]
+        ]
+        ratios = [Ratio(**ratio | {"ratio": Value(**ratio["ratio"])}) for ratio in measured["ratios"]]
+        return Record(**content, measured=Measured(rows, ratios, measured["seeds"]))
+    except (ValueError, TypeError, KeyError) as fault:
+        raise InputError(
+            f"{path}: expected results of a study, as `make bench` writes them ({fault})"
+        ) from None

@@ -1,0 +1,23 @@
+"""Scenes in the renderer, ready to draw from, as the studies of images need them."""
+
+from pathlib import Path
+
+from simgen.photons.candidates import Setup
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.sensor.mosaic import sensitivities
+from simgen.spec.recipe import Recipe
+from simgen.spec.scene import load_scene
+
+
+def setup_of(recipe: Recipe) -> Setup:
+    """The recipe's scene and cameras."""
+    scene, folder = load_scene(recipe.scene)
+    mi, curves = backend.load(spectral=recipe.is_spectral), sensitivities(recipe.sensor, Path())
+    built = build(mi, scene, folder, recipe.render.max_depth, curves)
+    return Setup(built, recipe.grid.camera_grid(), recipe.cfa, recipe.render.max_depth)
+
+
+def film(side_px: int) -> list[str]:
+    """Settings of a square film of so many pixels that sees what the paper's cameras see."""
+    return [f"grid.height={side_px}", f"grid.width={side_px}", f"grid.pixel_mm={36.0448 / side_px}"]

@@ -1,0 +1,43 @@
+"""The studies of run time against error, in the order of the page.
+
+photon_images     Photon counts by thinning and by dense rendering, and how far they are from the truth.
+photon_costs      What a photon costs at the paper's size, and how that grows.
+radiance_images   Renderings by samples, lengths of paths, modes of the renderer, and a denoiser.
+sections          Errors of sections of a known texture, ours and other packages'.
+section_growth    Time of sections at the paper's size, and how that grows.
+demosaicing       Errors of colours.
+depth_and_focus   Depth and removal by every method over photon budgets.
+skips             Work that is skipped: on against off.
+end_to_end        From a recipe to a report, beside a plain script.
+colour            Colours of a chart in spectral and RGB mode.
+dataset_overhead  What a dataset of a collection costs beside its light.
+"""
+
+from benchmarks.results import Study
+from benchmarks.studies import (
+    colour,
+    dataset_overhead,
+    demosaicing,
+    depth_and_focus,
+    end_to_end,
+    photon_costs,
+    photon_images,
+    radiance_images,
+    section_growth,
+    sections,
+    skips,
+)
+
+STUDIES: tuple[Study, ...] = (
+    photon_images.STUDY,
+    photon_costs.STUDY,
+    radiance_images.STUDY,
+    sections.STUDY,
+    section_growth.STUDY,
+    demosaicing.STUDY,
+    depth_and_focus.STUDY,
+    skips.STUDY,
+    end_to_end.STUDY,
+    colour.STUDY,
+    dataset_overhead.STUDY,
+)

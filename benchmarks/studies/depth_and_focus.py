@@ -1,0 +1,180 @@
+"""Depth and removal by every method: time against error over photon budgets, and the bound beside.
+
+A small version of the tables "depth" and "removal" over the corpus: a few of its scenes on fewer and larger
+pixels. All methods see the same photons.
+"""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.corpus import load_corpus, make, named_scenes, work_list
+from benchmarks.figures import curve, frame
+from benchmarks.results import Measured, Parameter, Ratio, Row, Size, Study, Value
+from benchmarks.scenes import film
+from pcii.base.progress import Stages
+from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.method_names import depth_name, estimator_of, methods_for
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DEPTH, REMOVAL, BOUND = "Depth", "Removal of defocused points", "Least error of the depth of whole objects"
+MEASURES = {
+    "median_px": ("depth", "median_px"),
+    "bad_1px_percent": ("depth", "bad_1px"),
+    "badpix_007_percent": ("depth", "hci_objects", "badpix_007"),
+    "mse_x100": ("depth", "hci_objects", "mse_x100"),
+    "answered_percent": ("depth", "coverage"),
+}
+"""Columns of depth: errors of total disparity on objects, and metrics of the HCI benchmark there."""
+MASKS = {
+    "iou": ("object", "iou"),
+    "boundary_f": ("object", "boundary_f"),
+    "iou_of_oracle": ("pixel", "iou_oracle"),
+}
+DEFAULT, SWEEPS = depth_name("posterior"), (depth_name("likelihood-sweep"), depth_name("variance-sweep"))
+LEAST_SHARE = 1e-3
+"""Shares of errors below this are as good as none when a ratio is taken."""
+
+
+SIZES: Mapping[Size, Mapping[str, Any]] = {
+    "quick": {
+        "names": ("paper", "slats"),
+        "rows": 5,
+        "side_px": 128,
+        "seeds": 3,
+        "budgets": (100, 1000, 10000),
+        "methods": methods_for(full_light=False),
+    },
+    "full": {
+        "names": ("paper", "slats", "natural_balls", "plain_pair"),
+        "rows": 10,
+        "side_px": 512,
+        "seeds": 10,
+        "budgets": (30, 100, 1000, 10000, 100000),
+        "methods": methods_for(full_light=False),
+    },
+}
+
+
+def measure(
+    names: Sequence[str], rows: int, side_px: int, seeds: int, budgets: Sequence[int], methods: Sequence[str]
+) -> Measured:
+    """Methods by their full names on scenes of the corpus, with so many by so many cameras and pixels."""
+    pitch_mm = 45 * 2 / (rows - 1)  # twice the paper's span, so that coarse pixels tell depths apart
+    settings = [
+        *film(side_px), f"grid.rows={rows}", f"grid.cols={rows}", f"grid.pitch_mm=[{pitch_mm}, {pitch_mm}]",
+        "products.radiance=mosaic", "render.samples_per_pixel=32",
+    ]  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder, Stages() as progress:
+        works = work_list(named_scenes(load_corpus(), names), Path(folder), seeds, list(budgets), settings)
+        make(works, progress)
+        folders = [work.folder for work in works]
+        scores = Path(folder) / "scores"
+        evaluation = evaluate(folders, scores, methods=methods, budgets=budgets, report=progress)
+    found = [row for group in evaluation["groups"] for row in _rows(group)]
+    return Measured(found, _ratios(found), sorted({work.recipe.seed for work in works}))
+
+
+def _rows(group: Mapping[str, Any]) -> list[Row]:
+    """Rows of one scene."""
+    rows: list[Row] = []
+    bounds: dict[tuple[float, str], Row] = {}
+    for result in group["results"]:
+        where: dict[str, Parameter] = {"scene": group["title"], "photons_per_view": float(result["budget"])}
+        is_depth = estimator_of(result["method"]) is not None
+        values = {"time_ms": _value(result["seconds"], 1e3)}
+        for name, path in (MEASURES if is_depth else MASKS).items():
+            value = _value(_at(result, path), 100 if name.endswith("percent") else 1)
+            if value is not None:
+                values[name] = value
+        known = {name: value for name, value in values.items() if value is not None}
+        rows.append(Row(DEPTH if is_depth else REMOVAL, result["method"], where, known))
+        for bound in result.get("bounds", {}).get("objects", ()):
+            sigma = _value(bound["depth_sigma_px"])
+            if sigma is not None:
+                parameters = where | {"object": bound["name"]}
+                row = Row(BOUND, "Cramer-Rao bound", parameters, {"sigma_px": sigma})
+                bounds.setdefault((result["budget"], bound["name"]), row)
+    return [*rows, *bounds.values()]
+
+
+def _at(result: Mapping[str, Any], path: tuple[str, ...]) -> Mapping[str, Any] | None:
+    found: Any = result
+    for name in path:
+        found = None if found is None else found.get(name)
+    return found
+
+
+def _value(mean: Mapping[str, Any] | None, scale: float = 1.0) -> Value | None:
+    if mean is None:
+        return None
+    low, high = mean["interval"] or (None, None)
+    return Value(scale * mean["mean"], low and scale * low, high and scale * high)
+
+
+def _ratios(rows: list[Row]) -> list[Ratio]:
+    """How much larger the better plane sweep's share of errors is than that of the default method."""
+    found: list[Ratio] = []
+    measured = Measured(rows)
+    for row in measured.of(DEPTH):
+        if row.name == DEFAULT and "bad_1px_percent" in row.values:
+            sweeps = [each for each in measured.of(DEPTH, **row.parameters) if each.name in SWEEPS]
+            if not sweeps:
+                continue
+            best, own = (
+                max(min(each.values["bad_1px_percent"].value for each in some), 100 * LEAST_SHARE)
+                for some in (sweeps, [row])
+            )
+            where = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons"
+            found.append(Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own)))
+    return found
+
+
+def draw(figure: "Figure", measured: Measured) -> None:
+    """Error of depth and masks against time, of the first scene; lines go from few photons to many."""
+    scene = measured.rows[0].parameters["scene"]
+    panels = figure.subplots(1, 3)
+    for axes, table, x, y in (
+        (panels[0], DEPTH, "time_ms", "bad_1px_percent"),
+        (panels[1], DEPTH, "photons_per_view", "median_px"),
+        (panels[2], REMOVAL, "time_ms", "iou"),
+    ):
+        rows = measured.of(table, scene=scene)
+        for number, method in enumerate(dict.fromkeys(row.name for row in rows)):
+            curve(axes, [row for row in rows if row.name == method], x, y, method, number)
+        if y == "median_px":
+            for number, name in enumerate(
+                dict.fromkeys(row.parameters["object"] for row in measured.of(BOUND, scene=scene))
+            ):
+                own = measured.of(BOUND, scene=scene, object=name)
+                curve(axes, own, x, "sigma_px", f"bound, all of {name}", 7 + number)
+        frame(axes, x, y, f"{table}: {scene}", log="xy" if y == "median_px" else "x")
+
+
+def reading(measured: Measured) -> str:
+    """How to read it: the default methods at the fewest and the most photons of the first scene."""
+    scene = measured.rows[0].parameters["scene"]
+    budgets = sorted({float(row.parameters["photons_per_view"]) for row in measured.of(DEPTH, scene=scene)})
+
+    def of(table: str, name: str, budget: float, quantity: str) -> float:
+        return measured.one(table, name, scene=scene, photons_per_view=budget).values[quantity].value
+
+    few, many = budgets[0], budgets[-1]
+    return (
+        "How good are depth and masks for their time, and how far from what light allows? In depth, less is"
+        " better: the default posterior is wrong by more than 1 px, or silent, in"
+        f" {of(DEPTH, DEFAULT, few, 'bad_1px_percent'):.0f} % of the objects' pixels with {few:g} photons per"
+        f" view and in {of(DEPTH, DEFAULT, many, 'bad_1px_percent'):.0f} % with {many:g}; dashed bounds are"
+        " standard deviations of whoever knows an object's texture and that all of it lies at one depth. Of"
+        f" masks more is better: IoU by likelihood goes from {of(REMOVAL, 'likelihood', few, 'iou'):.2f} to"
+        f" {of(REMOVAL, 'likelihood', many, 'iou'):.2f}, by the paper's three steps from"
+        f" {of(REMOVAL, 'three-step', few, 'iou'):.2f} to {of(REMOVAL, 'three-step', many, 'iou'):.2f}."
+    )
+
+
+STUDY = Study(
+    "depth-and-focus", "Depth and focus", SIZES, measure, draw, reading, width_in=13.0, height_in=4.4
+)

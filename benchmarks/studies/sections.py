@@ -1,0 +1,179 @@
+"""Sections of a textured plane: time against error, ours and other packages' on the same views.
+
+100 views of the plane, whose views and truth are known in closed form. Other packages get what suits them:
+single precision images in memory, one channel, mean alone.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.figures import curve, frame
+from benchmarks.machine import has
+from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
+from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
+from benchmarks.textures import CONTRAST, Texture, plane_views
+from benchmarks.timing import median_of, side_by_side
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.demosaicing import demosaic
+from pcii.sections.reconstruction import reconstruct
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CFA = "GRBG"
+BORDER_PX = 80
+SHOWN_PX = 13.3
+"""The disparity that is drawn and read, which is neither whole nor half."""
+BLOCKS = 4
+"""Errors are told of so many by so many blocks of a section, whose spread gives the interval."""
+PLANE_MM = 1.0
+ONE_COLOUR = "Sections of one colour"
+THREE_COLOURS = "Sections of three colours from mosaics"
+BY_PHOTONS = "Sections of photon counts"
+Way = Callable[[], np.ndarray]
+
+
+SIZES: Mapping[Size, Mapping[str, Any]] = {
+    "quick": {"side_px": 256, "repeats": 6, "disparities": (13.0, 13.3), "budgets": (1e3, 1e4, 1e5)},
+    "full": {
+        "side_px": 512,
+        "repeats": 12,
+        "disparities": (13.0, 13.15, 13.3, 13.5),
+        "budgets": (1e3, 1e4, 1e5, 1e6),
+    },
+}
+
+
+def measure(side_px: int, repeats: int, disparities: Sequence[float], budgets: Sequence[float]) -> Measured:
+    """Every way on the same views, of planes of these disparities in px."""
+    texture, rows = Texture(), list[Row]()
+    for disparity in disparities:
+        plain, bayer = plane_views(texture, disparity, side_px, (None, CFA))
+        truths = {M: texture.seen_at(*[_centres(side_px, M)] * 2) for M in (1, 2, 4)}
+        green = {M: truth[..., 1:2] for M, truth in truths.items()}
+        rows += _rows(ONE_COLOUR, _plain_ways(plain), green, disparity, repeats)
+        rows += _rows(THREE_COLOURS, _bayer_ways(bayer), truths, disparity, repeats)
+    rows += _photon_rows(texture, side_px, budgets, repeats)
+    return Measured(rows, seeds=list(range(1, repeats + 1)))
+
+
+def _plain_ways(views: Views) -> dict[str, Way]:
+    images, grid = np.asarray(views.radiance)[..., 0], views.grid
+    ways: dict[str, Way] = {
+        "nearest": lambda: _estimate(views),
+        "bilinear": lambda: _estimate(views, shifts="bilinear"),
+        "2 x 2 subpixels": lambda: _estimate(views, subpixel=2),
+        "4 x 4 subpixels": lambda: _estimate(views, subpixel=4),
+        "SciPy, bilinear": lambda: by_scipy(images, grid, PLANE_MM)[..., None],
+        "SciPy, cubic": lambda: by_scipy(images, grid, PLANE_MM, order=3)[..., None],
+        "NumPy slices": lambda: by_slices(images, grid, PLANE_MM)[..., None],
+    }
+    if has("opencv-python-headless"):
+        ways["OpenCV, bilinear"] = lambda: by_opencv(images, grid, PLANE_MM)[..., None]
+    return ways
+
+
+def _bayer_ways(views: Views) -> dict[str, Way]:
+    return {
+        "nearest": lambda: _estimate(views),
+        "bilinear": lambda: _estimate(views, shifts="bilinear"),
+        "2 x 2 subpixels": lambda: _estimate(views, subpixel=2),
+        "4 x 4 subpixels": lambda: _estimate(views, subpixel=4),
+        "even, then Laroche-Prescott": lambda: _estimate(views, shifts="even"),
+    }
+
+
+def _estimate(data: Views | PhotonCounts, **options: Any) -> np.ndarray:
+    """The section's mean (H M, W M, C), NaN where no sample is."""
+    sections = reconstruct(data, PLANE_MM, **options)
+    if sections.cfa is not None:
+        return demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)
+    return np.where(sections.coverage[0] > 0, sections.estimate[0], np.nan)
+
+
+def _rows(
+    table: str, ways: dict[str, Way], truths: dict[int, np.ndarray], disparity: float, repeats: int
+) -> list[Row]:
+    seconds = side_by_side({name: lambda _, way=way: way() for name, way in ways.items()}, repeats)
+    rows: list[Row] = []
+    for name, way in ways.items():
+        found = way()
+        M = found.shape[0] // truths[1].shape[0]
+        values = {"time_ms": median_of(seconds[name], 1e3)} | errors(found, truths[M], BORDER_PX * M)
+        rows.append(Row(table, name, {"disparity_px": disparity}, values))
+    return rows
+
+
+def errors(found: np.ndarray, truth: np.ndarray, border_px: int) -> dict[str, Value]:
+    """RMS error inside the border in percent of the contrast, and the share of voxels that have a value."""
+    inner = slice(border_px, -border_px)
+    difference = (found - truth)[inner, inner]
+    blocks = [
+        part for band in np.array_split(difference, BLOCKS) for part in np.array_split(band, BLOCKS, axis=1)
+    ]
+    rms = [100 / CONTRAST * float(np.sqrt(np.nanmean(block**2))) for block in blocks]
+    covered = 100 * float(np.isfinite(difference).mean())
+    return {"rmse_percent": mean_of(rms), "covered_percent": Value(covered)}
+
+
+def _centres(side_px: int, M: int) -> np.ndarray:
+    """Places of fine voxels in pixels."""
+    return (np.arange(side_px * M) + 0.5) / M - 0.5
+
+
+def _photon_rows(texture: Texture, side_px: int, budgets: Sequence[float], repeats: int) -> list[Row]:
+    """Errors of sections from events follow from the photons, and nothing is sharper than they are."""
+    (views,), rows = plane_views(texture, SHOWN_PX, side_px, [None]), list[Row]()
+    rates = np.asarray(views.radiance)[..., 0].astype(np.float64)
+    truth = texture.seen_at(*[_centres(side_px, 1)] * 2)[..., 1:2]
+    for budget in budgets:
+        scale = budget / (0.5 * side_px**2)
+        seconds, error = [], []
+        for seed in range(repeats):
+            images = np.random.default_rng(seed).poisson(scale * rates)
+            k, l, i, j = np.nonzero(images)
+            counts = PhotonCounts.from_events(k, l, i, j, images[k, l, i, j], views.grid)
+            taken = side_by_side({"events": lambda _, counts=counts: _estimate(counts)}, 1)
+            seconds += taken["events"]
+            found = _estimate(counts) / scale
+            error.append(errors(found, truth, BORDER_PX)["rmse_percent"].value)
+        values = {"time_ms": median_of(seconds, 1e3), "rmse_percent": mean_of(error)}
+        rows.append(Row(BY_PHOTONS, "events", {"photons_per_view": budget}, values))
+    return rows
+
+
+def draw(figure: "Figure", measured: Measured) -> None:
+    """Error against time: of one colour beside other packages, and of three colours."""
+    left, middle, right = figure.subplots(1, 3)
+    for axes, table, title in ((left, ONE_COLOUR, "one colour"), (middle, THREE_COLOURS, "three colours")):
+        for number, row in enumerate(measured.of(table, disparity_px=SHOWN_PX)):
+            curve(axes, [row], "time_ms", "rmse_percent", row.name, number)
+        frame(axes, "time_ms", "rmse_percent", f"{title}, disparity {SHOWN_PX:g} px")
+    curve(right, measured.of(BY_PHOTONS), "photons_per_view", "rmse_percent", "events", 0)
+    frame(right, "photons_per_view", "rmse_percent", "photon counts")
+
+
+def reading(measured: Measured) -> str:
+    """How to read it, with figures of the plane of 13.3 px."""
+    own, bilinear, peer = (
+        measured.one(ONE_COLOUR, name, disparity_px=SHOWN_PX).values
+        for name in ("nearest", "bilinear", "SciPy, bilinear")
+    )
+    whole = measured.one(ONE_COLOUR, "nearest", disparity_px=13.0).values
+    few, *_, many = (row.values["rmse_percent"].value for row in measured.of(BY_PHOTONS))
+    return (
+        "Does interpolation pay? Further left and further down is better: with 100 cameras the roundings"
+        f" of nearest shifts cancel, so that they have an error of {own['rmse_percent'].value:.1f} % of the"
+        f" texture's contrast in {own['time_ms'].value:.1f} ms where bilinear ones have"
+        f" {bilinear['rmse_percent'].value:.1f} % in {bilinear['time_ms'].value:.1f} ms and SciPy"
+        f" {peer['rmse_percent'].value:.1f} % in {peer['time_ms'].value:.0f} ms; at a whole disparity,"
+        f" where all round alike, nearest shifts are off by {whole['rmse_percent'].value:.0f} %. Sections"
+        f" of photon counts have errors of {few:.0f} % down to {many:.0f} % as photons grow, beside which"
+        " those of shifts are small."
+    )
+
+
+STUDY = Study("sections", "Sections: error", SIZES, measure, draw, reading, width_in=12.0, height_in=4.2)

@@ -1,0 +1,151 @@
+"""Work that is skipped: on against off over random small scenes, and whether both give the same bytes."""
+
+import tempfile
+import time
+import tracemalloc
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.drawn import KINDS, TUNING
+from benchmarks.figures import bars
+from benchmarks.results import Measured, Row, Size, Study, Value
+from benchmarks.skips import SKIPS, Arrays, Skip, World
+from benchmarks.timing import median_of, ratio_of
+from simgen.spec.recipe import Recipe
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+TABLE = "Every skip, on against off"
+LITTLE_PERCENT = 5.0
+"""A skip that saves less is not worth its code."""
+
+
+SIZES: Mapping[Size, Mapping[str, Any]] = {
+    "quick": {"scenes": 4, "side_px": 96},
+    "full": {"scenes": 1000, "side_px": 96},
+}
+
+
+def measure(scenes: int, side_px: int, skips: Sequence[Skip] = SKIPS) -> Measured:
+    """Every skip on so many random scenes, and on one before them that warms up and shows the memory."""
+    seconds: dict[str, tuple[list[float], list[float]]] = {skip.name: ([], []) for skip in skips}
+    peaks: dict[str, tuple[float, float]] = {}
+    same = dict.fromkeys(seconds, 0)
+    for number in range(scenes + 1):
+        with tempfile.TemporaryDirectory() as folder:
+            world = random_world(number, side_px, Path(folder))
+            world.prepare_all()
+            for skip in skips:
+                if number == 0:
+                    peaks[skip.name] = _peak_mb(skip.on, world, "on"), _peak_mb(skip.off, world, "off")
+                    continue
+                # First the one, then the other, so that neither always finds what the other left in caches.
+                turns = ((0, skip.on), (1, skip.off))
+                found: dict[int, Arrays] = {}
+                for which, work in turns if number % 2 else turns[::-1]:
+                    start = time.perf_counter()
+                    found[which] = work(world, f"{skip.name}, {which}")
+                    seconds[skip.name][which].append(time.perf_counter() - start)
+                same[skip.name] += not skip.exact or are_same(found[0], found[1])
+    rows = [_row(skip, *seconds[skip.name], *peaks[skip.name], same[skip.name]) for skip in skips]
+    ratios = [ratio_of(skip.name, seconds[skip.name][1], seconds[skip.name][0]) for skip in skips]
+    return Measured(rows, ratios, list(range(1, scenes + 1)))
+
+
+def random_world(number: int, side_px: int, folder: Path) -> World:
+    """A drawn scene of any kind, any few cameras, photons and pattern."""
+    rng = np.random.default_rng([31, number])
+    rows, cols = (int(n) for n in rng.integers(2, 5, 2))
+    recipe = Recipe.model_validate(
+        {
+            "scene": f"drawn_{rng.choice(list(KINDS))}",
+            "scene_number": int(TUNING + rng.integers(1000)),
+            "seed": number,
+            "grid": {
+                "rows": rows,
+                "cols": cols,
+                "pitch_mm": [18.0, 18.0],
+                "pixel_mm": 36.0448 / side_px,
+                "height": side_px,
+                "width": side_px,
+            },
+            "sensor": {"cfa": str(rng.choice(["GRBG", "RGGB", "BGGR", "GBRG"]))},
+            "photons": {"budget": int(10 ** rng.uniform(1, 3.5))},
+            "render": {"samples_per_pixel": 8},
+            "products": {"radiance": "none"},
+        }
+    )
+    return World(recipe, Path(), folder)
+
+
+def are_same(one: Arrays, other: Arrays) -> bool:
+    """Whether both have the same arrays, byte by byte, and any at all."""
+    return (
+        bool(one)
+        and one.keys() == other.keys()
+        and all(
+            one[name].shape == other[name].shape and np.array_equal(one[name], other[name], equal_nan=True)
+            for name in one
+        )
+    )
+
+
+def _peak_mb(work: Callable[[World, str], Arrays], world: World, which: str) -> float:
+    """Peak of what Python and NumPy take during the work; the renderer's own memory is not in it."""
+    tracemalloc.start()
+    work(world, f"memory, {len(list(world.folder.iterdir()))}, {which}")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return peak / 2**20
+
+
+def _row(skip: Skip, on: list[float], off: list[float], on_mb: float, off_mb: float, same: int) -> Row:
+    claim = "same bytes" if skip.exact else "same distribution"
+    saved = median_of([100 * (1 - a / b) for a, b in zip(on, off, strict=True)])
+    values = {
+        "time_on_ms": median_of(on, 1e3),
+        "time_off_ms": median_of(off, 1e3),
+        "time_saved_percent": saved,
+        "memory_on_mb": Value(on_mb),
+        "memory_off_mb": Value(off_mb),
+    }
+    held = f"{same} of {len(on)}" if skip.exact else "see photon images"
+    return Row(TABLE, skip.name, {"claim": claim, "scenes_where_it_holds": held}, values)
+
+
+def draw(figure: "Figure", measured: Measured) -> None:
+    """Time that each skip saves, with the line below which it would not be worth its code."""
+    axes = figure.subplots()
+    rows = measured.of(TABLE)
+    bars(
+        axes, [row.name for row in rows], [row.values["time_saved_percent"] for row in rows], "time saved, %"
+    )
+    axes.axvline(LITTLE_PERCENT, color="#d55e00", linewidth=0.9, linestyle=":")
+
+
+def reading(measured: Measured) -> str:
+    """How to read it: how many hold, and which save little here."""
+    rows = measured.of(TABLE)
+    exact = [row for row in rows if row.parameters["claim"] == "same bytes"]
+    scenes = len(measured.seeds)
+    hold = sum(row.parameters["scenes_where_it_holds"] == f"{scenes} of {scenes}" for row in exact)
+    little = [row.name for row in rows if row.values["time_saved_percent"].value < LITTLE_PERCENT]
+    told = (
+        f"less than {LITTLE_PERCENT:g} % is saved by: {'; '.join(little)}"
+        if little
+        else "all save more than that"
+    )
+    return (
+        f"Is skipped work really not missed? Of {len(exact)} skips that claim the same bytes, {hold} gave"
+        f" them in all {scenes} random scenes; the other draws anew from the same distribution. Bars are"
+        " the share of the time saved on these small scenes, where fixed costs weigh most, and the dotted"
+        f" line is {LITTLE_PERCENT:g} %: {told}. Memory is that of Python and NumPy, without the renderer's"
+        " own."
+    )
+
+
+STUDY = Study("skips", "Skipped work", SIZES, measure, draw, reading, width_in=9.5, height_in=4.6)

@@ -1,0 +1,226 @@
+"""Pictures of a report: the panels of the paper's Figures 6 and 7, and the depth map with its error.
+
+All show the same part of the frame, the `Crop`, so that a place in one is the same place in all others.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.app.pipeline import Outcome
+from pcii.core.section_stack import Sections
+from pcii.core.truth import Truth
+from pcii.imaging import pictures as picture
+from pcii.imaging.bright_regions import box_around
+from pcii.io.suggested_depths import depth_range_of
+from pcii.metrics.true_masks import object_masks, pixel_masks
+from pcii.sections.demosaicing import demosaic
+from pcii.sections.photon_statistics import cell_sums
+
+LONGEST_PX = 640
+"""Longer sides of pictures are shown at one of 2 x 2 pixels, or of more."""
+SATURATED = 0.95
+"""Share of the errors of depth that the colours of their picture do not saturate."""
+
+Panel = dict[str, str]
+"""An `image` as a data URI and its `caption`."""
+
+
+@dataclass(frozen=True)
+class Crop:
+    """Part of the frame that a report shows: `rows` and `cols`, at one of `step_px` x `step_px` pixels."""
+
+    rows: slice
+    cols: slice
+    step_px: int = 1
+
+    @property
+    def height_px(self) -> int:
+        """Height of the part in pixels of the frame."""
+        return self.rows.stop - self.rows.start
+
+    @property
+    def width_px(self) -> int:
+        """Width of the part in pixels of the frame."""
+        return self.cols.stop - self.cols.start
+
+    def middles(self, image: np.ndarray) -> np.ndarray:
+        """The pixel in the middle of each block of an image (H, W, ...): ids and depths have no mean."""
+        part, step = image[self.rows, self.cols], self.step_px
+        rows, cols = (
+            np.minimum(np.arange(0, size, step) + step // 2, size - 1)
+            for size in (self.height_px, self.width_px)
+        )
+        return part[rows][:, cols]
+
+    def sums(self, image: np.ndarray) -> np.ndarray:
+        """Sums over the blocks of an image (H, W, C)."""
+        part = np.moveaxis(image[self.rows, self.cols], -1, 0)
+        kind = np.float64 if image.dtype.kind == "f" else np.int64
+        return np.moveaxis(cell_sums(part, self.step_px, kind), 0, -1)
+
+
+def crop_of(outcome: Outcome) -> Crop:
+    """The objects with a margin, or what was found in focus; else the whole frame."""
+    dataset = outcome.dataset
+    box = box_around(picture.interesting_part(dataset.grid, dataset.truth, outcome.focus))
+    longest = max(side.stop - side.start for side in box)
+    return Crop(*box, -(-longest // LONGEST_PX))
+
+
+def block_estimate(sections: Sections, plane: int, crop: Crop) -> tuple[np.ndarray, np.ndarray]:
+    """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples.
+
+    At some depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the
+    estimate is that of the 3 x 3 blocks around, so that no depth has a tint.
+    """
+    counts, samples = crop.sums(sections.counts[plane]), crop.sums(sections.coverage[plane])
+    around = (_sums_around(values) for values in (counts, samples))
+    counts, weights = (
+        np.where(samples > 0, own, near) for own, near in zip((counts, samples), around, strict=True)
+    )
+    return counts / np.maximum(weights, 1), samples
+
+
+def _sums_around(blocks: np.ndarray) -> np.ndarray:
+    """Sums over each block (h, w, C) and the eight around it."""
+    height, width = blocks.shape[:2]
+    padded = np.pad(blocks, ((1, 1), (1, 1), (0, 0)))
+    rows = sum(padded[a : a + height] for a in range(3))
+    return sum(rows[:, b : b + width] for b in range(3))  # type: ignore[index]
+
+
+def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """8-bit pictures of block estimates with their samples, all at the same exposure."""
+    white = max(picture.white_level(estimate, samples=samples) for estimate, samples in blocks)
+    return [picture.to_srgb8(estimate, white) for estimate, _ in blocks]
+
+
+def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
+    """Panels of Figure 6: central view raw and demosaiced, sections, photons of one view, truth."""
+    dataset = outcome.dataset
+    k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
+    letters = iter([*"abcdefghijklmnopqrstuvwxyz"] + [f"{n}" for n in range(27, 1000)])
+    panels: list[Panel] = []
+    if dataset.views is not None:
+        view = dataset.views.view(k, l).astype(np.float64)
+        is_mosaic = dataset.views.cfa is not None
+        colour = demosaic(view[..., 0], cfa=dataset.cfa) if is_mosaic else view
+        raw, colour = (_reduced(image, crop) for image in (view, colour))
+        white = picture.white_level(colour)
+        name = f"view ({k}, {l}) at full light"
+        panels.append(_photo(picture.to_srgb8(raw, white), f"({next(letters)}) {name}{', raw' * is_mosaic}"))
+        if is_mosaic:
+            image = picture.to_srgb8(colour, white)
+            panels.append(_photo(image, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
+    if outcome.full_light is not None:
+        panels += _section_panels(outcome.full_light, crop, "full light", letters)
+    if dataset.has_counts:
+        per_view = dataset.counts.total / dataset.grid.view_count
+        panels += _section_panels(outcome.sections, crop, f"{per_view:.0f} photons per view", letters)
+        counts = dataset.counts.view(k, l)
+        shown = crop.sums(counts[..., None])
+        image = picture.to_srgb8(shown, max(1.0, picture.white_level(shown)))
+        caption = f"({next(letters)}) view ({k}, {l}) at the photon budget: {counts.sum()} photons"
+        panels.append(_drawing(image, caption))
+    if dataset.truth is not None:
+        near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
+        image = picture.depth_image(crop.middles(depth_of_objects(dataset.truth)), near, far)
+        panels.append(
+            _drawing(
+                image, f"({next(letters)}) {_true_depth_words(dataset.truth)} (colour scale under Depth)"
+            )
+        )
+    return panels
+
+
+def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
+    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison.
+
+    Without truth all are in one row.
+    """
+    truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
+    by_object = object_masks(grid, truth, z_mm) if truth else None
+    by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
+    sections = encoded([block_estimate(outcome.sections, plane, crop) for plane in range(len(z_mm))])
+    rows: list[list[Panel]] = []
+    for focus in outcome.focus:
+        for plane, z in enumerate(z_mm):
+            kept = crop.middles(focus.in_focus[plane])
+            image = sections[plane] * kept[..., None]
+            empty = "" if focus.in_focus[plane].any() else ", nothing is kept"
+            panels = [_photo(image, f"{focus.method}, {z:g} mm: after removal{empty}")]
+            if by_object is not None and by_pixel is not None:
+                true = crop.middles(by_object[plane])
+                image = picture.mask_image(true)
+                image[true & ~crop.middles(by_pixel[plane])] = 130
+                panels.append(_drawing(image, f"truth at {z:g} mm"))
+                panels.append(_drawing(picture.agreement_image(kept, true), f"comparison at {z:g} mm"))
+            rows.append(panels)
+    return rows if truth else [[panel for row in rows for panel in row]]
+
+
+def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:
+    """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
+    truth, depth = outcome.dataset.truth, outcome.depth
+    near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
+    found, sure = crop.middles(depth.z_mm), crop.middles(depth.confidence)
+    image = picture.depth_image(found, near, far, sure)
+    panels = [_drawing(image, "estimated depth, darker where less sure")]
+    if truth is not None:
+        true = crop.middles(depth_of_objects(truth))
+        panels.append(_drawing(picture.depth_image(true, near, far), _true_depth_words(truth)))
+        error, limit = depth_error_mm(outcome, crop)
+        image = picture.error_image(error, limit)
+        image[np.isfinite(true) & np.isnan(error)] = 110
+        panels.append(_drawing(image, "estimated less true depth"))
+    panels.append(_drawing(picture.to_srgb8(sure**2.2, 1.0), "confidence, from 0 (black) to 1 (white)"))
+    return panels
+
+
+def depth_error_mm(outcome: Outcome, crop: Crop) -> tuple[np.ndarray, float]:
+    """Estimated less true depth of the objects (h, w), NaN without either, and where colours saturate, in mm.
+
+    Most errors, `SATURATED` of them, are within that limit, which is rounded to two digits.
+    """
+    truth = outcome.dataset.truth
+    assert truth is not None
+    found, true = crop.middles(outcome.depth.z_mm), crop.middles(depth_of_objects(truth))
+    both = np.isfinite(found) & np.isfinite(true)
+    error = np.full(found.shape, np.nan)
+    error[both] = found[both] - true[both]
+    limit = float(np.quantile(np.abs(error[both]), SATURATED)) if both.any() else 1.0
+    return error, float(f"{max(limit, 1e-3):.1e}")
+
+
+def depth_of_objects(truth: Truth) -> np.ndarray:
+    """True depth of the objects, +inf elsewhere; of everything, if the truth knows no objects."""
+    has_objects = (truth.object_id > 0).any()
+    return np.where(truth.object_id > 0, truth.z_mm, np.inf) if has_objects else truth.z_mm
+
+
+def _true_depth_words(truth: Truth) -> str:
+    """What a picture of `depth_of_objects` shows."""
+    return "true depth of the objects" if (truth.object_id > 0).any() else "true depth"
+
+
+def _section_panels(sections: Sections, crop: Crop, light: str, letters: Iterator[str]) -> list[Panel]:
+    equation = "Eq. 2" if sections.counts.dtype.kind == "f" else "Eq. 3"
+    images = encoded([block_estimate(sections, plane, crop) for plane in range(len(sections.z_mm))])
+    return [
+        _photo(image, f"({next(letters)}) section at {z:g} mm, {light} ({equation})")
+        for z, image in zip(sections.z_mm, images, strict=True)
+    ]
+
+
+def _reduced(image: np.ndarray, crop: Crop) -> np.ndarray:
+    return crop.sums(image) / crop.sums(np.ones_like(image))
+
+
+def _photo(image: np.ndarray, caption: str) -> Panel:
+    return {"image": picture.photo_uri(image), "caption": caption}
+
+
+def _drawing(image: np.ndarray, caption: str) -> Panel:
+    return {"image": picture.data_uri(image), "caption": caption}

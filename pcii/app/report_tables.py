@@ -1,0 +1,157 @@
+"""Numbers of a report as text: key facts, Table 1, scores of the masks and of the depth map.
+
+A column or row of which nothing is known is left out.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from pcii.app.pipeline import Outcome
+from pcii.evaluation.entropy_intervals import entropy_half_widths
+from pcii.evaluation.summary import object_planes
+from pcii.evaluation.tables import Table
+
+Row = Mapping[str, Any]
+NUMBERS = (
+    ("IoU", "iou"),
+    ("oracle", "iou_oracle"),
+    ("precision", "precision"),
+    ("recall", "recall"),
+    ("F1", "f1"),
+    ("boundary F", "boundary_f"),
+    ("photon precision", "photon_precision"),
+    ("photon recall", "photon_recall"),
+    ("entropy before", "entropy_before"),
+    ("entropy after", "entropy_after"),
+)
+"""Columns of the scores after those that say what is scored."""
+
+
+def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
+    """What the reader wants to know first: a few names and values."""
+    dataset, score = outcome.dataset, outcome.score
+    facts: list[tuple[str, str]] = []
+    if dataset.has_counts:
+        facts.append(("photons per view", f"{dataset.counts.total / dataset.grid.view_count:,.0f}"))
+    for focus in outcome.focus:
+        ious = [
+            row["iou"] for row in _rows_of(score.planes, focus.method, "object") if row["object"] is not None
+        ]
+        if ious and None not in ious:
+            name = "IoU" if len(ious) == 1 else "mean IoU"
+            facts.append((f"{name} of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
+    if score.depth["median_mm"] is not None:
+        facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
+        facts.append(("depths off by more than 1 px", _percent(score.depth["bad_1px"])))
+    else:
+        facts.append(("pixels with a depth", _percent(float((outcome.depth.confidence > 0).mean()))))
+    return facts
+
+
+def _rows_of(planes: Sequence[Row], method: str, kind: str) -> list[Row]:
+    return [row for row in planes if row["method"] == method and row["truth"] == kind]
+
+
+def table1(outcome: Outcome) -> dict[str, Any] | None:
+    """Entropies of the objects with their intervals, and whether each is lowest at its plane."""
+    objects, truth = outcome.score.objects, outcome.dataset.truth
+    if truth is None or all(bits is None for row in objects for bits in row["entropy"].values()):
+        return None
+    halves = entropy_half_widths(outcome.dataset.counts, outcome.sections, truth)
+    rows: list[dict[str, Any]] = []
+    for row, half in zip(objects, halves or [{}] * len(objects), strict=True):
+        if None in row["entropy"].values():  # not seen
+            continue
+        lowest = min(row["entropy"].values())
+        cells = [
+            {
+                "text": f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else ""),
+                "lowest": bits == lowest and len(row["entropy"]) > 1,
+            }
+            for z, bits in row["entropy"].items()
+        ]
+        rows.append({"name": row["name"], "cells": cells})
+    depths = [f"{z} mm" for z in objects[0]["entropy"]]
+    holds = table1_holds(objects, outcome.score.planes)
+    return {"depths": depths, "rows": rows, "has_intervals": bool(halves), "holds": holds}
+
+
+def table1_holds(objects: Sequence[Row], planes: Sequence[Row]) -> bool | None:
+    """Whether each object's entropy is lowest at its plane; None if none has two planes to compare."""
+    plane_of = object_planes(planes)
+    verdicts: list[bool] = []
+    for row in objects:
+        bits = {z: value for z, value in row["entropy"].items() if value is not None}
+        if row["name"] in plane_of and len(bits) > 1:
+            verdicts.append(min(bits, key=lambda z: bits[z]) == plane_of[row["name"]])
+    return all(verdicts) if verdicts else None
+
+
+def score_table(outcome: Outcome) -> Table:
+    """Scores of every method at every plane against both kinds of truth; without truth its entropies."""
+    planes = outcome.score.planes
+    oracles = outcome.score.bounds["planes"] or [{"iou_oracle": None}] * len(planes)
+    rows = [{**row, "iou_oracle": bound["iou_oracle"]} for row, bound in zip(planes, oracles, strict=True)]
+    columns: list[tuple[str, Callable[[Row], str]]] = [
+        ("plane", lambda row: f"{row['z_mm']:g} mm"),
+        ("method", lambda row: row["method"]),
+    ]
+    if outcome.dataset.truth is None:
+        rows = [row for row in rows if row["truth"] == "object"]
+    else:
+        columns.append(("truth", lambda row: row["truth"]))
+        columns.append(("objects", _objects))
+    words = len(columns)
+    columns += [
+        (title, lambda row, key=key: _number(row[key]))
+        for title, key in NUMBERS
+        if any(row[key] is not None for row in rows)
+    ]
+    columns.append(("claimed share", lambda row: _percent(row["claimed_share"], 2)))
+    cells = tuple(tuple(of(row) for _, of in columns) for row in rows)
+    return Table("Scores of the masks", tuple(title for title, _ in columns), cells, words)
+
+
+def _objects(row: Row) -> str:
+    if row["truth"] == "pixel":
+        return "all in focus"
+    return row["object"] or "none at this plane"
+
+
+def depth_table(outcome: Outcome) -> Table:
+    """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
+    depth = outcome.score.depth
+    rows: list[tuple[str, str]] = []
+    if depth["coverage"] is not None:
+        rows.append(("pixels of the objects with an estimate", _percent(depth["coverage"])))
+        if depth["median_mm"] is not None:
+            for name in ("median", "mean"):
+                key = {"median": "median", "mean": "mae"}[name]
+                value = f"{depth[f'{key}_mm']:.2f} mm, {depth[f'{key}_px']:.2f} px of total disparity"
+                rows.append((f"{name} error of those", value))
+        rows.append(("off by more than 1 px of total disparity, or no estimate", _percent(depth["bad_1px"])))
+        rows.append(("off by more than 3 px of total disparity, or no estimate", _percent(depth["bad_3px"])))
+    where, hci = "the objects' pixels", depth["hci_objects"]
+    if not hci["answered"]:
+        where, hci = "all pixels", depth["hci"]
+    if hci["answered"]:
+        value = (
+            f"BadPix(0.07) {_percent(hci['badpix_007'])}, MSE × 100 {hci['mse_x100']:.2f}, "
+            f"Q25 {hci['q25_x100']:.2f}"
+        )
+        rows.append((f"HCI 4D light field benchmark, px between neighbouring views, {where}", value))
+    if depth["ece"] is not None:
+        rows.append(("expected calibration error of the confidence", f"{depth['ece']:.3f}"))
+    for row in outcome.score.bounds["objects"]:
+        if row["depth_sigma_px"] is not None:
+            bound = f"{row['depth_sigma_px']:.3f} px of total disparity"
+            rows.append((f"Cramér-Rao bound on the standard deviation for {row['name']}", bound))
+    return Table("Errors of the depth map", ("measure", "value"), tuple(rows), words=2)
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"
+
+
+def _percent(share: float, digits: int = 1) -> str:
+    return f"{100 * share:.{digits}f} %"

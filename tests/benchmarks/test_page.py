@@ -1,0 +1,68 @@
+import inspect
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from records import MACHINE, MEASURED, STUDY, record
+
+from benchmarks import __main__ as command
+from benchmarks.figures import draw
+from benchmarks.page import tables_of, told, write_html, write_markdown
+from benchmarks.results import Value, read_record
+from benchmarks.studies import STUDIES
+
+
+def test_tables_have_a_column_for_each_parameter_and_quantity() -> None:
+    errors, memory = tables_of(MEASURED.rows)
+    assert errors.header == ("what", "samples", "time, ms", "RMSE, %")
+    assert errors.rows == (("ours", "4", "2 (1.5 to 2.5)", "0.125"), ("theirs <b>", "16", "8", "–"))
+    assert memory.rows == (("ours", "1230"),)
+    assert told(Value(1.5e-7)) == "1.5e-07"
+
+
+def test_the_markdown_page_has_figure_reading_tables_and_ratios(tmp_path: Path) -> None:
+    write_markdown(tmp_path / "page.md", [STUDY], [record()])
+    text = (tmp_path / "page.md").read_text()
+    assert "![A study of nothing](benchmarks/nothing.png)" in text
+    assert "Ours takes 2 ms. Two. Three." in text
+    assert "| ours against theirs | 4 (3.5 to 4.5) | 3 | yes |" in text
+    assert "abacus, 2 cores" in text
+    assert "busy" not in text
+    with Image.open(tmp_path / "benchmarks" / "nothing.png") as picture:
+        assert min(picture.size) > 300
+
+
+def test_the_page_says_that_the_machine_was_busy(tmp_path: Path) -> None:
+    write_markdown(tmp_path / "page.md", [STUDY], [record(machine=MACHINE | {"load": 9.5})])
+    assert "busy with other work when it began (load 9.5)" in (tmp_path / "page.md").read_text()
+
+
+def test_the_html_page_is_one_file_that_escapes_what_it_shows(tmp_path: Path) -> None:
+    draw(STUDY, MEASURED, tmp_path / "nothing.png")
+    write_html(tmp_path / "page.html", [STUDY], [record()])
+    text = (tmp_path / "page.html").read_text()
+    assert "data:image/png;base64," in text
+    assert "theirs &lt;b&gt;" in text
+    assert "<b>" not in text
+
+
+def test_a_run_leaves_results_figure_and_printed_tables(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = command.measure(STUDY, "quick", tmp_path)
+    assert read_record(tmp_path / "nothing.json").measured == made.measured
+    assert (tmp_path / "nothing.png").is_file()
+    assert (tmp_path / "nothing.csv").is_file()
+    assert made.versions["numpy"]
+    assert made.machine["cores"] >= 1
+    assert "| ours | 4 | 2 (1.5 to 2.5) | 0.125 |" in capsys.readouterr().out
+
+
+def test_every_study_has_both_sizes_and_they_fit() -> None:
+    names = [study.name for study in STUDIES]
+    assert len(set(names)) == len(names)
+    assert not {*names} & {*command.LONG_TABLES}
+    for study in STUDIES:
+        assert set(study.sizes) == {"quick", "full"}
+        for size in study.sizes.values():
+            inspect.signature(study.measure).bind(**size)

@@ -1,0 +1,116 @@
+"""An analysis that was interrupted goes on: what is finished and valid is kept, with the same bytes."""
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import pcii
+from pcii.app import long_steps, pipeline, single_run
+from pcii.app.results import masks_name
+from pcii.core.estimates import DepthMap, Segmented
+from pcii.io.dataset import Dataset
+from pcii.io.results_list import read_results
+from pcii.io.verification import verify
+
+METHODS = ("brightness", "variance")
+REMOVALS = tuple(long_steps.removal_step(method) for method in METHODS)
+ALL = (*REMOVALS, long_steps.DEPTH_STEP)
+VARIES = {"report.html", "results.json"}
+"""They tell how long steps took."""
+
+
+@pytest.fixture(scope="module")
+def dataset() -> Dataset:
+    return pcii.sample()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _quick_depth() -> Iterator[None]:
+    """The variance sweep in place of the default method, which is slower."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "estimate_depth", partial(pcii.estimate_depth, method="variance-sweep"))
+        yield
+
+
+@pytest.fixture(scope="module")
+def whole(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a run that nothing interrupted."""
+    out = tmp_path_factory.mktemp("whole") / "results"
+    assert run(dataset, out) == ()
+    return out
+
+
+def run(dataset: Dataset, out: Path, **options: object) -> tuple[str, ...]:
+    """Names of the steps that the run kept."""
+    settings = {"z_mm": None, "methods": METHODS} | options
+    return single_run.run(dataset, out, **settings).kept  # type: ignore[arg-type]
+
+
+def contents(out: Path) -> dict[str, bytes]:
+    files = {file.relative_to(out).as_posix(): file for file in out.rglob("*") if file.is_file()}
+    return {name: file.read_bytes() for name, file in files.items() if name not in VARIES}
+
+
+def interrupted(dataset: Dataset, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that is stopped in its last long step."""
+
+    def stop(*_: object) -> DepthMap:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "estimate_depth", stop)
+        with pytest.raises(KeyboardInterrupt):
+            run(dataset, out)
+
+
+def test_an_interrupted_run_goes_on_to_the_same_bytes(
+    dataset: Dataset, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    interrupted(dataset, out, monkeypatch)
+    assert not (out / "score.json").exists()
+    assert verify(out) > 0
+    assert run(dataset, out) == REMOVALS
+    assert contents(out) == contents(whole)
+    assert list(read_results(out)["files"]) == list(read_results(whole)["files"])
+    assert run(dataset, out) == ALL
+    assert contents(out) == contents(whole)
+
+
+def test_what_other_options_made_is_made_anew(dataset: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(dataset, out, z_mm=(540.0,), methods=METHODS[:1])
+    # The range of depths is the recipe's, whatever sections are asked for.
+    assert run(dataset, out, z_mm=(620.0,), methods=METHODS[:1]) == (long_steps.DEPTH_STEP,)
+    assert run(dataset, out, z_mm=(620.0,), methods=METHODS[1:]) == (long_steps.DEPTH_STEP,)
+    assert run(dataset, out, z_mm=(620.0,)) == ALL
+
+
+def test_what_other_software_made_is_made_anew(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    run(dataset, out)
+    monkeypatch.setattr(long_steps, "_software", lambda: {"pcii": "another"})
+    assert run(dataset, out) == ()
+    assert run(dataset, out) == ALL
+
+
+def test_what_is_damaged_is_made_anew(dataset: Dataset, whole: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(dataset, out)
+    (chunk,) = (out / masks_name(METHODS[0]) / "in_focus" / "c").rglob("0/0/0")
+    chunk.write_bytes(chunk.read_bytes()[:-1] + b"?")
+    assert run(dataset, out) == (REMOVALS[1], long_steps.DEPTH_STEP)
+    assert contents(out) == contents(whole)
+
+
+def test_masks_of_a_single_step_are_not_taken_for_those_of_a_run(dataset: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(dataset, out)
+    other = pcii.segment(dataset.counts, z_mm=[540, 620], method="variance")
+    with single_run.Results(out, dataset).writing() as results:
+        results.save_segmented(Segmented(~other.in_focus, "brightness", other.sections))
+    assert run(dataset, out) == (REMOVALS[1], long_steps.DEPTH_STEP)
