@@ -66,7 +66,7 @@ def example_of(dataset: Dataset, rng: np.random.Generator) -> dict[str, np.ndarr
     method = PosteriorDepth()
     dimmed = counts.subsample(photons, rng)
     evidence = evidence_of_texture(dimmed, planes, method.block_px, method.model)
-    inputs = method.network_inputs(evidence, dimmed, method.block_px)
+    inputs = method.network_inputs(evidence, planes, method.block_px)
     example = {name: part.astype(np.float16) for name, part in inputs._asdict().items()}
     return _part(example | {"plane": true_plane(truth, grid, planes)}, rng)
 

@@ -1,8 +1,9 @@
 """Depth from its posterior probability: evidence of texture, smooth surfaces, and a network that corrects it.
 
-Blocks without evidence follow their neighbours, and where there is none at all the posterior still has a
-largest value. So whether a surface is seen is decided apart: there are photons, and two halves of the cameras
-show the same structure (`pcii.evidence.half_agreement`).
+The network has seen photon counts alone; of radiance the posterior is that of smooth surfaces, in which there
+is always one. Blocks without evidence follow their neighbours, and where there is none at all the posterior
+still has a largest value. So whether a surface is seen is decided apart: there are photons, and two halves of
+the cameras show the same structure (`pcii.evidence.half_agreement`).
 """
 
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.network_inputs import NetworkInputs, network_inputs
-from pcii.depth.smooth_surface import SurfacePrior
+from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of, least_agreement
@@ -44,7 +45,9 @@ class PosteriorDepth:
     """Standard deviation of the window that is seen as a whole if the halves of the cameras agree on much of
     it: so large that a chance agreement, which reaches as far as the windows of its test, is little of it."""
     least_share: float = 0.25
-    """How much, of what the posterior calls a surface there."""
+    """How much, for what is more probably a surface than not."""
+    most_empty: float = 0.9
+    """No surface is seen where the probability of none is higher."""
 
     def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
@@ -52,6 +55,7 @@ class PosteriorDepth:
         posterior, photons = self._posterior(data, z_range_mm)
         plane, confidence, total_px = posterior.most_probable()
         seen = self._has_photons(photons, plane, posterior.block_px)
+        seen &= posterior.no_surface <= self.most_empty
         if isinstance(data, PhotonCounts):
             agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
             seen &= agree | self._in_agreeing_region(agree, posterior)
@@ -73,15 +77,17 @@ class PosteriorDepth:
             block_px *= 2
         evidence = evidence_of_texture(data, planes, block_px, self.model)
         h, w = evidence.nats.shape[1:]
-        parts = network_posterior(self.network_inputs(evidence, data, block_px))
-        return DepthPosterior(planes, *(part[..., :h, :w] for part in parts), block_px), evidence.photons
+        if isinstance(data, Views):
+            probability = surface_posterior(evidence.nats, self.prior).transpose(2, 0, 1)
+            nothing = np.zeros((h, w), np.float32)
+        else:
+            probability, nothing = network_posterior(self.network_inputs(evidence, planes, block_px))
+        posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
+        return posterior, evidence.photons
 
-    def network_inputs(
-        self, evidence: TextureEvidence, data: PhotonCounts | Views, block_px: int
-    ) -> NetworkInputs:
-        """What the network is given for the evidence of blocks."""
-        colours = data.radiance.shape[-1] if isinstance(data, Views) else 1
-        return network_inputs(evidence, data.grid.view_count * colours * block_px**2, self.prior, MULTIPLE)
+    def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
+        """What the network is given for the evidence of blocks of photon counts."""
+        return network_inputs(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
 
     def _in_agreeing_region(self, agree: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
         """Surfaces (h, w) bool around which the halves `agree` (h, w) in a share of the blocks."""

@@ -29,7 +29,7 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
 
     trunk, head = _sessions(threads())
     Z, h, w = inputs.evidence.shape
-    features, cell_logit, cell_nothing = trunk.run(None, inputs._asdict())
+    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, inputs._asdict()))
     nothing = cell_nothing[0, 0].repeat(CELL_BLOCKS, axis=0).repeat(CELL_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_BLOCKS
@@ -42,7 +42,7 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
         parts = features[cells], cell_logit[cells], inputs.evidence[blocks], inputs.brightness[blocks]
         names = [argument.name for argument in head.get_inputs()]
         (logit,) = head.run(None, dict(zip(names, parts, strict=True)))
-        own = logit[:, top - first : end - first]
+        own = np.asarray(logit)[:, top - first : end - first]
         largest = np.maximum(own.max(axis=0), nothing[top:end])
         own = np.exp(own - largest)
         none[top:end] = np.exp(nothing[top:end] - largest)

@@ -6,9 +6,13 @@ from twins import bayer_photons, blocky_texture, even_light, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap
+from pcii.core.estimates import DepthMap, DepthPosterior
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.methods import estimate_depth
+from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.depth.smooth_surface import surface_posterior
+from pcii.evidence.texture_evidence import evidence_of_texture
 
 RANGE_MM = (1 / 9, 1 / 1)
 
@@ -74,16 +78,26 @@ def test_depths_that_look_alike_share_the_probability():
         [np.roll(np.tile(tile, (32, 32)), (-2 * (k - 3), -2 * (l - 3)), (0, 1)) for l in range(7)]
         for k in range(7)
     ]
-    medians = []
+    probabilities = []
+    method = PosteriorDepth()
     for seed in (3, 4, 5):
         film = np.random.default_rng(seed).poisson(0.1 * np.array(views))
         counts = PhotonCounts.from_dense(film, unit_grid(7, 7, 96, 96))
-        alike = estimate_depth(counts, RANGE_MM)
-        one = estimate_depth(counts, (1 / 3.4, 1))  # only one of them is in the range
-        medians.append([np.median(depth.confidence[depth.confidence > 0]) for depth in (one, alike)])
-    sure, unsure = np.mean(medians, axis=0)
+        # Of the smooth surface and of the network; at first only one of the depths is in the range.
+        for z_range_mm in ((1 / 3.4, 1), RANGE_MM):
+            planes = FocalPlanes.between(counts.grid, *z_range_mm, method.step_px)
+            evidence = evidence_of_texture(counts, planes, method.block_px, method.model)
+            surface = surface_posterior(evidence.nats, method.prior).transpose(2, 0, 1)
+            nowhere = np.zeros(surface.shape[1:], np.float32)
+            for posterior in (
+                DepthPosterior(planes, surface, nowhere, method.block_px),
+                method.posterior(counts, z_range_mm),
+            ):
+                probabilities.append(np.median(posterior.most_probable()[1]))
+    sure, sure_network, unsure, unsure_network = np.mean(np.reshape(probabilities, (3, 4)), axis=0)
     assert sure > 0.9
     assert unsure < 0.8  # each of the three has a third, if neighbours were independent of each other
+    assert unsure_network < sure_network - 0.1  # of patterns that it has not seen the network is less sure
 
 
 def flat_share(rate: float, films: int) -> float:
