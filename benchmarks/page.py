@@ -31,7 +31,7 @@ def write_html(path: Path, studies: Sequence[Study], records: Sequence[Record]) 
     for section in sections:
         picture = (path.parent / f"{section['name']}.png").read_bytes()
         section["picture"] = "data:image/png;base64," + base64.b64encode(picture).decode()
-    write_bytes_safely(path, _rendered("benchmarks.html.j2", sections=sections).encode())
+    write_bytes_safely(path, _rendered("benchmarks.html.j2", sections=sections, script=None).encode())
 
 
 def tables_of(rows: Sequence[Row]) -> list[Table]:

@@ -40,6 +40,7 @@ NO_NUMBERS = {
     "depth_methods": "names",
     "removal_methods": "names",
     "open_collection": "opens a folder",
+    "sample": "opens a folder",
     "evaluate": "scores as `score` does",
     "import_hci": "reads pictures as `import_images` does",
     "Sections": "made by `reconstruct`",

@@ -21,8 +21,8 @@ def check_z_mm(z_mm: object) -> np.ndarray:
 
     Raises `InputError` for no depth, or one that is not a finite number above 0.
 
-    >>> check_z_mm(540)
-    array([540.])
+    >>> check_z_mm(540).tolist()
+    [540.0]
     """
     try:
         z = np.atleast_1d(np.asarray(z_mm, dtype=np.float64))

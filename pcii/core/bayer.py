@@ -44,8 +44,8 @@ def colour_cells(cfa: str | None) -> np.ndarray:
 def sites_of_colours(cfa: str | None) -> np.ndarray:
     """How many of the 2 x 2 cells are of each colour, (C,) float64.
 
-    >>> sites_of_colours("GRBG")
-    array([1., 2., 1.])
+    >>> sites_of_colours("GRBG").tolist()
+    [1.0, 2.0, 1.0]
     """
     return np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa)).astype(np.float64)
 

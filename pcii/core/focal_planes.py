@@ -62,8 +62,8 @@ class FocalPlanes(Brief):
         >>> grid = CameraGrid(
         ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
         ... )
-        >>> FocalPlanes.at_total_disparity(grid, [20, 10]).z_mm
-        array([ 500., 1000.])
+        >>> FocalPlanes.at_total_disparity(grid, [20, 10]).z_mm.tolist()
+        [500.0, 1000.0]
         """
         total = np.atleast_1d(np.asarray(total_disparity_px, dtype=np.float64))
         return cls(grid, depth_of_total_disparity_mm(grid, total), total)

@@ -52,8 +52,8 @@ def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray
     >>> grid = CameraGrid(
     ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
     ... )
-    >>> total_disparity_px(grid, np.array([500.0, 1000.0]))
-    array([20., 10.])
+    >>> total_disparity_px(grid, np.array([500.0, 1000.0])).tolist()
+    [20.0, 10.0]
     """
     d_x, d_y = parallax_px(grid, z_mm)
     with np.errstate(over="ignore", invalid="ignore"):

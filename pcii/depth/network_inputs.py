@@ -38,7 +38,7 @@ class NetworkInputs(NamedTuple):
     light: np.ndarray
 
 
-def network_inputs(
+def inputs_of(
     evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int
 ) -> NetworkInputs:
     """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples."""

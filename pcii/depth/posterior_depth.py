@@ -15,7 +15,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.depth.network_inputs import NetworkInputs, network_inputs
+from pcii.depth.network_inputs import NetworkInputs, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
@@ -87,7 +87,7 @@ class PosteriorDepth:
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
-        return network_inputs(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
+        return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
 
     def _in_agreeing_region(self, agree: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
         """Surfaces (h, w) bool around which the halves `agree` (h, w) in a share of the blocks."""

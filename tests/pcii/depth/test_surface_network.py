@@ -9,7 +9,7 @@ from pcii.core.estimates import DepthPosterior
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth import surface_network
-from pcii.depth.network_inputs import NetworkInputs, network_inputs
+from pcii.depth.network_inputs import NetworkInputs, inputs_of
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import network_posterior
@@ -77,8 +77,8 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
     samples = grid.view_count * METHOD.block_px**2
-    own = network_inputs(evidence, samples, SurfacePrior(), 1)
-    turned = network_inputs(
+    own = inputs_of(evidence, samples, SurfacePrior(), 1)
+    turned = inputs_of(
         evidence._replace(
             nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
         ),
