@@ -11,7 +11,7 @@ from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.scene import Scene
 from simgen.spectral.camera_curves import sensitivity
-from simgen.spectral.spectra import PATCHES, patch_names
+from simgen.spectral.spectra import PATCHES, colour_science, patch_names
 
 ACROSS, DOWN, SIDE_PX, BORDER_PX = 6, 4, 16, 2
 WHITE = 18
@@ -69,7 +69,7 @@ def _chart(lamp: str, side_mm: float) -> Scene:
 
 def integrated(lamp: str, camera: str | None) -> np.ndarray:
     """Raw channels (24, 3) of the patches, or CIE XYZ without a camera, by integration in colour-science."""
-    import colour
+    colour = colour_science()
 
     shape = colour.SpectralShape(380, 780, 1)
     if camera is None:
@@ -92,7 +92,7 @@ def colours(channels: np.ndarray, lamp: str) -> np.ndarray:
 
 def lab(xyz: np.ndarray, lamp: str) -> np.ndarray:
     """With the lamp's own white, at luminance 1."""
-    import colour
+    colour = colour_science()
 
     shape = colour.SpectralShape(380, 780, 1)
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(shape).values
@@ -103,6 +103,6 @@ def lab(xyz: np.ndarray, lamp: str) -> np.ndarray:
 
 def difference(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     """CIEDE2000 (24,)."""
-    import colour
+    colour = colour_science()
 
     return colour.delta_E(one, other, method="CIE 2000")

@@ -21,6 +21,7 @@ from pcii.core.bayer import mosaic
 from pcii.sections.demosaicing import METHODS, demosaic
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
+from simgen.spectral.spectra import colour_science
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,7 +99,7 @@ def _blocks(pixels: np.ndarray) -> Sequence[np.ndarray]:
 
 def ciede2000(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """Colour difference (H, W) of two linear sRGB images, what is beyond the screen clipped."""
-    import colour
+    colour = colour_science()
 
     space = colour.RGB_COLOURSPACES["sRGB"]
     one, other = (

@@ -29,10 +29,10 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
     Raises `InputError` for numbers that are NaN or infinite, for encoded ones below 0, and for light that is
     too bright for float32.
 
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), None).round(3)
-    array([0.   , 0.216, 1.   ], dtype=float32)
-    >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").round(3)
-    array([0.   , 0.502, 1.   ], dtype=float32)
+    >>> to_radiance(np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
+    [0.0, 0.216, 1.0]
+    >>> to_radiance(np.array([0, 128, 255], np.uint8), "linear").astype(float).round(3).tolist()
+    [0.0, 0.502, 1.0]
     """
     whole = numbers.dtype.kind == "u"
     if not whole and not np.isfinite(numbers).all():

@@ -178,8 +178,8 @@ def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
     If the rate is r, non-zero samples have the mean m = r / (1 - exp(-r)) and the variance
     m (1 + r - m). The rate is found from the mean by Newton's method; a mean of 1 or less is rate 0.
 
-    >>> truncated_poisson_variance(np.array([1.0, 2.0, 50.0])).round(3)
-    array([ 0.   ,  1.187, 50.   ])
+    >>> truncated_poisson_variance(np.array([1.0, 2.0, 50.0])).round(3).tolist()
+    [0.0, 1.187, 50.0]
     """
     m = np.maximum(np.asarray(mean, dtype=np.float64), 1.0)
     rate = np.maximum(2 * (m - 1), 1e-9)  # exact to second order at small rates; m itself at large
