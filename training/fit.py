@@ -22,11 +22,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from pcii.depth.network_inputs import NetworkInputs
+from pcii.depth.surface_network import MULTIPLE
 from training.layers import DepthNetwork
 
 HELD_OUT = 12
-MULTIPLE = 32
-"""Blocks of a cell of the coarsest level."""
 MOST_VALUES = 900_000
 """Blocks times planes of the part of an example that is used at once."""
 LEAST_SIDE = 96
@@ -35,7 +35,7 @@ RATE, WARM_UP, DECAY = 1.5e-3, 0.02, 1e-4
 AVERAGE = 0.995
 NO_SURFACE = 0.5
 """Weight of blocks without a surface."""
-INPUTS = ("evidence", "brightness", "coverage", "surface", "light")
+INPUTS = NetworkInputs._fields
 
 Example = tuple[list[Tensor], Tensor]
 
@@ -66,17 +66,16 @@ def fit(network: DepthNetwork, folder: Path, out: Path, minutes: float, threads:
     replicas = [copy.deepcopy(network) for _ in range(threads)]
     optimizer = torch.optim.AdamW(network.parameters(), lr=RATE, weight_decay=DECAY, betas=(0.9, 0.99))
     start = shown = time.monotonic()
-    steps, losses = 0, list[float]()
+    steps, losses, files = 0, list[float](), by_scene(folder)
     with ThreadPoolExecutor(threads) as pool, out.with_suffix(".csv").open("w", newline="") as stream:
         curve = csv.writer(stream)
         curve.writerow(["minutes", "steps", "training_nats", "held_out_nats", "off", "off_of_surface"])
         while (done := (time.monotonic() - start) / 60 / minutes) < 1:
-            files = by_scene(folder)
             for group in optimizer.param_groups:
                 group["lr"] = RATE * min(1, done / WARM_UP) * (0.5 + 0.5 * np.cos(np.pi * done)) + 1e-6
-            own = [files[rng.integers(len(files))] for _ in replicas]  # all kinds of scene alike
+            kinds = [files[rng.integers(len(files))] for _ in replicas]  # all kinds of scene alike
             chosen = [
-                (each[rng.integers(len(each))], np.random.default_rng(rng.integers(2**32))) for each in own
+                (each[rng.integers(len(each))], np.random.default_rng(rng.integers(2**32))) for each in kinds
             ]
             for replica in replicas:
                 replica.load_state_dict(network.state_dict())

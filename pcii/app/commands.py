@@ -10,7 +10,7 @@ from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
 from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
-from pcii.base.command_output import answer_json, results_beside, say, say_next, say_next_page
+from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 
@@ -40,7 +40,7 @@ def sample(*, out: Out) -> None:
 
     copy_sample(out)
     say(f"{out}")
-    say_next("pcii", "run", out, "-o", results_beside(out))
+    say_next("pcii", "run", out, "-o", results_folder(out))
 
 
 @app.command

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from pcii.app.command_options import Depths, Out
-from pcii.base.command_output import answer, results_beside, say, say_next
+from pcii.base.command_output import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.core.images import Views
@@ -182,7 +182,7 @@ def import_dataset(
     if warning is not None:
         answer(f"warning: {warning}; then delete {out} and import again")
     else:
-        say_next("pcii", "run", out, "-o", results_beside(out))
+        say_next("pcii", "run", out, "-o", results_folder(out))
 
 
 def _optics(

@@ -38,7 +38,7 @@ def say_next_page(path: Path) -> None:
     say_next("python3", "-m", "webbrowser", path)
 
 
-def results_beside(folder: Path) -> Path:
+def results_folder(folder: Path) -> Path:
     """Folder that is suggested for the results of a dataset or collection."""
     return folder.parent / f"{folder.name}-results"
 

@@ -12,7 +12,7 @@ from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.evidence.texture_evidence import TextureEvidence
 from pcii.sections.photon_statistics import cell_sums
 
-CELL_BLOCKS = 2
+CELL_SIDE_BLOCKS = 2
 """Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""
 MOST_RATE = 25.0
 """Of the mean of the film; brighter blocks are taken as so bright."""
@@ -48,7 +48,8 @@ def inputs_of(
 
     nats, sums, samples = (padded(part) for part in (evidence.nats, evidence.sums, evidence.samples))
     in_cells = [
-        np.stack([cell_sums(plane, CELL_BLOCKS, np.float32) for plane in part]) for part in (nats, samples)
+        np.stack([cell_sums(plane, CELL_SIDE_BLOCKS, np.float32) for plane in part])
+        for part in (nats, samples)
     ]
     posterior = surface_posterior(in_cells[0], prior).transpose(2, 0, 1)
     ratio = np.log(np.maximum(posterior * len(nats), np.float32(np.exp(LEAST_LOG_RATIO))))
@@ -59,7 +60,7 @@ def inputs_of(
     return NetworkInputs(
         np.arcsinh(nats),
         np.sqrt(np.clip(rate, 0, MOST_RATE)),
-        in_cells[1] / np.float32(samples_per_block * CELL_BLOCKS**2),
+        in_cells[1] / np.float32(samples_per_block * CELL_SIDE_BLOCKS**2),
         np.minimum(ratio, np.float32(MOST_LOG_RATIO)),
         np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32),
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pcii.depth.network_inputs import CELL_BLOCKS, NetworkInputs
+from pcii.depth.network_inputs import CELL_SIDE_BLOCKS, NetworkInputs
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
@@ -30,14 +30,14 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     trunk, head = _sessions(threads())
     Z, h, w = inputs.evidence.shape
     features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, inputs._asdict()))
-    nothing = cell_nothing[0, 0].repeat(CELL_BLOCKS, axis=0).repeat(CELL_BLOCKS, axis=1)
+    nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
-    rows = max(1, BAND_VALUES // (Z * w)) * CELL_BLOCKS
+    rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
     for top in range(0, h, rows):
         end = min(top + rows, h)
         # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
-        first, last = max(top - CELL_BLOCKS, 0), min(end + CELL_BLOCKS, h)
-        cells = np.s_[:, :, first // CELL_BLOCKS : last // CELL_BLOCKS]
+        first, last = max(top - CELL_SIDE_BLOCKS, 0), min(end + CELL_SIDE_BLOCKS, h)
+        cells = np.s_[:, :, first // CELL_SIDE_BLOCKS : last // CELL_SIDE_BLOCKS]
         blocks = np.s_[:, first:last]
         parts = features[cells], cell_logit[cells], inputs.evidence[blocks], inputs.brightness[blocks]
         names = [argument.name for argument in head.get_inputs()]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from cyclopts import Parameter
 
 from pcii.base import command_line
-from pcii.base.command_output import answer, answer_json, results_beside, say, say_next
+from pcii.base.command_output import answer, answer_json, results_folder, say, say_next
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, new_recipe, new_scene
@@ -112,7 +112,7 @@ def generate(
             manifest = make(sweep.recipe(0), sweep.near, out, report)
             write_card(out, terms)
             say(_made(out, manifest))
-            say_next("pcii", "run", out, "-o", results_beside(out))
+            say_next("pcii", "run", out, "-o", results_folder(out))
             return 0
         faults = generate_collection(sweep, out, crew, report)
         write_card(out, terms)
@@ -159,7 +159,7 @@ def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))
 
     write_sheet(dataset, out)
     say(f"{out}")
-    say_next("pcii", "run", dataset, "-o", results_beside(dataset))
+    say_next("pcii", "run", dataset, "-o", results_folder(dataset))
 
 
 @app.command

@@ -123,7 +123,7 @@ def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Mode
 def faults_of(source: str, sentences: Sequence[str], number: int) -> InputError:
     """An error that tells a `number` of faults of a file: the first in its text, the next as notes.
 
-    The first `MOST_FAULTS` of `sentences` are told, each in one line.
+    The first `MOST_FAULTS` of `sentences` are listed, each in one line.
     """
     first, *others = (shorten(sentence) for sentence in sentences[:MOST_FAULTS])
     fault = InputError(f"{source}: {first}" + (f" (and {number - 1} more)" if number > 1 else ""))
