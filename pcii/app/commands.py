@@ -77,7 +77,7 @@ def run(
     if outcome.kept:
         say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
     for row in outcome.score.planes:
-        if row["truth"] == "object" and row["iou"] is not None:
+        if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")

@@ -122,8 +122,8 @@ def segment(
         Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that the recipe
         names.
     method
-        three-step (of the paper), likelihood (Poisson), brightness, variance or shape-from-focus (for
-        comparison), or a method that an installed package registers.
+        three-step (of the paper), likelihood (Poisson), posterior (of depth), brightness, variance or
+        shape-from-focus (for comparison), or a method that an installed package registers.
     without
         Leave out one of the three steps; repeat for more.
     subpixel

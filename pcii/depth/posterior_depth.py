@@ -51,17 +51,25 @@ class PosteriorDepth:
 
     def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
+        posterior, seen = self.posterior_and_seen(data, z_range_mm)
+        _, confidence, total_px = posterior.most_probable()
+        depth = np.where(seen, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
+        maps = depth, np.where(seen, confidence, 0.0)
+        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
+
+    def posterior_and_seen(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
+    ) -> tuple[DepthPosterior, np.ndarray]:
+        """The posterior of planes through the range, and in which blocks (h, w) bool a surface is seen."""
         data = _without_faults(data)
         posterior, photons = self._posterior(data, z_range_mm)
-        plane, confidence, total_px = posterior.most_probable()
+        plane = posterior.most_probable()[0]
         seen = self._has_photons(photons, plane, posterior.block_px)
         seen &= posterior.no_surface <= self.most_empty
         if isinstance(data, PhotonCounts):
             agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
             seen &= agree | self._in_agreeing_region(agree, posterior)
-        depth = np.where(seen, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
-        maps = depth, np.where(seen, confidence, 0.0)
-        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
+        return posterior, seen
 
     def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
         """The posterior of planes through the range."""

@@ -6,6 +6,7 @@ from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts, check_depth_counts
 from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
+from pcii.removal.posterior_masks import PosteriorMasks
 from pcii.removal.simple_methods import brightness, shape_from_focus, variance
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.reconstruction import reconstruct
@@ -15,9 +16,10 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     """In-focus masks (Z, H, W), bool, of the sections at the depths `z_mm`.
 
     `method` is one of `pcii.removal_methods()`: "three-step" (Muniraj et al. 2017, Eqs. 7-9), "likelihood",
-    a simple one to compare them with ("brightness", "variance", "shape-from-focus"), or one that an
-    installed package registers; or a function that returns a `Segmented` for counts and their sections, such
-    as `ThreeStep(entropy=False)`. No method is given the number of objects, their colours or their depths.
+    "posterior" (of depth), a simple one to compare them with ("brightness", "variance",
+    "shape-from-focus"), or one that an installed package registers; or a function that returns a `Segmented`
+    for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
+    objects, their colours or their depths.
     Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a
     single view, or a registered method whose result is not a `Segmented` of these sections.
 
@@ -66,6 +68,7 @@ def find_method(name: str) -> plugins.Method:
 METHODS: dict[str, plugins.Method] = {
     "three-step": ThreeStep(),
     "likelihood": remove_by_likelihood,
+    "posterior": PosteriorMasks(),
     "brightness": brightness,
     "variance": variance,
     "shape-from-focus": shape_from_focus,

@@ -113,7 +113,7 @@ def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFi
         ("both", ["depth", "variance"], [FULL_LIGHT], "'variance' needs photon counts"),
         ("views", ["depth:focus"], [], "use depth:posterior, depth:variance-sweep, depth:structure-tensor$"),
         ("counts", [], [FULL_LIGHT], "has no radiance, and budget 'full-light' is of that"),
-        ("both", ["posterior"], [], "no method named 'posterior'; use depth, .*, depth:posterior"),
+        ("both", ["focus"], [], "no method named 'focus'; use depth, .*, depth:focus"),
         ("views", [], [300], "no photons of budget 300 here"),
     ],
 )

@@ -11,7 +11,7 @@ from pcii.imaging.bright_regions import roberts_magnitude, without_specks
 from pcii.removal.methods import segment
 from pcii.sections.probe_planes import with_probes
 
-ABLE = ["three-step", "likelihood"]
+ABLE = ["three-step", "likelihood", "posterior"]
 methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "variance", "shape-from-focus"])
 able = pytest.mark.parametrize("method", ABLE)
 

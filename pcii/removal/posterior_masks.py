@@ -1,0 +1,62 @@
+"""Removal of defocused points by the posterior probability of depth (`pcii.depth.posterior_depth`).
+
+A block is in focus at a plane if the surface is more probably near it than not: within half of the distance
+to the next plane, in total disparity, so that a round object belongs to one plane as a whole, and at most
+`within_px`. Nothing is claimed where the depth map has no answer.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pcii.core.estimates import DepthPosterior, Segmented
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import depth_of_total_disparity_mm
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.section_stack import Sections
+from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.sections.photon_statistics import cells_to_pixels
+
+
+@dataclass(frozen=True)
+class PosteriorMasks:
+    """The method with its constants, beside those of depth."""
+
+    depth: PosteriorDepth = field(default_factory=PosteriorDepth)
+    within_px: float = 10.0
+    """What is farther from a plane in total disparity has a blur half-extent above 5 px, and is defocused."""
+    around_px: float = 20.0
+    """Depths are compared so far beyond the planes, since what is defocused is to be found as well."""
+
+    def __call__(self, counts: PhotonCounts, sections: Sections) -> Segmented:
+        """In-focus masks (Z, H, W) of the sections.
+
+        `steps` holds `probability` (Z, H, W) float32, that of a surface near the plane.
+        """
+        planes = sections.planes
+        posterior, seen = self.depth.posterior_and_seen(counts, self.range_mm(planes))
+        near = self.probability_near(posterior, planes.total_disparity_px)
+
+        def on_pixels(blocks: np.ndarray) -> np.ndarray:
+            return np.stack([cells_to_pixels(each, posterior.block_px, counts.grid) for each in blocks])
+
+        in_focus = on_pixels((near > 0.5) & seen)
+        return Segmented(in_focus, "posterior", sections, {"probability": on_pixels(near)})
+
+    def probability_near(self, posterior: DepthPosterior, planes_px: np.ndarray) -> np.ndarray:
+        """Probability (P, h, w) float32 of a surface near each plane, given by its total disparity (P,)."""
+        own_px, which = np.unique(planes_px, return_inverse=True)
+        gaps_px = np.diff(own_px, prepend=-np.inf, append=np.inf)
+        away_px = posterior.planes.total_disparity_px[:, None] - own_px
+        within_px = [np.minimum(gaps / 2, self.within_px) for gaps in (gaps_px[:-1], gaps_px[1:])]
+        near = (-within_px[0] < away_px) & (away_px <= within_px[1])
+        near = np.tensordot(near.T.astype(np.float32), posterior.probability, axes=1)
+        return near[which]
+
+    def range_mm(self, planes: FocalPlanes) -> tuple[float, float]:
+        """Near and far ends of the depths around the planes; no less than half of the least disparity."""
+        total_px = planes.total_disparity_px
+        nearest_px = total_px.max() + self.around_px
+        farthest_px = max(total_px.min() - self.around_px, total_px.min() / 2)
+        near_mm, far_mm = depth_of_total_disparity_mm(planes.grid, np.array([nearest_px, farthest_px]))
+        return float(near_mm), float(far_mm)
