@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import Measured, Parameter, Row, Study, Value, label
-from pcii.evaluation.plots import COLOURS, MARKERS
+from pcii.figures.palette import COLOURS, MARKERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

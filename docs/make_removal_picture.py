@@ -13,7 +13,7 @@ matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
 import pcii
-from pcii.imaging.pictures import to_srgb8, white_level
+from pcii.figures.pictures import to_srgb8, white_level
 from pcii.metrics.scoring import object_masks
 
 WINDOW = np.s_[330:700, 180:850]

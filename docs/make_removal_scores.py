@@ -21,8 +21,8 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from benchmarks.corpus import Entry, load_corpus
 from pcii.evaluation.method_names import DEPTH, full_name
-from pcii.evaluation.plots import COLOURS, MARKERS
 from pcii.evaluation.tables import Table, markdown
+from pcii.figures.palette import COLOURS, MARKERS
 
 Group = Mapping[str, Any]
 KINDS = ("paper", "textured", "untextured", "cluttered")

@@ -7,13 +7,13 @@ inside the functions that need them.
 __version__ = "0.1.0"
 
 from pcii.base.errors import InputError
+from pcii.base.srgb import srgb_to_linear
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap, DepthPosterior, Score, Segmented
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import limit_photons
 from pcii.core.section_stack import Sections
-from pcii.core.srgb import srgb_to_linear
 from pcii.core.truth import Truth
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate

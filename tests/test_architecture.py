@@ -14,6 +14,7 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
+        "figures",
         "core",
         "io",
         "imaging",

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pcii.app.pipeline import Outcome
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.estimates import Segmented
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
-from pcii.imaging import pictures as picture
+from pcii.figures import pictures as picture
+from pcii.figures.exposure import block_sums, encoded, filled_means
 from pcii.imaging.bright_regions import box_around
 from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.true_masks import object_masks, pixel_masks
 from pcii.sections.demosaicing import demosaic
-from pcii.sections.photon_statistics import cell_sums
 
 LONGEST_PX = 640
 """Longer sides of pictures are shown at one of 2 x 2 pixels, or of more."""
@@ -56,15 +58,13 @@ class Crop:
 
     def sums(self, image: np.ndarray) -> np.ndarray:
         """Sums over the blocks of an image (H, W, C)."""
-        part = np.moveaxis(image[self.rows, self.cols], -1, 0)
-        kind = np.float64 if image.dtype.kind == "f" else np.int64
-        return np.moveaxis(cell_sums(part, self.step_px, kind), 0, -1)
+        return block_sums(image[self.rows, self.cols], self.step_px)
 
 
 def crop_of(outcome: Outcome) -> Crop:
     """The objects with a margin, or what was found in focus; else the whole frame."""
     dataset = outcome.dataset
-    box = box_around(picture.interesting_part(dataset.grid, dataset.truth, outcome.focus))
+    box = box_around(_interesting_part(dataset.grid, dataset.truth, outcome.focus))
     longest = max(side.stop - side.start for side in box)
     return Crop(*box, -(-longest // LONGEST_PX))
 
@@ -73,28 +73,10 @@ def block_estimate(sections: Sections, plane: int, crop: Crop) -> tuple[np.ndarr
     """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples.
 
     At some depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the
-    estimate is that of the 3 x 3 blocks around, so that no depth has a tint.
+    estimate is that of the blocks around.
     """
-    counts, samples = crop.sums(sections.counts[plane]), crop.sums(sections.coverage[plane])
-    around = (_sums_around(values) for values in (counts, samples))
-    counts, weights = (
-        np.where(samples > 0, own, near) for own, near in zip((counts, samples), around, strict=True)
-    )
-    return counts / np.maximum(weights, 1), samples
-
-
-def _sums_around(blocks: np.ndarray) -> np.ndarray:
-    """Sums over each block (h, w, C) and the eight around it."""
-    height, width = blocks.shape[:2]
-    padded = np.pad(blocks, ((1, 1), (1, 1), (0, 0)))
-    rows = sum(padded[a : a + height] for a in range(3))
-    return sum(rows[:, b : b + width] for b in range(3))  # type: ignore[index]
-
-
-def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """8-bit pictures of block estimates with their samples, all at the same exposure."""
-    white = max(picture.white_level(estimate, samples=samples) for estimate, samples in blocks)
-    return [picture.to_srgb8(estimate, white) for estimate, _ in blocks]
+    samples = crop.sums(sections.coverage[plane])
+    return filled_means(crop.sums(sections.counts[plane]), samples), samples
 
 
 def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
@@ -126,7 +108,7 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
         panels.append(_drawing(image, caption))
     if dataset.truth is not None:
         near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
-        image = picture.depth_image(crop.middles(depth_of_objects(dataset.truth)), near, far)
+        image = picture.depth_image(crop.middles(dataset.truth.object_z_mm), near, far)
         panels.append(
             _drawing(
                 image, f"({next(letters)}) {_true_depth_words(dataset.truth)} (colour scale under Depth)"
@@ -169,7 +151,7 @@ def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:
     image = picture.depth_image(found, near, far, sure)
     panels = [_drawing(image, "estimated depth, darker where less sure")]
     if truth is not None:
-        true = crop.middles(depth_of_objects(truth))
+        true = crop.middles(truth.object_z_mm)
         panels.append(_drawing(picture.depth_image(true, near, far), _true_depth_words(truth)))
         error, limit = depth_error_mm(outcome, crop)
         image = picture.error_image(error, limit)
@@ -186,18 +168,12 @@ def depth_error_mm(outcome: Outcome, crop: Crop) -> tuple[np.ndarray, float]:
     """
     truth = outcome.dataset.truth
     assert truth is not None
-    found, true = crop.middles(outcome.depth.z_mm), crop.middles(depth_of_objects(truth))
+    found, true = crop.middles(outcome.depth.z_mm), crop.middles(truth.object_z_mm)
     both = np.isfinite(found) & np.isfinite(true)
     error = np.full(found.shape, np.nan)
     error[both] = found[both] - true[both]
     limit = float(np.quantile(np.abs(error[both]), SATURATED)) if both.any() else 1.0
     return error, float(f"{max(limit, 1e-3):.1e}")
-
-
-def depth_of_objects(truth: Truth) -> np.ndarray:
-    """True depth of the objects, +inf elsewhere; of everything, if the truth knows no objects."""
-    has_objects = (truth.object_id > 0).any()
-    return np.where(truth.object_id > 0, truth.z_mm, np.inf) if has_objects else truth.z_mm
 
 
 def _true_depth_words(truth: Truth) -> str:
@@ -224,3 +200,15 @@ def _photo(image: np.ndarray, caption: str) -> Panel:
 
 def _drawing(image: np.ndarray, caption: str) -> Panel:
     return {"image": picture.data_uri(image), "caption": caption}
+
+
+def _interesting_part(grid: CameraGrid, truth: Truth | None, focus: Sequence[Segmented]) -> np.ndarray:
+    """Mask (H, W) of the true objects; if there are none, of all points that a method found in focus.
+
+    Without methods it is the whole image.
+    """
+    if truth is not None and (truth.object_id > 0).any():
+        return truth.object_id > 0
+    if not focus:
+        return np.ones((grid.height, grid.width), dtype=bool)
+    return np.logical_or.reduce([segmented.in_focus.any(axis=0) for segmented in focus])

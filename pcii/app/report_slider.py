@@ -12,14 +12,15 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, block_estimate, encoded
+from pcii.app.report_figures import Crop, block_estimate
 from pcii.base.progress import Report
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
-from pcii.imaging import pictures as picture
+from pcii.figures import pictures as picture
+from pcii.figures.exposure import encoded
 from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.true_masks import object_masks
 from pcii.sections.reconstruction import reconstruct

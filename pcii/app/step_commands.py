@@ -43,7 +43,7 @@ def reconstruct(
     shifts
         `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
-    from pcii.imaging.pictures import to_srgb8, white_level, write_png
+    from pcii.figures.pictures import to_srgb8, white_level, write_png
     from pcii.io.suggested_depths import planes_of
     from pcii.sections.demosaicing import demosaic
     from pcii.sections.reconstruction import reconstruct as make
@@ -81,7 +81,7 @@ def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget 
         structure-tensor; or one that a package registers.
     """
     from pcii.depth.methods import estimate_depth
-    from pcii.imaging.pictures import depth_image, write_png
+    from pcii.figures.pictures import depth_image, write_png
     from pcii.io.suggested_depths import depth_range_of
 
     data = opened(dataset, budget)
@@ -130,7 +130,7 @@ def segment(
         Find the outlines of the three steps on this many voxels per pixel and axis.
     """
     from pcii.base.errors import InputError
-    from pcii.imaging.pictures import mask_image, write_png
+    from pcii.figures.pictures import mask_image, write_png
     from pcii.io.suggested_depths import planes_of
     from pcii.removal.methods import find_method
     from pcii.removal.methods import segment as remove

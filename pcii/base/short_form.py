@@ -1,4 +1,4 @@
-"""Short representations of objects that hold large arrays: one line, and a small table in notebooks."""
+"""Short representations of objects that hold large arrays: one line; in notebooks a table and pictures."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -28,8 +28,12 @@ class Brief(ABC):
         line = f"{type(self).__name__}({facts})"
         return line if len(line) <= LONGEST else f"{line[: LONGEST - 2]}…)"
 
+    def _thumbnails(self) -> Mapping[str, str]:
+        """Small pictures for notebooks: data URIs by caption."""
+        return {}
+
     def _repr_html_(self) -> str:
-        return table(type(self).__name__, self._known_facts())
+        return table(type(self).__name__, self._known_facts()) + side_by_side(self._thumbnails())
 
 
 def table(caption: str, rows: Sequence[Sequence[object]], header: Sequence[str] = ()) -> str:
@@ -39,6 +43,15 @@ def table(caption: str, rows: Sequence[Sequence[object]], header: Sequence[str] 
         f"<tr>{''.join(f'<td>{in_html(_figure(cell))}</td>' for cell in row)}</tr>" for row in rows
     )
     return f"<table><caption>{in_html(caption)}</caption><tr>{names}</tr>{body}</table>"
+
+
+def side_by_side(uris: Mapping[str, str]) -> str:
+    """Pictures side by side in HTML, each with its caption; nothing if there are none."""
+    cells = "".join(
+        f'<td><img src="{in_html(uri)}" alt="{in_html(caption)}"><br>{in_html(caption)}</td>'
+        for caption, uri in uris.items()
+    )
+    return f"<table><tr>{cells}</tr></table>" if uris else ""
 
 
 def _figure(value: object) -> object:

@@ -1,4 +1,4 @@
-"""Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes, sRGB.
+"""Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes.
 
 array_labels   What every array is: the names of its axes, its meaning and its unit, in files and in
                xarray alike.
@@ -13,9 +13,8 @@ photon_counts  Photon counts of the elemental images, as sparse events or as a d
 photon_limit   Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
-srgb           sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values,
-               luminance.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
+view_figures   Pictures of elemental images: which view, its colours, its exposure.
 xarray_form    The types as datasets of xarray: named axes, coordinates with units, the camera grid as
                attributes.
 """

@@ -56,6 +56,16 @@ def colour_index(height: int, width: int, cfa: str | None) -> np.ndarray:
     return np.tile(cells, ((height + 1) // 2, (width + 1) // 2))[:height, :width]
 
 
+def by_colour(pixels: np.ndarray, cfa: str | None) -> np.ndarray:
+    """Pixels (H, W) of a mosaic in the channels (H, W, C) of their colours, 0 in the others; same dtype.
+
+    >>> by_colour(np.array([[2, 4]]), "GRBG").tolist()
+    [[[0, 2, 0], [4, 0, 0]]]
+    """
+    colours = colour_index(pixels.shape[0], pixels.shape[1], cfa)[..., None]
+    return pixels[..., None] * (colours == np.arange(channel_count(cfa)))
+
+
 def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
     """Bayer mosaic (..., H, W) of a colour image (..., H, W, 3), same dtype: one colour of each pixel.
 

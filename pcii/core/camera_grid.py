@@ -2,11 +2,15 @@
 
 import math
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.short_form import Brief, times
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def _check_size(name: str, value: object) -> None:
@@ -25,7 +29,7 @@ def _check_length(name: str, value: object) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraGrid:
+class CameraGrid(Brief):
     """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
 
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,
@@ -72,6 +76,23 @@ class CameraGrid:
             raise InputError(f"shear_px: expected two finite numbers (x, y) of pixels, got {shear!r}")
         object.__setattr__(self, "shear_px", (float(shear[0]), float(shear[1])))
 
+    def _facts(self) -> dict[str, object]:
+        across, down = self.baseline_mm
+        return {
+            "cameras": times((self.rows, self.cols)),
+            "pitch_mm (x, y)": "{:g}, {:g}".format(*self.pitch_mm),
+            "baseline_mm (x, y)": f"{across:g}, {down:g}",
+            "focal_mm": f"{self.focal_mm:g}",
+            "image": times((self.height, self.width)),
+            "pixel_mm": f"{self.pixel_mm:g}",
+            "shear_px (x, y)": "{:g}, {:g}".format(*self.shear_px) if any(self.shear_px) else None,
+        }
+
+    @property
+    def baseline_mm(self) -> tuple[float, float]:
+        """Distance of the first and the last camera in mm, (x, y); 0 where there is one."""
+        return (self.cols - 1) * self.pitch_mm[0], (self.rows - 1) * self.pitch_mm[1]
+
     @property
     def view_count(self) -> int:
         """Number of cameras, rows x cols."""
@@ -81,3 +102,25 @@ class CameraGrid:
     def shape_KLHW(self) -> tuple[int, int, int, int]:
         """Shape (K, L, H, W) of one monochrome stack of views."""
         return (self.rows, self.cols, self.height, self.width)
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """Draw where the cameras stand, in mm, with both baselines and the virtual centre.
+
+        Draws into `axes`, by default of a new figure, and returns them. Raises `InputError` if they are no
+        Matplotlib axes.
+        """
+        from pcii.figures.charts import draw_cameras
+        from pcii.figures.panels import one_axes
+
+        axes = one_axes(axes, (4.0, 4.0))
+        (across, down), K, L = self.baseline_mm, self.rows, self.cols
+        x_mm, y_mm = np.linspace(-across / 2, across / 2, L), np.linspace(-down / 2, down / 2, K)
+        pitch = "{:g}, {:g}".format(*self.pitch_mm)
+        draw_cameras(axes, x_mm, y_mm, f"{K} x {L} cameras, pitch {pitch} mm (x, y)")
+        return axes
+
+
+def check_camera(grid: CameraGrid, k: int, l: int) -> None:
+    """Raise `InputError` for a camera outside the grid."""
+    if not (0 <= k < grid.rows and 0 <= l < grid.cols):
+        raise InputError(f"view: there is no camera ({k}, {l}) in a grid of {grid.rows} x {grid.cols}")

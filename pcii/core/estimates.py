@@ -1,6 +1,6 @@
 """Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,10 @@ from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
+
+DEPTH_SHOWN = ("median_mm", "mae_mm", "median_px", "bad_1px", "bad_3px", "coverage", "ece")
+"""Scores of depth that a notebook shows."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -58,6 +62,9 @@ class Segmented(Brief):
             "in_focus": listed(shares),
         }
 
+    def _thumbnails(self) -> dict[str, str]:
+        return self.sections.thumbnails(self.in_focus)
+
     @property
     def z_mm(self) -> np.ndarray:
         """Depths of the sections (Z,) float64."""
@@ -67,6 +74,22 @@ class Segmented(Brief):
     def cleaned(self) -> np.ndarray:
         """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
         return self.sections.estimate * self.in_focus[..., None]
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+        """Draw each section after removal with the outline of its mask, and return the Matplotlib axes (N,).
+
+        Panels, exposure and `axes` are those of `Sections.plot`.
+        """
+        from pcii.figures.palette import COLOURS, literal
+        from pcii.figures.panels import outline
+
+        panels, planes = self.sections.draw(axes, self.in_focus)
+        film = self.sections.grid.height, self.sections.grid.width
+        for panel, plane in zip(panels, planes, strict=True):
+            outline(panel, self.in_focus[plane], film, COLOURS[4])
+            share = self.in_focus[plane].mean()
+            panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{literal(self.method)}")
+        return panels
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -90,6 +113,28 @@ class DepthMap(Brief):
         answered = self.z_mm[np.isfinite(self.z_mm)]
         share = f"{answered.size / max(1, self.z_mm.size):.2%}"
         return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
+
+    def _thumbnails(self) -> dict[str, str]:
+        from pcii.figures.maps import depth_limits_mm, depth_thumbnail
+
+        limits = depth_limits_mm(self.z_mm)
+        if limits is None:
+            return {}
+        caption = f"{limits[0]:.4g} mm (yellow) to {limits[1]:.4g} mm (violet)"
+        return {caption: depth_thumbnail(self.z_mm, self.confidence, limits)}
+
+    def plot(self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None) -> "Axes":
+        """Draw depth in mm, darker where less sure, with a colour bar; return the Matplotlib axes.
+
+        The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
+        those of a new figure. Raises `InputError` if they are no Matplotlib axes.
+        """
+        from pcii.figures.maps import draw_depth
+        from pcii.figures.panels import one_axes
+
+        axes = one_axes(axes, self.z_mm.shape)
+        draw_depth(axes, self.z_mm, self.confidence, z_range_mm, "depth, darker where less sure")
+        return axes
 
     def to_xarray(self) -> "xarray.Dataset":
         """`z_mm` and `confidence` over pixels."""
@@ -122,6 +167,45 @@ class DepthPosterior(Brief):
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
+
+    def _thumbnails(self) -> dict[str, str]:
+        from pcii.figures.maps import entropy_thumbnail
+
+        most = self._most_bits()
+        return {
+            f"entropy, 0 (blue) to {most:.3g} bits (yellow)": entropy_thumbnail(self.entropy_bits(), most)
+        }
+
+    def _most_bits(self) -> float:
+        return float(np.log2(len(self.planes) + 1))
+
+    def entropy_bits(self) -> np.ndarray:
+        """Entropy (h, w) of the distribution in bits, float64: 0 is a depth for sure, or surely none."""
+        all_of_it = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
+        logarithm = np.log2(all_of_it, out=np.zeros(all_of_it.shape), where=all_of_it > 0)
+        return np.maximum(-(all_of_it * logarithm).sum(axis=0), 0)
+
+    def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> "Axes":
+        """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
+
+        The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
+        Matplotlib `axes`, by default those of a new figure. Raises `InputError` for a pixel outside the view.
+        """
+        from pcii.figures.charts import draw_probability
+        from pcii.figures.maps import draw_entropy
+        from pcii.figures.panels import one_axes
+
+        film = self.planes.grid.height, self.planes.grid.width
+        if pixel is None:
+            axes = one_axes(axes, film)
+            draw_entropy(axes, self.entropy_bits(), self._most_bits(), film, self.block_px)
+            return axes
+        i, j = _checked_pixel(pixel, film)
+        axes = one_axes(axes)
+        a, b = i // self.block_px, j // self.block_px
+        title = f"pixel ({i}, {j}), no surface: {self.no_surface[a, b]:.1%}"
+        draw_probability(axes, self.planes.z_mm, self.probability[:, a, b], title)
+        return axes
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.
@@ -164,7 +248,21 @@ class Score(Brief):
     def _repr_html_(self) -> str:
         names = ("z_mm", "method", "truth", "object", "iou", "precision", "recall", "boundary_f")
         rows = [[row.get(name) for name in names] for row in self.planes]
-        return table(repr(self), rows, names)
+        shown = table(repr(self), rows, names)
+        errors = [(name, self.depth[name]) for name in DEPTH_SHOWN if self.depth.get(name) is not None]
+        return shown + (table("depth", errors) if errors else "")
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+        """Draw what is scored, a panel each, and return the Matplotlib axes (N,).
+
+        Masks: the IoU of the objects in each plane by method, beside the best that follows from true depth.
+        Depth: shares of errors and answers. Confidence: how often depths are right, of those that state as
+        much. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
+        number.
+        """
+        from pcii.figures.score_panels import draw_score
+
+        return draw_score(axes, self.planes, self.bounds, self.depth)
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""
@@ -175,3 +273,13 @@ class Score(Brief):
             "depth": dict(self.depth),
             "bounds": dict(self.bounds),
         }
+
+
+def _checked_pixel(pixel: tuple[int, int], film: tuple[int, int]) -> tuple[int, int]:
+    is_pair = isinstance(pixel, tuple | list) and len(pixel) == 2
+    if not is_pair or not all(isinstance(n, int | np.integer) for n in pixel):
+        raise InputError(f"pixel: expected (row, column), got {pixel!r}")
+    i, j = int(pixel[0]), int(pixel[1])
+    if not (0 <= i < film[0] and 0 <= j < film[1]):
+        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {film[0]} x {film[1]}")
+    return i, j

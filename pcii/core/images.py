@@ -1,7 +1,7 @@
 """Elemental images: the radiance of every view."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from pcii.core.array_labels import VIEWS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.view_figures import chosen_camera, draw_light, light_thumbnail, middle_camera
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 
 class ArrayLike5D(Protocol):
@@ -67,6 +69,13 @@ class Views(Brief):
     def _facts(self) -> dict[str, object]:
         return {"shape": times(self.radiance.shape), "cfa": self.cfa}
 
+    def _thumbnails(self) -> dict[str, str]:
+        k, l = middle_camera(self.grid)
+        try:
+            return {f"view ({k}, {l})": light_thumbnail(self.view(k, l), self.cfa)}
+        except (InputError, OSError):  # no number, or no file: the rest can still be shown
+            return {}
+
     @property
     def channel_count(self) -> int:
         """Number of colours of sections of these views."""
@@ -76,6 +85,23 @@ class Views(Brief):
         """`radiance` over cameras, pixels and channels; views on disk are all read."""
         arrays = {"radiance": np.asarray(self.radiance)}
         return labelled_dataset(arrays, VIEWS_LABELS, grid=self.grid, cfa=self.cfa)
+
+    def plot(
+        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
+    ) -> "Axes":
+        """Draw the elemental image of the camera `view`, (k, l), in colours and return the Matplotlib axes.
+
+        The default is the camera in the middle; "mean" is the mean of all views. The 98th percentile of what
+        is lit is white. A mosaic's pixels take the colours that they lack from those around. `axes` are by
+        default those of a new figure. Raises `InputError` for a camera outside the grid, or NaN or infinity.
+        """
+        camera = chosen_camera(self.grid, view)
+        if camera is None:
+            light = np.zeros(self.radiance.shape[2:])
+            for k, l in np.ndindex(*self.radiance.shape[:2]):
+                light += self.view(k, l)
+            return draw_light(axes, light, self.cfa, "mean of all views")
+        return draw_light(axes, self.view(*camera), self.cfa, f"view {camera}")
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

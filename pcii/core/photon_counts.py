@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -12,12 +12,14 @@ from pcii.base.short_form import Brief, times
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
-from pcii.core.camera_grid import CameraGrid
+from pcii.core.camera_grid import CameraGrid, check_camera
 from pcii.core.images import Views
+from pcii.core.view_figures import chosen_camera, draw_light, draw_photons, middle_camera, photon_thumbnail
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40
@@ -121,6 +123,11 @@ class PhotonCounts(Brief):
         kept = "events" if self.is_sparse else "dense"
         return {"shape": times(self.grid.shape_KLHW), "cfa": self.cfa, "photons": self.total, "kept": kept}
 
+    def _thumbnails(self) -> dict[str, str]:
+        k, l = middle_camera(self.grid)
+        counts = self.view(k, l)
+        return {f"view ({k}, {l}), photons: {counts.sum()}": photon_thumbnail(counts)}
+
     @property
     def is_sparse(self) -> bool:
         """Whether the counts are kept as events."""
@@ -161,10 +168,7 @@ class PhotonCounts(Brief):
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l); raises `InputError` for a camera outside the grid."""
-        if not (0 <= k < self.grid.rows and 0 <= l < self.grid.cols):
-            raise InputError(
-                f"view: there is no camera ({k}, {l}) in a grid of {self.grid.rows} x {self.grid.cols}"
-            )
+        check_camera(self.grid, k, l)
         if self._dense is not None:
             return self._dense[k, l]
         events = self.events
@@ -185,6 +189,23 @@ class PhotonCounts(Brief):
     def channel_count(self) -> int:
         """Number of colours of sections of these counts: 3, or 1 for monochrome."""
         return channel_count(self.cfa)
+
+    def plot(
+        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
+    ) -> "Axes":
+        """Draw the photons of the camera `view`, (k, l), and return the Matplotlib axes.
+
+        The default is the camera in the middle. "mean" is the mean of all views, in colours. `axes` are by
+        default those of a new figure. Raises `InputError` for a camera outside the grid.
+        """
+        camera = chosen_camera(self.grid, view)
+        if camera is not None:
+            counts = self.view(*camera)
+            return draw_photons(axes, counts, f"view {camera}, photons: {counts.sum()}")
+        views = np.ndindex(self.grid.rows, self.grid.cols)
+        light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
+        title = f"mean of all views, photons: {self.total}"
+        return draw_light(axes, light[..., None], self.cfa, title)
 
     def to_xarray(self) -> "xarray.Dataset":
         """The counts as they are kept: events `k`, `l`, `i`, `j`, `n`, or `dense` over cameras and pixels."""

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.srgb import LUMINANCE
 from pcii.core.bayer import channel_count, colour_index, mosaic
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.srgb import LUMINANCE
 
 MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""

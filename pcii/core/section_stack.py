@@ -1,5 +1,6 @@
 """Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -10,13 +11,14 @@ from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed, times
 from pcii.core.array_labels import SECTIONS_LABELS
 from pcii.core.arrays import read_only
-from pcii.core.bayer import check_cfa
+from pcii.core.bayer import by_colour, check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 Normalisation = Literal["overlap", "views"]
 Shifts = Literal["nearest", "bilinear", "even"]
@@ -65,6 +67,9 @@ class Sections(Brief):
             "cfa": self.cfa,
         }
 
+    def _thumbnails(self) -> dict[str, str]:
+        return self.thumbnails(None)
+
     @property
     def grid(self) -> CameraGrid:
         """The cameras."""
@@ -101,3 +106,52 @@ class Sections(Brief):
         return labelled_dataset(
             arrays, labels, grid=self.grid, cfa=self.cfa, planes_mm=self.z_mm, subpixel=self.subpixel
         )
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+        """Draw the sections in their colours, a panel each, and return the Matplotlib axes (N,).
+
+        All have the same exposure, as in a report: the 98th percentile of what is lit is white, each mean
+        counting as often as it has samples. Of more than 12 sections 12 are drawn, from the first to the
+        last. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
+        number of them.
+        """
+        return self.draw(axes, None)[0]
+
+    def draw(
+        self, axes: "Axes | Sequence[Axes] | np.ndarray | None", kept: np.ndarray | None
+    ) -> tuple[np.ndarray, list[int]]:
+        """Draw as `plot` does, only points that are `kept`, bool (Z, H, W); the axes and the planes shown."""
+        from pcii.figures.exposure import PANEL_PX, block_px, evenly_chosen
+        from pcii.figures.panels import MOST_PANELS, several_axes, show_picture
+
+        film, planes = (self.grid.height, self.grid.width), evenly_chosen(len(self.planes), MOST_PANELS)
+        panels = several_axes(axes, len(planes), film)
+        block = block_px(self.counts.shape[1:3], PANEL_PX) / self.subpixel
+        for panel, plane, image in zip(panels, planes, self._pictures(planes, PANEL_PX, kept), strict=True):
+            show_picture(panel, image, film, f"section at {self.z_mm[plane]:.5g} mm", block)
+        return panels, planes
+
+    def thumbnails(self, kept: np.ndarray | None) -> dict[str, str]:
+        """Small pictures for notebooks by caption, only of points that are `kept`, bool (Z, H, W)."""
+        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, evenly_chosen
+        from pcii.figures.pictures import data_uri
+
+        planes = evenly_chosen(len(self.planes), MOST_THUMBNAILS)
+        images = self._pictures(planes, THUMBNAIL_PX, kept)
+        return {f"{z:.5g} mm": data_uri(image) for z, image in zip(self.z_mm[planes], images, strict=True)}
+
+    def _pictures(self, planes: Sequence[int], longest_px: int, kept: np.ndarray | None) -> list[np.ndarray]:
+        """8-bit pictures of sections at a common exposure, no side longer than `longest_px`."""
+        from pcii.figures.exposure import exposed
+
+        images: list[tuple[np.ndarray, np.ndarray]] = []
+        for plane in planes:
+            sums, samples = self.counts[plane], self.coverage[plane]
+            if self.normalisation == "views":
+                samples = np.full_like(samples, self.grid.view_count)
+            if kept is not None:
+                sums = sums * kept[plane][..., None]
+            if self.cfa is not None:
+                sums, samples = (by_colour(mosaic[..., 0], self.cfa) for mosaic in (sums, samples))
+            images.append((sums, samples))
+        return exposed(images, longest_px)

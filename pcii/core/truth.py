@@ -1,6 +1,6 @@
 """Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.axes import Axes
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 """Maps that a dataset may lack."""
@@ -78,6 +79,32 @@ class Truth(Brief):
         photons = None if self.photons is None else self.photons.z_mm.size
         objects = listed(list(self.names.values()))
         return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
+    @property
+    def object_z_mm(self) -> np.ndarray:
+        """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
+        on_object = self.object_id > 0
+        return np.where(on_object, self.z_mm, np.inf) if on_object.any() else self.z_mm
+
+    def plot(
+        self,
+        axes: "Axes | Sequence[Axes] | np.ndarray | None" = None,
+        *,
+        z_range_mm: tuple[float, float] | None = None,
+    ) -> np.ndarray:
+        """Draw `object_z_mm` and the objects with their names, two panels; return the Matplotlib axes (2,).
+
+        The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
+        two, by default of a new figure. Raises `InputError` for another number.
+        """
+        from pcii.figures.maps import draw_depth, draw_objects
+        from pcii.figures.panels import several_axes
+
+        panels = several_axes(axes, 2, self.z_mm.shape)
+        title = "true depth of the objects" if (self.object_id > 0).any() else "true depth"
+        draw_depth(panels[0], self.object_z_mm, None, z_range_mm, title)
+        draw_objects(panels[1], self.object_id, self.names)
+        return panels
 
     def to_xarray(self) -> "xarray.Dataset":
         """The maps that are known, over pixels, and `photon_...` (photon,) for each photon.

@@ -5,18 +5,14 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pcii.base.plain_text import visible
 from pcii.evaluation.tables import light_name
+from pcii.figures.charts import draw_diagonal, draw_reliability
+from pcii.figures.palette import COLOURS, MARKERS, literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-"""The palette of Okabe and Ito, which the colour-blind can distinguish."""
-MARKERS = "osD^vPX"
-LONGEST_NAME = 40
-"""Characters of a method's name in the legend, about a third of the plot's width."""
 MEASURES = {
     "iou": ("object", "IoU, mean over planes"),
     "bad_1px": ("depth", "share of errors of depth above 1 px"),
@@ -24,8 +20,6 @@ MEASURES = {
 """What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
 PANELS = 4
 """Panels of the calibration plots, side by side."""
-LEAST_AREA, WHOLE_AREA = 4.0, 120.0
-"""Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 
 
 def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: str = "iou") -> str:
@@ -53,7 +47,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
             if own:
                 means = [row[part][measure] for row in own]
                 heights = [mean["mean"] for mean in means]
-                axes.errorbar(places, heights, yerr=_bars(means), label=_legend(method), **style)
+                axes.errorbar(places, heights, yerr=_bars(means), label=literal(method), **style)
     photons = [row["photons_per_view"] for row in group["results"] if row["photons_per_view"] is not None]
     for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
         axes.set_xlabel(name)
@@ -93,12 +87,11 @@ def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
     figure = _figure(0.7 + 2.6 * lines, 0.7 + 2.45 * columns)
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     for budget, axes in zip(budgets, panels.flat, strict=False):
-        axes.plot([0, 1], [0, 1], color="#8a94a6", linewidth=0.8)
+        draw_diagonal(axes)
         for row in found:
             if row["budget"] == budget:
                 _draw_bins(axes, row["depth"]["reliability"], _style(methods.index(row["method"])))
         axes.set_title(light_name(budget), fontsize=9)
-        axes.set_xlim(-0.02, 1.02)
         _frame(axes)
     for axes in panels.flat[len(budgets) :]:
         axes.set_axis_off()
@@ -108,7 +101,7 @@ def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         axes.set_ylabel("share within 1 px")
     shown = [method for method in methods if any(row["method"] == method for row in found)]
     handles = [Line2D([], [], markersize=5, **_style(methods.index(method))) for method in shown]
-    names = [_legend(method) for method in shown]
+    names = [literal(method) for method in shown]
     figure.legend(handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
     return _data_uri(figure)
 
@@ -119,10 +112,7 @@ def _draw_bins(axes: "Axes", reliability: Mapping[str, Any], style: Mapping[str,
     stated, correct, shares = (
         [one[name]["mean"] for one in bins] for name in ("confidence", "correct", "share")
     )
-    areas = [LEAST_AREA + WHOLE_AREA * share for share in shares]
-    marks = {"color": style["color"], "marker": style["marker"], "alpha": 0.8, "linewidth": 0}
-    axes.scatter(stated, correct, areas, clip_on=False, zorder=3, **marks)
-    axes.plot(stated, correct, linewidth=1.0, color=style["color"], linestyle=style["linestyle"])
+    draw_reliability(axes, stated, correct, shares, style)
 
 
 def _style(number: int) -> dict[str, Any]:
@@ -154,13 +144,6 @@ def _data_uri(figure: "Figure") -> str:
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
     return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"
-
-
-def _legend(method: str) -> str:
-    """A method's name, cut to `LONGEST_NAME` and escaped so that Matplotlib shows it literally."""
-    name = visible(method)
-    name = name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
-    return name.lstrip("_").replace("$", r"\$")
 
 
 def _bars(means: Sequence[Mapping[str, Any]]) -> list[list[float]]:

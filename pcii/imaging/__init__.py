@@ -1,9 +1,8 @@
-"""Image processing: bright regions, outlines, watersheds, pictures.
+"""Image processing: bright regions, outlines, watersheds.
 
 bright_regions    Bright regions of a section, with outlines along the strongest edges; operations on
                   masks.
 mask_outlines     Outlines of masks with subpixel accuracy, and their agreement.
-pictures          Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.
 watershed_pieces  Division of bright regions into pieces along the ridges of edges, and the choice of a
                   plane for each piece.
 """

@@ -5,7 +5,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 
 Encoding = Literal["srgb", "linear"] | float
 """How numbers tell light: "srgb", "linear", or the exponent of a gamma, such as 2.2."""

@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 from simgen.assets.asset_worker import SECONDS
 from simgen.assets.triangles import Triangles
 from simgen.base.asset_names import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files

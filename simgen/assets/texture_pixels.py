@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 from simgen.assets.pattern_areas import half_plane, sine_wave, square_wave
 from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
 

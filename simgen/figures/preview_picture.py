@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import linear_to_srgb
+from pcii.base.srgb import linear_to_srgb
 from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.figures.picture_parts import (

@@ -4,10 +4,10 @@ import itertools
 
 import numpy as np
 
+from pcii.base.srgb import linear_to_srgb
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.srgb import linear_to_srgb
 
 Box = tuple[slice, slice]
 """Rows and columns of a film."""

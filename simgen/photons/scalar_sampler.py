@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.srgb import LUMINANCE
 from pcii.core.bayer import colour_cells
-from pcii.core.srgb import LUMINANCE
 from simgen.photons.candidates import Accepted, Setup, chances, even_film_points
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant

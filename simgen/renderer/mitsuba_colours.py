@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 from simgen.spec.materials import Reflectance, Spectrum
 from simgen.spectral.spectra import WAVELENGTH_NM, illuminant, linear_srgb, patch, resampled, tint
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import LUMINANCE
+from pcii.base.srgb import LUMINANCE
 from simgen.renderer.mitsuba_colours import radiance_plugin
 from simgen.spec.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight
 from simgen.spectral.spectra import illuminant

@@ -6,7 +6,7 @@ Everything here is on the renderer's side: Dr.Jit arrays with an element for eac
 from collections.abc import Iterator
 from typing import Any, Protocol
 
-from pcii.core.srgb import LUMINANCE
+from pcii.base.srgb import LUMINANCE
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene

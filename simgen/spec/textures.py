@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 from simgen.base.strict_models import Colour, NonNegative, Real, Share, Strict, Whole
 
 CLIPPED_SHARE = 0.01

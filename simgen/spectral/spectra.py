@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import LUMINANCE
+from pcii.base.srgb import LUMINANCE
 from simgen.base.srgb import FROM_XYZ
 from simgen.base.strict_models import suggestion
 

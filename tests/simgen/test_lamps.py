@@ -9,7 +9,7 @@ import pytest
 from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
 
 from pcii.base.errors import InputError
-from pcii.core.srgb import LUMINANCE, srgb_to_linear
+from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.renderer import backend
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]

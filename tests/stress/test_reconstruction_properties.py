@@ -13,12 +13,12 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
+from pcii.base.srgb import linear_to_srgb
 from pcii.core.arrays import check_z_mm
 from pcii.core.bayer import PATTERNS
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm, project_px, total_disparity_px
 from pcii.core.photon_limit import photon_rates, scope_energies
-from pcii.core.srgb import linear_to_srgb
 from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.imaging.mask_outlines import boundary_f, object_share
 from pcii.metrics.agreement import mask_agreement

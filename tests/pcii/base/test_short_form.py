@@ -1,16 +1,21 @@
 """What values say of themselves: a line, and a table that shows names as text."""
 
+import base64
+import io
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hostile_names import NAMES
+from PIL import Image
 from tiny_datasets import NESTED, OWN, by_count, write_dataset
+from twins import unit_grid
 
 from pcii.base.plain_text import visible
 from pcii.base.short_form import listed
-from pcii.core.estimates import DepthMap
+from pcii.core.estimates import DepthMap, DepthPosterior
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import PhotonTruth, Truth
@@ -87,3 +92,40 @@ def test_nothing_seen_has_no_depth() -> None:
 def test_long_lists_tell_their_ends() -> None:
     assert listed([540.0, 540.25, 620]) == "[540, 540.25, 620]"
     assert listed(list(range(450, 480))) == "[450 .. 479: 30 in all]"
+
+
+def test_notebooks_show_small_pictures(values: list[tuple[object, str]]) -> None:
+    shown = {
+        type(value).__name__: re.findall('<img src="data:image/png;base64,([^"]+)"', value._repr_html_())  # type: ignore[attr-defined]
+        for value, _ in values
+    }
+    with_pictures = {name: len(found) for name, found in shown.items() if found}
+    assert with_pictures == {"PhotonCounts": 1, "Views": 1, "Sections": 2, "Segmented": 2, "DepthMap": 1}
+    photons = np.asarray(Image.open(io.BytesIO(base64.b64decode(shown["PhotonCounts"][0]))))
+    assert photons.shape == (8, 12, 3)
+
+
+def test_pictures_of_large_values_are_small() -> None:
+    grid = unit_grid(1, 2, 1024, 700)
+    counts = PhotonCounts.from_events([0], [0], [3], [3], [1], grid, cfa="GRBG")  # type: ignore[arg-type]
+    depth = DepthMap(np.full((1024, 700), 500.0), np.ones((1024, 700)))
+    for value in (counts, reconstruct(counts, np.linspace(1, 2, 9)), depth):
+        page = value._repr_html_()
+        assert len(page) < 40_000
+        for found in re.findall('base64,([^"]+)"', page):
+            assert max(Image.open(io.BytesIO(base64.b64decode(found))).size) <= 256
+
+
+def test_views_that_cannot_be_read_are_shown_without_a_picture() -> None:
+    grid = unit_grid(1, 2, 8, 12)
+    assert "<img" not in Views(np.full((1, 2, 8, 12, 1), np.nan), grid)._repr_html_()
+
+
+def test_a_grid_and_a_posterior_say_what_they_are() -> None:
+    grid = unit_grid(2, 3, 8, 12, pitch_mm=(10.0, 5.0))
+    page = grid._repr_html_()
+    assert "<td>baseline_mm (x, y)</td><td>20, 5</td>" in page
+    assert repr(grid).startswith("CameraGrid(rows=2, cols=3, ")  # as it is made
+    planes = FocalPlanes.at_depths(grid, [1.0, 2.0])
+    posterior = DepthPosterior(planes, np.zeros((2, 4, 6), np.float32), np.ones((4, 6), np.float32), 2)
+    assert posterior._repr_html_().count("<img") == 1

@@ -9,8 +9,8 @@ from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image
 
 from pcii.base.errors import InputError
+from pcii.base.srgb import srgb_to_linear
 from pcii.core.images import Views
-from pcii.core.srgb import srgb_to_linear
 from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.image_folders import import_images
 from pcii.importing.light_encoding import to_radiance

@@ -19,8 +19,8 @@ from test_other_sources import PARAMETERS, hci_folder, pfm
 
 from pcii.app.commands import app
 from pcii.base import command_line
+from pcii.base.srgb import linear_to_srgb
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.srgb import linear_to_srgb
 from pcii.io.dataset import open_dataset
 from pcii.io.verification import verify
 

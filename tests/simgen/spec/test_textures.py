@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from property_settings import at_least
 from pydantic import ValidationError
 
-from pcii.core.srgb import srgb_to_linear
+from pcii.base.srgb import srgb_to_linear
 from simgen.assets.pattern_areas import half_plane, square_wave
 from simgen.assets.texture_pixels import paint
 from simgen.base.asset_names import MeshName

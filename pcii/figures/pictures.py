@@ -2,15 +2,11 @@
 
 import base64
 import io
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import Segmented
-from pcii.core.srgb import linear_to_srgb
-from pcii.core.truth import Truth
+from pcii.base.srgb import linear_to_srgb
 
 PHOTO_QUALITY = 78
 """Of WebP: grain of single photons still looks like grain."""
@@ -47,7 +43,7 @@ def white_level(
     (0.964, 0.1)
     """
     values = linear[box]
-    lit = values > 0
+    lit = (values > 0) & np.isfinite(values)
     if not lit.any():
         return 1.0
     if samples is None:
@@ -135,15 +131,3 @@ def write_png(path: Path, image: np.ndarray) -> None:
     from pcii.base.safe_files import write_bytes_safely
 
     write_bytes_safely(path, png_bytes(image))
-
-
-def interesting_part(grid: CameraGrid, truth: Truth | None, focus: Sequence[Segmented]) -> np.ndarray:
-    """Mask (H, W) of the true objects; if there are none, of all points that a method found in focus.
-
-    Without methods it is the whole image.
-    """
-    if truth is not None and (truth.object_id > 0).any():
-        return truth.object_id > 0
-    if not focus:
-        return np.ones((grid.height, grid.width), dtype=bool)
-    return np.logical_or.reduce([segmented.in_focus.any(axis=0) for segmented in focus])

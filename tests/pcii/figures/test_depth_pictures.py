@@ -1,6 +1,6 @@
 import numpy as np
 
-from pcii.imaging.pictures import depth_image
+from pcii.figures.pictures import depth_image
 
 
 def test_depth_is_brighter_the_nearer_and_the_surer_and_black_where_unknown() -> None:

@@ -1,0 +1,20 @@
+"""Pictures of plain arrays: 8-bit images, and what Matplotlib draws for `.plot()` and notebooks.
+
+Nothing here knows a type. The types of `core` know what of themselves is worth a picture, and hand over
+arrays with their captions; so this room comes before `core`, and all imports can be read in the source, which
+a table of functions registered by later rooms would hide.
+
+Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it is given, or else into a new figure of
+`pyplot`, and returns them: one `Axes`, or where a type has several panels an array (N,) of them, which it
+takes as a list. Matplotlib is imported on the first picture.
+
+charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
+exposure      What of an image is shown, and how bright: blocks of pixels, means of colours, a common
+              exposure.
+maps          Maps over pixels with a scale or names: depth, entropy, objects.
+palette       Colours and markers that the colour-blind can distinguish, and names as Matplotlib shows them.
+panels        Axes to draw in, given or new, and pictures over the pixels of a view.
+pictures      Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.
+score_panels  Panels of a score: IoU of masks by plane and method, shares of depths, reliability of
+              confidence.
+"""

@@ -1,0 +1,98 @@
+"""What of an image is shown, and how bright: blocks of pixels, means of colours, a common exposure."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pcii.figures.pictures import to_srgb8, white_level
+
+PANEL_PX = 320
+"""Pictures with longer sides are drawn in blocks of 2 x 2 pixels or more: a panel has about as many dots on a
+screen, so single photons are still seen."""
+THUMBNAIL_PX = 256
+"""The longer side of a small picture in a notebook."""
+MOST_THUMBNAILS = 4
+"""Small pictures of one value."""
+
+
+def block_px(shape: Sequence[int], longest_px: int) -> int:
+    """Side of the blocks of which an image (H, W, ...) has at most `longest_px` in a row or column."""
+    return -(-max(shape[0], shape[1], 1) // longest_px)
+
+
+def block_sums(image: np.ndarray, step_px: int) -> np.ndarray:
+    """Sums over blocks of `step_px` x `step_px` pixels of an image (H, W, C), as int64 or float64.
+
+    Those at the ends may be smaller.
+    """
+    kind = np.float64 if image.dtype.kind == "f" else np.int64
+    missing = [-size % step_px for size in image.shape[:2]]
+    padded = np.pad(image, [(0, missing[0]), (0, missing[1]), (0, 0)]) if any(missing) else image
+    with np.errstate(over="ignore", invalid="ignore"):
+        # Strided sums: NumPy's own over short runs take several times as long.
+        rows = padded[::step_px].astype(kind)
+        for place in range(1, step_px):
+            rows += padded[place::step_px]
+        sums = rows[:, ::step_px].copy()
+        for place in range(1, step_px):
+            sums += rows[:, place::step_px]
+    return sums
+
+
+def filled_means(counts: np.ndarray, samples: np.ndarray) -> np.ndarray:
+    """Mean per sample (h, w, C) of blocks with these sums and numbers of samples.
+
+    A block without a sample of a colour has the mean of the 3 x 3 blocks around, so that nothing has a tint;
+    0 if those have none either.
+    """
+    empty = samples <= 0
+    if empty.any():
+        around = (_sums_around(values) for values in (counts, samples))
+        counts, samples = (
+            np.where(empty, near, own) for own, near in zip((counts, samples), around, strict=True)
+        )
+    means = np.zeros(counts.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.divide(counts, samples, out=means, where=samples > 0)
+
+
+def _sums_around(blocks: np.ndarray) -> np.ndarray:
+    """Sums over each block (h, w, C) and the eight around it."""
+    height, width = blocks.shape[:2]
+    padded = np.pad(blocks, ((1, 1), (1, 1), (0, 0)))
+    rows = sum(padded[a : a + height] for a in range(3))
+    return sum(rows[:, b : b + width] for b in range(3))  # type: ignore[index]
+
+
+def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """8-bit pictures of block estimates with their samples, all at the same exposure."""
+    white = max(white_level(estimate, samples=samples) for estimate, samples in blocks)
+    return [to_srgb8(estimate, white) for estimate, _ in blocks]
+
+
+def exposed(images: Sequence[tuple[np.ndarray, np.ndarray]], longest_px: int) -> list[np.ndarray]:
+    """8-bit pictures of images, each given by sums and numbers of samples (H, W, C), at the same exposure.
+
+    They are shown in blocks, so that no side is longer than `longest_px`.
+    """
+    blocks: list[tuple[np.ndarray, np.ndarray]] = []
+    for sums, samples in images:
+        step_px = block_px(sums.shape, longest_px)
+        sums, samples = block_sums(sums, step_px), block_sums(samples, step_px)
+        blocks.append((filled_means(sums, samples), samples))
+    return encoded(blocks)
+
+
+def photon_picture(counts: np.ndarray, longest_px: int) -> np.ndarray:
+    """8-bit picture of the photon counts (H, W) of one view: the photons in blocks, one or more are white."""
+    shown = block_sums(counts[..., None], block_px(counts.shape, longest_px))
+    return to_srgb8(shown, max(1.0, white_level(shown)))
+
+
+def evenly_chosen(count: int, most: int) -> list[int]:
+    """Indices of all of `count` things, or of `most` of them evenly apart, the first and the last included.
+
+    >>> evenly_chosen(3, 4), evenly_chosen(9, 3)
+    ([0, 1, 2], [0, 4, 8])
+    """
+    return np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist()
