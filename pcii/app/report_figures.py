@@ -177,7 +177,7 @@ def depth_error_mm(outcome: Outcome, crop: Crop) -> tuple[np.ndarray, float]:
 
 
 def _true_depth_words(truth: Truth) -> str:
-    """What a picture of `depth_of_objects` shows."""
+    """What a picture of `Truth.object_z_mm` shows."""
     return "true depth of the objects" if (truth.object_id > 0).any() else "true depth"
 
 

@@ -63,7 +63,7 @@ class Segmented(Brief):
         }
 
     def _thumbnails(self) -> dict[str, str]:
-        return self.sections.thumbnails(self.in_focus)
+        return self.sections._thumbnails_of(self.in_focus)
 
     @property
     def z_mm(self) -> np.ndarray:
@@ -81,12 +81,12 @@ class Segmented(Brief):
         Panels, exposure and `axes` are those of `Sections.plot`.
         """
         from pcii.figures.palette import COLOURS, literal
-        from pcii.figures.panels import outline
+        from pcii.figures.panels import draw_outline
 
-        panels, planes = self.sections.draw(axes, self.in_focus)
+        panels, planes = self.sections._draw(axes, self.in_focus)
         film = self.sections.grid.height, self.sections.grid.width
         for panel, plane in zip(panels, planes, strict=True):
-            outline(panel, self.in_focus[plane], film, COLOURS[4])
+            draw_outline(panel, self.in_focus[plane], film, COLOURS[4])
             share = self.in_focus[plane].mean()
             panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{literal(self.method)}")
         return panels

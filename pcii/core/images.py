@@ -99,7 +99,7 @@ class Views(Brief):
         if camera is None:
             light = np.zeros(self.radiance.shape[2:])
             for k, l in np.ndindex(*self.radiance.shape[:2]):
-                light += self.view(k, l)
+                light += self.view(k, l) / self.grid.view_count
             return draw_light(axes, light, self.cfa, "mean of all views")
         return draw_light(axes, self.view(*camera), self.cfa, f"view {camera}")
 

@@ -202,6 +202,7 @@ class PhotonCounts(Brief):
         if camera is not None:
             counts = self.view(*camera)
             return draw_photons(axes, counts, f"view {camera}, photons: {counts.sum()}")
+        # The sum is a whole number, and at its exposure the picture of the mean.
         views = np.ndindex(self.grid.rows, self.grid.cols)
         light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
         title = f"mean of all views, photons: {self.total}"

@@ -68,7 +68,7 @@ class Sections(Brief):
         }
 
     def _thumbnails(self) -> dict[str, str]:
-        return self.thumbnails(None)
+        return self._thumbnails_of(None)
 
     @property
     def grid(self) -> CameraGrid:
@@ -115,9 +115,9 @@ class Sections(Brief):
         last. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
         number of them.
         """
-        return self.draw(axes, None)[0]
+        return self._draw(axes, None)[0]
 
-    def draw(
+    def _draw(
         self, axes: "Axes | Sequence[Axes] | np.ndarray | None", kept: np.ndarray | None
     ) -> tuple[np.ndarray, list[int]]:
         """Draw as `plot` does, only points that are `kept`, bool (Z, H, W); the axes and the planes shown."""
@@ -131,7 +131,7 @@ class Sections(Brief):
             show_picture(panel, image, film, f"section at {self.z_mm[plane]:.5g} mm", block)
         return panels, planes
 
-    def thumbnails(self, kept: np.ndarray | None) -> dict[str, str]:
+    def _thumbnails_of(self, kept: np.ndarray | None) -> dict[str, str]:
         """Small pictures for notebooks by caption, only of points that are `kept`, bool (Z, H, W)."""
         from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, evenly_chosen
         from pcii.figures.pictures import data_uri

@@ -89,7 +89,7 @@ def show_picture(
     axes.locator_params(integer=True, nbins=6)
 
 
-def outline(axes: "Axes", mask: np.ndarray, film: Sequence[int], colour: str) -> None:
+def draw_outline(axes: "Axes", mask: np.ndarray, film: Sequence[int], colour: str) -> None:
     """Draw the outline of a mask (H, W) along the sides of its voxels, which may be finer than pixels."""
     from matplotlib.collections import LineCollection
 
