@@ -8,6 +8,7 @@
 # make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
 # make bench-publish  make bench, then docs/benchmarks.md and the committed ratios from it; on an idle machine
 # make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours
+# make docs   the site of docs/*.md and the API, in out/docs
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
 PYTHON ?= python3
@@ -16,7 +17,7 @@ BIN := $(VENV)/bin
 OUT ?= out
 TRAIN_MINUTES ?= 90
 
-.PHONY: demo test stress bench bench-full bench-guard bench-publish bench-setup train gallery format clean llvm
+.PHONY: demo test stress bench bench-full bench-guard bench-publish bench-setup train docs gallery format clean llvm
 .DEFAULT_GOAL := demo
 
 $(VENV)/.ready: pyproject.toml
@@ -75,6 +76,11 @@ train: llvm
 	$(BIN)/python -m training.samples $(OUT)/training/* --out $(OUT)/training-examples
 	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES)
 	$(BIN)/python -m training.export $(OUT)/depth.pt
+
+docs: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(BIN)/python -m sphinx -q -E -W --keep-going -b html docs $(OUT)/docs
+	@echo "Open $(OUT)/docs/index.html in a browser."
 
 gallery: llvm
 	$(BIN)/python docs/make_gallery.py

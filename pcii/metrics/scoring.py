@@ -36,14 +36,14 @@ def score(
     """Compare in-focus masks and a depth map with the truth.
 
     `planes` has a row for each method, plane and kind of truth. "object": the objects whose visible surface
-    is closest to this plane. "pixel": the points whose blur half-extent |disparity(z) - disparity(z0)| (N -
-    1) / 2 is at most 1 px. `boundary_f` is the F-measure of the outlines with a tolerance of 2 px, located
-    within pixels if the truth has `coverage`; `entropy_before` and `entropy_after` are Eq. 9 of the section
-    as a whole, before and after removal, in bits; `claimed_share` is the share of the section that the mask
-    keeps. `objects` is Table 1: the entropy at each plane of each object's region, which includes its blur at
-    the other planes. `depth` is `depth_errors`. `bounds` holds limits of accuracy: `iou_oracle` for each row
-    of `planes`, and `depth_sigma_px` for each object, from its texture in `full_light`, the sections of the
-    radiance (Eq. 2).
+    is closest to this plane. "pixel": the points whose blur half-extent,
+    `|disparity(z) - disparity(z0)| (N - 1) / 2`, is at most 1 px. `boundary_f` is the F-measure of the
+    outlines with a tolerance of 2 px, located within pixels if the truth has `coverage`; `entropy_before` and
+    `entropy_after` are Eq. 9 of the section as a whole, before and after removal, in bits; `claimed_share` is
+    the share of the section that the mask keeps. `objects` is Table 1: the entropy at each plane of each
+    object's region, which includes its blur at the other planes. `depth` is `depth_errors`. `bounds` holds
+    limits of accuracy: `iou_oracle` for each row of `planes`, and `depth_sigma_px` for each object, from its
+    texture in `full_light`, the sections of the radiance (Eq. 2).
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.

@@ -1,0 +1,66 @@
+"""How Sphinx builds the pages of this folder: `make docs`."""
+
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+
+import pcii
+
+project = "Photon-starved integral imaging"
+author = copyright = "The photon-integral-imaging authors"
+version = release = pcii.__version__
+
+BENCHMARKS = "benchmarks"
+"""The page that `make bench-publish` writes: it joins the others once it is there."""
+
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+highlight_language = "none"  # of blocks that name no language
+exclude_patterns = ["gallery/*"]  # pictures
+
+myst_enable_extensions = ["dollarmath"]
+myst_fence_as_directive = ["math"]  # GitHub's way to write a displayed equation
+myst_heading_anchors = 4  # links to headings as GitHub makes them: page.md#some-heading
+
+default_role = "literal"  # docstrings write names in single backticks
+autodoc_typehints_format = "short"
+autodoc_member_order = "bysource"
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 88
+
+html_theme = "furo"
+html_title = project
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_copy_source = False
+html_show_sourcelink = False
+html_show_sphinx = False
+html_math_renderer = "mathml"
+html_theme_options = {"navigation_with_keys": True}
+
+
+def setup(app: Any) -> None:
+    """Have equations written as MathML, which browsers show without a script and without the network."""
+    app.connect("source-read", _leave_out_benchmarks)
+    app.add_html_math_renderer("mathml", (_inline_equation, None), (_displayed_equation, None))
+
+
+def _leave_out_benchmarks(app: Any, page: str, source: list[str]) -> None:
+    if page == "index" and not Path(app.srcdir, f"{BENCHMARKS}.md").exists():
+        source[0] = source[0].replace(f"\n{BENCHMARKS}\n", "\n")
+
+
+def _inline_equation(translator: Any, node: nodes.math) -> None:
+    translator.body.append(_mathml(node.astext(), "inline"))
+    raise nodes.SkipNode
+
+
+def _displayed_equation(translator: Any, node: nodes.math_block) -> None:
+    translator.body.append(f'<div class="equation">{_mathml(node.astext(), "block")}</div>\n')
+    raise nodes.SkipNode
+
+
+def _mathml(latex: str, display: str) -> str:
+    from latex2mathml.converter import convert  # pyright: ignore[reportMissingImports]
+
+    return convert(latex, display=display)
