@@ -1,0 +1,168 @@
+"""The pages do what they say: their Python and their `sh` blocks run, from top to bottom."""
+
+import shutil
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import create_autospec
+
+import numpy as np
+import pytest
+from guide_blocks import PAGES, ROOT, blocks, run_page
+from tiny import TINY_RECIPE
+
+import pcii
+import simgen
+from pcii.exporting.card_files import write_card
+from pcii.exporting.publication_terms import Terms
+from pcii.imaging.pictures import write_png
+from pcii.io.sample_dataset import copy_sample
+from simgen.spec.recipe import Recipe, override
+
+DOCS = ROOT / "docs"
+SLOW = {"first_hour.md", "your_own_images.md"}
+RUN = {page.name: page for page in PAGES if any(block.language == "python" for block in blocks(page))}
+
+
+def tiny(out: str, *overrides: str) -> None:
+    """A dataset or a collection of the tiny recipe, in a second."""
+    values = {key: value for key, value in TINY_RECIPE["grid"].items() if key != "pitch_mm"}
+    grid = ["grid.pitch_mm=[18,18]", *(f"grid.{key}={value}" for key, value in values.items())]
+    asked = [*grid, "products.radiance=none", *overrides]
+    if any("[100,300]" in each for each in overrides):
+        simgen.generate_collection("paper", out, asked)
+    else:
+        simgen.generate(simgen.load_recipe("paper", asked), out)
+
+
+def given_cameras(request: pytest.FixtureRequest) -> None:
+    tiny("out/imperfect", "grid.errors.position_sd_mm=[0.3,0.3,0.3]")
+
+
+def given_collections(request: pytest.FixtureRequest) -> None:
+    tiny("out/dimmer", "photons.budget=[100,300]")
+
+
+def given_exchange(request: pytest.FixtureRequest) -> None:
+    shutil.copytree(request.getfixturevalue("nested_dataset"), "out/small")
+    write_card(Path("out/small"), Terms())
+    shown: list[Any] = []
+    viewer = SimpleNamespace(add_image=lambda image, **_: shown.append(image), shown=shown)
+    request.getfixturevalue("monkeypatch").setitem(
+        sys.modules, "napari", SimpleNamespace(Viewer=lambda: viewer, viewer=viewer)
+    )
+
+
+def given_cluster(request: pytest.FixtureRequest) -> None:
+    monkeypatch = request.getfixturevalue("monkeypatch")
+    monkeypatch.setattr(simgen, "generate_collection", create_autospec(simgen.generate_collection))
+    cluster = SimpleNamespace(scheduler_address="tcp://127.0.0.1:8786", scale=lambda *, jobs: None)
+    monkeypatch.setitem(sys.modules, "dask_jobqueue", SimpleNamespace(SLURMCluster=lambda **options: cluster))
+
+
+def given_scenes(request: pytest.FixtureRequest) -> None:
+    Path("scenes/mine").mkdir(parents=True)
+
+
+def given_plugins(request: pytest.FixtureRequest) -> None:
+    """The package of the page, as if `pip install -e .` had been run."""
+    (table,) = (block.text for block in blocks(DOCS / "plugins.md") if block.language == "toml")
+    about = Path("my_methods-0.1.dist-info")
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: my-methods\nVersion: 0.1\n")
+    lines = [
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in points.items())
+        for group, points in tomllib.loads(table)["project"]["entry-points"].items()
+    ]
+    (about / "entry_points.txt").write_text("\n".join(lines))
+    request.getfixturevalue("monkeypatch").syspath_prepend(str(Path.cwd()))
+    request.addfinalizer(lambda: sys.modules.pop("my_methods", None))
+
+
+def given_your_own_images(request: pytest.FixtureRequest) -> None:
+    request.getfixturevalue("monkeypatch").setattr(sys, "path", [*sys.path, str(DOCS)])
+    from make_your_own_images import photograph  # pyright: ignore[reportMissingImports]
+
+    Path("out/example/photos").mkdir(parents=True)
+    cameras = pcii.Optics(pitch_mm=(2, 2), focal_mm=35, sensor_mm=36).grid((5, 5, 480, 640))
+    for k, l in np.ndindex(5, 5):
+        write_png(Path(f"out/example/photos/{l}_{k}.png"), photograph(cameras, k, l))
+
+
+GIVEN: dict[str, Callable[[pytest.FixtureRequest], None]] = {
+    "cameras.md": given_cameras,
+    "collections.md": given_collections,
+    "exchange.md": given_exchange,
+    "cluster.md": given_cluster,
+    "scenes.md": given_scenes,
+    "plugins.md": given_plugins,
+    "your_own_images.md": given_your_own_images,
+}
+"""What a page finds in the working folder, beside `out/sample`."""
+
+
+def check_exchange(names: dict[str, Any]) -> None:
+    dataset = pcii.open_dataset("out/small")
+    stack = np.array([[dataset.counts.view(k, l) for l in range(3)] for k in range(2)])
+    np.testing.assert_array_equal(names["dense"], stack)
+    np.testing.assert_array_equal(names["photons"], stack[0, 1])
+    assert dataset.truth is not None
+    np.testing.assert_array_equal(names["depth"], dataset.truth.z_mm)
+    assert sys.modules["napari"].viewer.shown[0].shape == (2, 64, 60, 3)
+
+
+def check_plugins(names: dict[str, Any]) -> None:
+    assert names["focus"].in_focus.any(axis=(1, 2)).all()
+    assert all(row["iou"] > 0.6 for row in names["score"].planes)  # 0.74 and 0.81, of one draw of photons
+    assert names["score"].depth["bad_3px"] < 0.2  # 0.07
+
+
+def check_cluster(names: dict[str, Any]) -> None:
+    (call,) = names["simgen"].generate_collection.call_args_list
+    assert call.kwargs["crew"].scheduler == "tcp://127.0.0.1:8786"
+
+
+CHECKS = {"exchange.md": check_exchange, "plugins.md": check_plugins, "cluster.md": check_cluster}
+"""What is to come of a page, beside that it runs."""
+
+
+def case(name: str) -> object:
+    marks = [pytest.mark.renders] if "import simgen" in RUN[name].read_text() or name in GIVEN else []
+    marks += [pytest.mark.slow] if name in SLOW else []
+    return pytest.param(name, id=name, marks=marks)
+
+
+@pytest.mark.parametrize("name", [case(name) for name in RUN])
+def test_a_page_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if name != "first_hour.md":  # which begins in an empty folder
+        copy_sample(Path("out/sample"))
+    if name in GIVEN:
+        GIVEN[name](request)
+    names = run_page(RUN[name])
+    if name in CHECKS:
+        CHECKS[name](names)
+
+
+def test_all_that_is_prepared_belongs_to_a_page() -> None:
+    assert {*SLOW, *GIVEN, *CHECKS} <= set(RUN)
+
+
+def test_the_recipes_of_the_guide_are_valid() -> None:
+    whole, sweep = (block.text for block in blocks(DOCS / "recipes.md") if block.language == "toml")
+    assert Recipe.model_validate(tomllib.loads(whole)).photons.nested == (100, 300)
+    assert tomllib.loads(sweep)["photons"]["budget"] == [100, 300, 1000]
+
+
+def test_the_terms_of_the_guide_to_exchange_are_valid() -> None:
+    (table,) = (block.text for block in blocks(DOCS / "exchange.md") if block.language == "toml")
+    recipe = Recipe.model_validate({"scene": "blank", **tomllib.loads(table)})
+    assert recipe.publication.licence == "CC-BY-4.0"
+    values: dict[str, Any] = {"scene": "blank"}
+    override(values, ["publication.licence=CC0-1.0"])
+    assert Recipe.model_validate(values).publication.terms().licence == "CC0-1.0"
