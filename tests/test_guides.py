@@ -39,7 +39,7 @@ def tiny(out: str, *overrides: str) -> None:
 
 
 def given_cameras(request: pytest.FixtureRequest) -> None:
-    tiny("out/imperfect", "grid.errors.position_sd_mm=[0.3,0.3,0.3]")
+    tiny("out/imperfect", "grid.errors.position_sd_mm=[0.3,0.3,0.3]", "products.counts=false")
 
 
 def given_collections(request: pytest.FixtureRequest) -> None:
