@@ -51,16 +51,17 @@ def _leave_out_benchmarks(app: Any, page: str, source: list[str]) -> None:
 
 
 def _inline_equation(translator: Any, node: nodes.math) -> None:
-    translator.body.append(_mathml(node.astext(), "inline"))
+    translator.body.append(_mathml(node.astext(), displayed=False))
     raise nodes.SkipNode
 
 
 def _displayed_equation(translator: Any, node: nodes.math_block) -> None:
-    translator.body.append(f'<div class="equation">{_mathml(node.astext(), "block")}</div>\n')
+    translator.body.append(f'<div class="equation">{_mathml(node.astext(), displayed=True)}</div>\n')
     raise nodes.SkipNode
 
 
-def _mathml(latex: str, display: str) -> str:
-    from latex2mathml.converter import convert  # pyright: ignore[reportMissingImports]
+def _mathml(latex: str, *, displayed: bool) -> str:
+    """MathML of an equation; what cannot be converted stops the build."""
+    from math_core import LatexToMathML  # pyright: ignore[reportMissingImports]
 
-    return convert(latex, display=display)
+    return LatexToMathML().convert_with_local_state(latex, displaystyle=displayed)
