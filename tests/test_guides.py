@@ -27,23 +27,18 @@ SLOW = {"first_hour.md", "your_own_images.md"}
 RUN = {page.name: page for page in PAGES if any(block.language == "python" for block in blocks(page))}
 
 
-def tiny(out: str, *overrides: str) -> None:
-    """A dataset or a collection of the tiny recipe, in a second."""
-    values = {key: value for key, value in TINY_RECIPE["grid"].items() if key != "pitch_mm"}
-    grid = ["grid.pitch_mm=[18,18]", *(f"grid.{key}={value}" for key, value in values.items())]
-    asked = [*grid, "products.radiance=none", *overrides]
-    if any("[100,300]" in each for each in overrides):
-        simgen.generate_collection("paper", out, asked)
-    else:
-        simgen.generate(simgen.load_recipe("paper", asked), out)
+GRID = [f"grid.{key}={value}" for key, value in TINY_RECIPE["grid"].items()]
+TINY = [*GRID, "products.radiance=none"]
+"""Makes of any recipe one that takes a second."""
 
 
 def given_cameras(request: pytest.FixtureRequest) -> None:
-    tiny("out/imperfect", "grid.errors.position_sd_mm=[0.3,0.3,0.3]", "products.counts=false")
+    errors = ["grid.errors.position_sd_mm=[0.3,0.3,0.3]", "products.counts=false"]
+    simgen.generate(simgen.load_recipe("paper", [*TINY, *errors]), "out/imperfect")
 
 
 def given_collections(request: pytest.FixtureRequest) -> None:
-    tiny("out/dimmer", "photons.budget=[100,300]")
+    simgen.generate_collection("paper", "out/dimmer", [*TINY, "photons.budget=[100,300]"])
 
 
 def given_exchange(request: pytest.FixtureRequest) -> None:
