@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 import pcii
 from pcii.core.bayer import colour_index
-from pcii.imaging.pictures import depth_image, to_srgb8, white_level
+from pcii.figures.pictures import depth_image, to_srgb8, white_level
 
 PART = np.s_[394:640, 300:720]
 """Ball and bird, in pixels of the virtual centre."""

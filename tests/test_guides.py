@@ -18,7 +18,7 @@ import pcii
 import simgen
 from pcii.exporting.card_files import write_card
 from pcii.exporting.publication_terms import Terms
-from pcii.imaging.pictures import write_png
+from pcii.figures.pictures import write_png
 from pcii.io.sample_dataset import copy_sample
 from simgen.spec.recipe import Recipe, override
 
