@@ -69,7 +69,7 @@ def measure(study: Study, size: Size, out: Path) -> Record:
     print(f"{study.title} ({study.name}, {size}) ...", flush=True)
     place, start = machine(), time.perf_counter()
     if was_busy(place):
-        print(f"the machine is busy (load {place['load']}): seconds will be too long", flush=True)
+        print(f"{place['cores_in_use']} cores are in use by others: seconds will be too long", flush=True)
     date = datetime.now(UTC).isoformat(timespec="seconds")
     measured = study.measure(**study.sizes[size])
     record = Record(study.name, size, date, time.perf_counter() - start, place, versions(), measured)

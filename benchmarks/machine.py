@@ -2,6 +2,7 @@
 
 import os
 import platform
+import time
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,8 +13,10 @@ from simgen.renderer import backend
 
 PEERS = ("scipy", "numba", "colour-science", "colour-demosaicing")
 EXTRAS = ("opencv-python-headless", "flip-evaluator", "mitsuba-oidn")
-BUSY = 0.5
-"""Load per core from which on a machine counts as busy."""
+BUSY = 0.25
+"""Share of the cores in use from which on a machine counts as busy."""
+LOOK_S = 1.0
+"""How long it is looked at: the load average would count the study before."""
 
 
 def machine() -> dict[str, Any]:
@@ -24,13 +27,13 @@ def machine() -> dict[str, Any]:
         "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1),
         "system": f"{platform.system()} {platform.machine()}",
         "renderer": backend.choose().variant,
-        "load": round(os.getloadavg()[0], 2),
+        "cores_in_use": round(_cores_in_use(), 2),
     }
 
 
 def was_busy(found: Mapping[str, Any]) -> bool:
     """Whether something else was running when a study began."""
-    return found["load"] > BUSY * found["cores"]
+    return found["cores_in_use"] > BUSY * found["cores"]
 
 
 def versions() -> dict[str, str]:
@@ -50,6 +53,24 @@ def has(package: str) -> bool:
     except PackageNotFoundError:
         return False
     return True
+
+
+def _cores_in_use() -> float:
+    """Cores that all programs together use while this one waits."""
+    before = _busy_s()
+    time.sleep(LOOK_S)
+    return (_busy_s() - before) / LOOK_S
+
+
+def _busy_s() -> float:
+    """Seconds that all cores together have been in use; 0 where the system does not tell."""
+    stat = Path("/proc/stat")
+    if not stat.is_file():
+        return 0.0
+    user, nice, system, _, _, *interrupts = map(
+        int, stat.read_text(encoding="utf-8").splitlines()[0].split()[1:8]
+    )
+    return (user + nice + system + sum(interrupts)) / os.sysconf("SC_CLK_TCK")
 
 
 def _processor() -> str:

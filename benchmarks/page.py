@@ -99,7 +99,7 @@ def _section(study: Study, record: Record) -> dict[str, Any]:
         "wall_s": round(record.wall_s),
         "machine": f"{machine['processor']}, {machine['cores']} cores, {machine['renderer']}",
         "busy": was_busy(machine),
-        "load": machine["load"],
+        "cores_in_use": machine["cores_in_use"],
         "seeds": ", ".join(map(str, record.measured.seeds)),
         "versions": ", ".join(f"{name} {number}" for name, number in record.versions.items()),
     }

@@ -33,7 +33,7 @@ STUDY = Study(
     _draw,
     lambda measured: f"Ours takes {measured.one('Errors', 'ours').values['time_ms'].value:g} ms. Two. Three.",
 )
-MACHINE = {"processor": "abacus", "cores": 2, "renderer": "scalar_rgb", "load": 0.1}
+MACHINE = {"processor": "abacus", "cores": 2, "renderer": "scalar_rgb", "cores_in_use": 0.1}
 
 
 def record(**changes: Any) -> Record:

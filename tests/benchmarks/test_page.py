@@ -33,8 +33,8 @@ def test_the_markdown_page_has_figure_reading_tables_and_ratios(tmp_path: Path) 
 
 
 def test_the_page_says_that_the_machine_was_busy(tmp_path: Path) -> None:
-    write_markdown(tmp_path / "page.md", [STUDY], [record(machine=MACHINE | {"load": 9.5})])
-    assert "busy with other work when it began (load 9.5)" in (tmp_path / "page.md").read_text()
+    write_markdown(tmp_path / "page.md", [STUDY], [record(machine=MACHINE | {"cores_in_use": 1.5})])
+    assert "busy with other work when it began (1.5 cores in use)" in (tmp_path / "page.md").read_text()
 
 
 def test_the_html_page_is_one_file_that_escapes_what_it_shows(tmp_path: Path) -> None:
