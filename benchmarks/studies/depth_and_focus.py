@@ -35,6 +35,8 @@ MASKS = {
     "iou_of_oracle": ("pixel", "iou_oracle"),
 }
 DEFAULT, SWEEPS = depth_name("posterior"), (depth_name("likelihood-sweep"), depth_name("variance-sweep"))
+NOT_WORSE = 1.0
+"""What the errors of the better sweep are to be at least, relative to those of the default."""
 LEAST_SHARE = 1e-3
 """Shares of errors below this are as good as none when a ratio is taken."""
 
@@ -129,7 +131,7 @@ def _ratios(rows: list[Row]) -> list[Ratio]:
                 for some in (sweeps, [row])
             )
             where = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons"
-            found.append(Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own)))
+            found.append(Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own), NOT_WORSE))
     return found
 
 
