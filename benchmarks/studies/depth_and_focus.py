@@ -131,7 +131,9 @@ def _ratios(rows: list[Row]) -> list[Ratio]:
                 for some in (sweeps, [row])
             )
             where = f"{row.parameters['scene']}, {row.parameters['photons_per_view']:g} photons"
-            found.append(Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own), NOT_WORSE))
+            found.append(
+                Ratio(f"{where}: errors of the better sweep against {DEFAULT}", Value(best / own), NOT_WORSE)
+            )
     return found
 
 
