@@ -45,7 +45,11 @@ demo: llvm
 test: llvm
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
+	@# Types are checked on one core; the other compiles loops, which both workers of the tests would else do.
+	$(BIN)/pyright & types=$$!; folder=$$(mktemp -d); \
+	$(BIN)/pcii sample --out $$folder/data --quiet && \
+	$(BIN)/pcii run $$folder/data --out $$folder/results --method three-step --method likelihood --quiet; \
+	compiled=$$?; rm -rf $$folder; wait $$types && exit $$compiled
 	$(BIN)/python -m pytest -n 2 -m "not slow and not stress"
 
 stress: llvm

@@ -54,7 +54,7 @@ def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) ->
 
     Sums run in double precision, which is exact if no voxel has more than 2^53 photons.
     """
-    images = data.dense.reshape(data.grid.view_count, data.grid.height, -1)
+    images = _of_few_types(data.dense).reshape(data.grid.view_count, data.grid.height, -1)
     planes = [_Plane(data, focal_planes, p, shifts, np.int64, False) for p in range(len(focal_planes))]
     for plane in planes:
         plane.sum(np.arange(data.grid.view_count), images)
@@ -160,6 +160,15 @@ def _dtype(data: Views) -> np.dtype:
     """Type of the sums: float32 for float16 and float32 data, float64 for all others."""
     kind = getattr(data.radiance, "dtype", None)
     return np.dtype(np.float32) if kind in (np.float16, np.float32) else np.dtype(np.float64)
+
+
+def _of_few_types(counts: np.ndarray) -> np.ndarray:
+    """The same counts, not copied, as one of four types, for each of which loops are compiled.
+
+    None is negative, nor above 2^40, so that bits mean the same with a sign and without.
+    """
+    size = counts.dtype.itemsize
+    return counts.view(np.int64 if size == 8 else f"u{size}")
 
 
 def _in_memory(data: Views) -> np.ndarray | None:
