@@ -80,7 +80,7 @@ class Segmented(Brief):
 
         Panels, exposure and `axes` are those of `Sections.plot`.
         """
-        from pcii.figures.palette import COLOURS, literal
+        from pcii.figures.palette import COLOURS, plot_label
         from pcii.figures.panels import draw_outline
 
         panels, planes = self.sections._draw(axes, self.in_focus)
@@ -88,7 +88,7 @@ class Segmented(Brief):
         for panel, plane in zip(panels, planes, strict=True):
             draw_outline(panel, self.in_focus[plane], film, COLOURS[4])
             share = self.in_focus[plane].mean()
-            panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{literal(self.method)}")
+            panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{plot_label(self.method)}")
         return panels
 
 
@@ -191,7 +191,7 @@ class DepthPosterior(Brief):
         The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
         Matplotlib `axes`, by default those of a new figure. Raises `InputError` for a pixel outside the view.
         """
-        from pcii.figures.charts import draw_probability
+        from pcii.figures.charts import draw_depth_probability
         from pcii.figures.maps import draw_entropy
         from pcii.figures.panels import one_axes
 
@@ -204,7 +204,7 @@ class DepthPosterior(Brief):
         axes = one_axes(axes)
         a, b = i // self.block_px, j // self.block_px
         title = f"pixel ({i}, {j}), no surface: {self.no_surface[a, b]:.1%}"
-        draw_probability(axes, self.planes.z_mm, self.probability[:, a, b], title)
+        draw_depth_probability(axes, self.planes.z_mm, self.probability[:, a, b], title)
         return axes
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -51,25 +51,24 @@ class PosteriorDepth:
 
     def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
-        posterior, seen = self.posterior_and_seen(data, z_range_mm)
-        _, confidence, total_px = posterior.most_probable()
-        depth = np.where(seen, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
-        maps = depth, np.where(seen, confidence, 0.0)
-        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
-
-    def posterior_and_seen(
-        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
-    ) -> tuple[DepthPosterior, np.ndarray]:
-        """The posterior of planes through the range, and in which blocks (h, w) bool a surface is seen."""
         data = _without_faults(data)
         posterior, photons = self._posterior(data, z_range_mm)
-        plane = posterior.most_probable()[0]
-        seen = self._has_photons(photons, plane, posterior.block_px)
-        seen &= posterior.no_surface <= self.most_empty
-        if isinstance(data, PhotonCounts):
-            agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
-            seen &= agree | self._in_agreeing_region(agree, posterior)
-        return posterior, seen
+        plane, confidence, total_px = posterior.most_probable()
+        detected = self._detected(data, posterior, photons, plane)
+        depth = np.where(detected, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
+        maps = depth, np.where(detected, confidence, 0.0)
+        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
+
+    def posterior_with_detection(
+        self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
+    ) -> tuple[DepthPosterior, np.ndarray]:
+        """The posterior of planes through the range, and the blocks (h, w) bool where a surface is detected.
+
+        They are those where the depth map has an answer.
+        """
+        data = _without_faults(data)
+        posterior, photons = self._posterior(data, z_range_mm)
+        return posterior, self._detected(data, posterior, photons, posterior.most_probable()[0])
 
     def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
         """The posterior of planes through the range."""
@@ -92,6 +91,17 @@ class PosteriorDepth:
             probability, nothing = network_posterior(self.network_inputs(evidence, planes, block_px))
         posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
         return posterior, evidence.photons
+
+    def _detected(
+        self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray, plane: np.ndarray
+    ) -> np.ndarray:
+        """Where a surface is detected (h, w) bool, `plane` (h, w) the most probable one."""
+        detected = self._has_photons(photons, plane, posterior.block_px)
+        detected &= posterior.no_surface <= self.most_empty
+        if isinstance(data, PhotonCounts):
+            agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
+            detected &= agree | self._in_agreeing_region(agree, posterior)
+        return detected
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pcii.evaluation.tables import light_name
-from pcii.figures.charts import draw_diagonal, draw_reliability
-from pcii.figures.palette import COLOURS, MARKERS, literal
+from pcii.figures.charts import draw_diagonal, draw_reliability_diagram
+from pcii.figures.palette import COLOURS, MARKERS, plot_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -47,7 +47,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
             if own:
                 means = [row[part][measure] for row in own]
                 heights = [mean["mean"] for mean in means]
-                axes.errorbar(places, heights, yerr=_bars(means), label=literal(method), **style)
+                axes.errorbar(places, heights, yerr=_bars(means), label=plot_label(method), **style)
     photons = [row["photons_per_view"] for row in group["results"] if row["photons_per_view"] is not None]
     for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
         axes.set_xlabel(name)
@@ -101,7 +101,7 @@ def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         axes.set_ylabel("share within 1 px")
     shown = [method for method in methods if any(row["method"] == method for row in found)]
     handles = [Line2D([], [], markersize=5, **_style(methods.index(method))) for method in shown]
-    names = [literal(method) for method in shown]
+    names = [plot_label(method) for method in shown]
     figure.legend(handles, names, loc="outside lower center", ncols=columns, frameon=False, fontsize=9)
     return _data_uri(figure)
 
@@ -112,7 +112,7 @@ def _draw_bins(axes: "Axes", reliability: Mapping[str, Any], style: Mapping[str,
     stated, correct, shares = (
         [one[name]["mean"] for one in bins] for name in ("confidence", "correct", "share")
     )
-    draw_reliability(axes, stated, correct, shares, style)
+    draw_reliability_diagram(axes, stated, correct, shares, style)
 
 
 def _style(number: int) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.figures.palette import COLOURS, literal
+from pcii.figures.palette import COLOURS, plot_label
 from pcii.figures.panels import GRID_COLOUR, write_in_middle
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def draw_cameras(axes: "Axes", x_mm: np.ndarray, y_mm: np.ndarray, title: str) -
     quiet_grid(axes)
 
 
-def draw_probability(axes: "Axes", z_mm: np.ndarray, probability: np.ndarray, title: str) -> None:
+def draw_depth_probability(axes: "Axes", z_mm: np.ndarray, probability: np.ndarray, title: str) -> None:
     """Probability (Z,) of a surface at each depth in mm."""
     axes.fill_between(z_mm, probability, color=COLOURS[0], alpha=0.3, linewidth=0)
     marker = "o" if z_mm.size <= 40 else None
@@ -80,14 +80,14 @@ def draw_bars(
             if share is not None:
                 place = group + (number + 0.5) * thickness - BAR / 2
                 colour = COLOURS[number % len(COLOURS[:-1])]
-                named[literal(name)] = axes.barh(place, share, 0.92 * thickness, color=colour)
+                named[plot_label(name)] = axes.barh(place, share, 0.92 * thickness, color=colour)
                 axes.text(share + 0.01, place, f"{share:.2f}", va="center", fontsize="small")
     for group, most in enumerate(limits):
         if most is not None:
             ends = [group - BAR / 2, group + BAR / 2]
             (line,) = axes.plot([most, most], ends, color=GRID_COLOUR, linewidth=2)
             named["best by true depth"] = line
-    axes.set_yticks(range(len(groups)), [literal(name) for name in groups])
+    axes.set_yticks(range(len(groups)), [plot_label(name) for name in groups])
     axes.set_ylim(max(1, len(groups)) - 0.5, -0.5)
     axes.set_xlim(0, 1.12)
     axes.set_xticks(np.linspace(0, 1, 6))
@@ -100,7 +100,7 @@ def draw_bars(
         write_in_middle(axes, "nothing is scored")
 
 
-def draw_reliability(
+def draw_reliability_diagram(
     axes: "Axes",
     stated: Sequence[float],
     correct: Sequence[float],

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.figures.exposure import THUMBNAIL_PX, block_px
-from pcii.figures.palette import COLOURS, literal
+from pcii.figures.palette import COLOURS, plot_label
 from pcii.figures.panels import figure_of, show_picture, write_in_middle
 from pcii.figures.pictures import data_uri, depth_image
 
@@ -95,7 +95,7 @@ def draw_objects(axes: "Axes", object_id: np.ndarray, names: Mapping[int, str]) 
     for number in ids[np.argsort(-sizes, kind="stable")][:MOST_NAMES].tolist():
         i, j = _middle(object_id == number)
         axes.text(
-            j, i, literal(names[number]), bbox=box, clip_on=True, ha="center", va="center", color="black"
+            j, i, plot_label(names[number]), bbox=box, clip_on=True, ha="center", va="center", color="black"
         )
     if not ids.size:
         write_in_middle(axes, "no object is seen")

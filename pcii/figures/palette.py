@@ -9,10 +9,10 @@ LONGEST_NAME = 40
 """Characters of a name, about a third of a plot's width."""
 
 
-def literal(name: str) -> str:
-    """A name, cut to `LONGEST_NAME` and escaped so that Matplotlib shows it literally, in legends too.
+def plot_label(name: str) -> str:
+    """A name as text for Matplotlib: at most `LONGEST_NAME` characters, none read as mathematics.
 
-    >>> print(literal("_a$b"))
+    >>> print(plot_label("_a$b"))
     a\\$b
     """
     name = visible(name)

@@ -35,7 +35,8 @@ def several_axes(
 ) -> np.ndarray:
     """The `count` axes (N,) of panels of these proportions: those given, or those of a new figure.
 
-    A single panel may be given by itself. Raises `InputError` for another number of axes, or other things.
+    For one panel the axes may be given without a list. Raises `InputError` if the number of axes is not
+    `count`, or if something given is no Matplotlib axes.
     """
     from matplotlib import pyplot
     from matplotlib.axes import Axes

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.figures.charts import draw_bars, draw_diagonal, draw_reliability, quiet_grid
+from pcii.figures.charts import draw_bars, draw_diagonal, draw_reliability_diagram, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS
 from pcii.figures.panels import several_axes
 
@@ -54,7 +54,7 @@ def draw_score(
         draw_diagonal(panel)
         stated, correct, held = ([one[name] for one in bins] for name in ("confidence", "correct", "share"))
         style = {"color": COLOURS[0], "marker": MARKERS[0], "linestyle": "-"}
-        draw_reliability(panel, stated, correct, held, style)
+        draw_reliability_diagram(panel, stated, correct, held, style)
         panel.set_xlabel("stated confidence")
         panel.set_ylabel("share within 1 px")
         panel.set_title("confidence: right on the diagonal")

@@ -15,6 +15,7 @@ from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.removal.likelihood.likelihood_method import FOCUS_PX
 from pcii.sections.photon_statistics import cells_to_pixels
 
 
@@ -23,7 +24,7 @@ class PosteriorMasks:
     """The method with its constants, beside those of depth."""
 
     depth: PosteriorDepth = field(default_factory=PosteriorDepth)
-    within_px: float = 10.0
+    within_px: float = FOCUS_PX
     """What is farther from a plane in total disparity has a blur half-extent above 5 px, and is defocused."""
     around_px: float = 20.0
     """Depths are compared so far beyond the planes, since what is defocused is to be found as well."""
@@ -34,24 +35,23 @@ class PosteriorMasks:
         `steps` holds `probability` (Z, H, W) float32, that of a surface near the plane.
         """
         planes = sections.planes
-        posterior, seen = self.depth.posterior_and_seen(counts, self.range_mm(planes))
-        near = self.probability_near(posterior, planes.total_disparity_px)
+        posterior, detected = self.depth.posterior_with_detection(counts, self.range_mm(planes))
+        near = self.in_focus_probability(posterior, planes.total_disparity_px)
 
         def on_pixels(blocks: np.ndarray) -> np.ndarray:
             return np.stack([cells_to_pixels(each, posterior.block_px, counts.grid) for each in blocks])
 
-        in_focus = on_pixels((near > 0.5) & seen)
+        in_focus = on_pixels((near > 0.5) & detected)
         return Segmented(in_focus, "posterior", sections, {"probability": on_pixels(near)})
 
-    def probability_near(self, posterior: DepthPosterior, planes_px: np.ndarray) -> np.ndarray:
-        """Probability (P, h, w) float32 of a surface near each plane, given by its total disparity (P,)."""
+    def in_focus_probability(self, posterior: DepthPosterior, planes_px: np.ndarray) -> np.ndarray:
+        """Probability (P, h, w) float32 of being in focus at planes of the total disparities (P,)."""
         own_px, which = np.unique(planes_px, return_inverse=True)
         gaps_px = np.diff(own_px, prepend=-np.inf, append=np.inf)
         away_px = posterior.planes.total_disparity_px[:, None] - own_px
         within_px = [np.minimum(gaps / 2, self.within_px) for gaps in (gaps_px[:-1], gaps_px[1:])]
         near = (-within_px[0] < away_px) & (away_px <= within_px[1])
-        near = np.tensordot(near.T.astype(np.float32), posterior.probability, axes=1)
-        return near[which]
+        return np.tensordot(near.T.astype(np.float32), posterior.probability, axes=1)[which]
 
     def range_mm(self, planes: FocalPlanes) -> tuple[float, float]:
         """Near and far ends of the depths around the planes; no less than half of the least disparity."""

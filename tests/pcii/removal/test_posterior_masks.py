@@ -15,7 +15,7 @@ def test_a_plane_has_what_is_nearer_to_it_than_to_the_next_and_within_reach():
     probability[:, 0, 0] = 0.5 ** np.arange(1, total_px.size + 1)
     planes = FocalPlanes.at_total_disparity(grid, total_px)
     posterior = DepthPosterior(planes, probability, 1 - probability.sum(axis=0), 2)
-    near = PosteriorMasks(within_px=10.0).probability_near(posterior, np.array([55.0, 22.0, 28.0, 22.0]))
+    near = PosteriorMasks(within_px=10.0).in_focus_probability(posterior, np.array([55.0, 22.0, 28.0, 22.0]))
     of = dict(zip(total_px, probability[:, 0, 0], strict=True))
     expected = [
         sum(of[px] for px in total_px if low < px <= high)
