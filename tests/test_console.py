@@ -158,9 +158,9 @@ def test_of_an_unfinished_dataset_the_way_on_is_told(
 
 
 LOOPS = """
-from pcii.base.compiled_loops import helper
+from pcii.base.compiled_loops import compiled
 
-@helper
+@compiled
 def double(number):
     return 2 * number
 """

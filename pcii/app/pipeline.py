@@ -103,7 +103,7 @@ class _ReportedRadiance:
 
     def __init__(self, radiance: ArrayLike5D, total: int, report: Report) -> None:
         self._radiance, self._total, self._report, self._done = radiance, total, report, 0
-        self.shape = radiance.shape
+        self.shape, self.dtype = radiance.shape, getattr(radiance, "dtype", None)
 
     def __getitem__(self, index: Any, /) -> Any:
         self._done += 1

@@ -1,26 +1,76 @@
-"""Compilation of loops with Numba, which needs no system library.
+"""Compilation of loops with Numba, which needs no system library, and their threads.
 
 Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
 longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
-that is not writable, so each loop is compiled once per machine. All loops together take more than a minute,
-so commands report it (`progress`).
+that is not writable, so each loop is compiled once per machine. All loops together take half a minute, so
+commands report it (`progress`).
+
+Loops are shared among threads by ranges of their outermost index (`in_threads`). Numba's own parallel loops
+take twice as long to compile, and their OpenMP threads do not survive a fork.
 """
 
 import os
-
-# OpenMP threads that spin while they wait slow down every other program on the machine; threads that sleep
-# cost some microseconds per loop. The variable is read at Numba's import; a value set by the user stays.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numba as nb
 from numba.core import event
 
 from pcii.base.progress import report_compiling
 
-compiled = nb.njit(parallel=True, nogil=True, cache=True)
-"""Decorator of a loop that is run by several threads."""
-helper = nb.njit(nogil=True, cache=True)
-"""Decorator of a function that compiled loops call within one thread."""
+compiled = nb.njit(nogil=True, cache=True)
+"""Decorator of a compiled function."""
+helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # type: ignore
+"""Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
+
+PARTS_PER_THREAD = 4
+"""Ranges per thread: threads that are done early take over those of others."""
+
+_threads: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+_pool: ThreadPoolExecutor | None = None
+
+
+def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
+    """Results of a compiled `loop(first, last, *arguments)` for ranges that share 0 .. `count` - 1.
+
+    Several threads run the ranges, this one among them. Results come in the order of the ranges; how many
+    there are depends on the number of threads.
+    """
+    parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1
+    if parts <= 1:
+        return [loop(0, count, *arguments)]
+    ranges = [(count * part // parts, count * (part + 1) // parts) for part in range(parts)]
+    own = parts // _threads
+    others = [_thread_pool().submit(loop, *ends, *arguments) for ends in ranges[own:]]
+    return [loop(*ends, *arguments) for ends in ranges[:own]] + [other.result() for other in others]
+
+
+def use_threads(count: int) -> None:
+    """Run loops of this process in so many threads, at most as many as Numba is allowed (the cores)."""
+    global _threads
+    _threads = min(count, nb.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    _forget_pool()
+
+
+def threads() -> int:
+    """Number of threads that share a loop."""
+    return _threads
+
+
+def _thread_pool() -> ThreadPoolExecutor:
+    global _pool
+    if _pool is None:
+        _pool = ThreadPoolExecutor(_threads - 1, "loops")
+    return _pool
+
+
+def _forget_pool() -> None:
+    global _pool
+    _pool = None
+
+
+os.register_at_fork(after_in_child=_forget_pool)  # a pool's threads stay behind in the parent
 
 
 class _CompilingListener(event.Listener):
@@ -42,13 +92,3 @@ class _CompilingListener(event.Listener):
 
 
 event.register("numba:compile", _CompilingListener())
-
-
-def use_threads(count: int) -> None:
-    """Run compiled loops of this process on so many threads, at most as many as Numba has."""
-    nb.set_num_threads(min(count, nb.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-
-
-def threads() -> int:
-    """Number of threads that run a compiled loop."""
-    return nb.get_num_threads()

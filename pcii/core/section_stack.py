@@ -1,6 +1,6 @@
 """Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -28,16 +28,17 @@ Shifts = Literal["nearest", "bilinear", "even"]
 class Sections(Brief):
     """Sections of the scene at `planes`, in the frame of the virtual centre camera.
 
-    `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons,
-    real numbers for radiance. `coverage` (Z, H, W, C) is the number of these samples. With `subpixel` = M
-    the voxel grid is M times finer in both axes. `variance` (Z, H, W, C) is that of the samples of each
-    voxel, or None. `cfa` is the Bayer pattern of sections that are mosaics themselves (of even shifts).
+    `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons, real
+    numbers for radiance. `samples` is their `coverage`, or a function that makes it when it is first asked
+    for: on one plane that takes as long as adding 100 000 photons. With `subpixel` = M the voxel grid is M
+    times finer in both axes. `variance` (Z, H, W, C) is that of the samples of each voxel, or None. `cfa` is
+    the Bayer pattern of sections that are mosaics themselves (of even shifts).
     Raises `InputError` if the shapes differ. `pcii.reconstruct` makes them.
     """
 
     planes: FocalPlanes
     counts: np.ndarray
-    coverage: np.ndarray
+    samples: np.ndarray | Callable[[], np.ndarray]
     subpixel: int = 1
     normalisation: Normalisation = "overlap"
     variance: np.ndarray | None = None
@@ -47,10 +48,9 @@ class Sections(Brief):
         Z, H, W = len(self.planes), self.grid.height * self.subpixel, self.grid.width * self.subpixel
         if self.counts.shape[:3] != (Z, H, W) or self.counts.ndim != 4:
             raise InputError(f"counts: expected ({Z}, {H}, {W}, C), got {self.counts.shape}")
-        if self.coverage.shape != self.counts.shape:
-            raise InputError("coverage: must have the shape of counts")
         object.__setattr__(self, "counts", read_only(self.counts))
-        object.__setattr__(self, "coverage", read_only(self.coverage))
+        if isinstance(self.samples, np.ndarray):
+            self.coverage  # noqa: B018 an array of another shape is reported here
         check_cfa(self.cfa)
         if self.variance is not None:
             if self.variance.shape != self.counts.shape:
@@ -79,6 +79,14 @@ class Sections(Brief):
     def z_mm(self) -> np.ndarray:
         """Depths of the planes (Z,) float64."""
         return self.planes.z_mm
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """Number of the samples that meet at each voxel, or sum of their shares: (Z, H, W, C)."""
+        coverage = self.samples if isinstance(self.samples, np.ndarray) else self.samples()
+        if coverage.shape != self.counts.shape:
+            raise InputError("coverage: must have the shape of counts")
+        return read_only(coverage)
 
     @cached_property
     def estimate(self) -> np.ndarray:

@@ -4,10 +4,9 @@ Axes: i rows, j blocks of a row, z planes. A block's depth is that of its neighb
 plane with probabilities that fall by a factor with each plane, or jumps to any plane.
 """
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper, in_threads
 
 
 @helper
@@ -29,18 +28,32 @@ def pass_on(belief: np.ndarray, message: np.ndarray, fall: float, jump: float) -
         message[z] /= largest
 
 
-@compiled
 def chain_posteriors(likelihood: np.ndarray, fall: float, jump: float, least: float) -> np.ndarray:
     """Posterior probabilities of blocks from likelihoods of rows of them, both (h, w, Z) float32.
 
     The largest of a block is 1. Values below `least` are raised to it.
     """
-    h, w, Z = likelihood.shape
     posterior = np.empty_like(likelihood)
-    for i in nb.prange(h):
+    in_threads(_chain_posteriors, len(likelihood), posterior, likelihood, fall, jump, least)
+    return posterior
+
+
+@compiled
+def _chain_posteriors(
+    first: int,
+    last: int,
+    posterior: np.ndarray,
+    likelihood: np.ndarray,
+    fall: float,
+    jump: float,
+    least: float,
+) -> None:
+    """Of the rows `first` to `last` - 1."""
+    _, w, Z = likelihood.shape
+    for i in range(first, last):
         forward = np.empty((w, Z), np.float32)
         backward, belief = np.ones(Z, np.float32), np.empty(Z, np.float32)
-        forward[0] = 1
+        forward[0, :] = np.float32(1)
         for j in range(1, w):
             for z in range(Z):
                 belief[z] = forward[j - 1, z] * likelihood[i, j - 1, z]
@@ -54,4 +67,3 @@ def chain_posteriors(likelihood: np.ndarray, fall: float, jump: float, least: fl
             for z in range(Z):
                 posterior[i, j, z] = max(posterior[i, j, z] / largest, np.float32(least))
             pass_on(belief, backward, fall, jump)
-    return posterior

@@ -5,14 +5,13 @@ Axes: Z planes, C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N
 
 import math
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, in_threads
 from pcii.evidence.prediction_types import PlacedEvents, Predicted
 
 
-@helper
+@compiled
 def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray, photons: np.ndarray) -> None:
     """Adds to `gain` (H, W) the log-likelihood ratio, in nats, of the section to its blur at each event.
 
@@ -28,7 +27,6 @@ def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray,
             photons[colour[e], a, b] += n[e]
 
 
-@compiled
 def views_of_planes(
     expected: np.ndarray, rows: np.ndarray, cols: np.ndarray, weight: float, views: np.ndarray
 ) -> None:
@@ -37,10 +35,23 @@ def views_of_planes(
     `expected` (Z, H, W) are the photons per cell of the planes; `rows` (Z, A) and `cols` (Z, B) the shifts of
     A x B = V cameras in whole cells.
     """
+    in_threads(_views_of_planes, len(views), expected, rows, cols, weight, views)
+
+
+@compiled
+def _views_of_planes(
+    first: int,
+    last: int,
+    expected: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    weight: float,
+    views: np.ndarray,
+) -> None:
+    """Of the views `first` to `last` - 1."""
     Z, H, W = expected.shape
     across = cols.shape[1]
-    for view in nb.prange(views.shape[0]):
-        v = np.int64(view)
+    for v in range(first, last):
         for z in range(Z):
             down, right = rows[z, v // across], cols[z, v % across]
             for i in range(max(0, down), min(H, H + down)):
@@ -48,7 +59,6 @@ def views_of_planes(
                     views[v, i - down, j - right] += weight * expected[z, i, j]
 
 
-@compiled
 def duel_planes(
     views: np.ndarray,
     expected: np.ndarray,
@@ -65,10 +75,27 @@ def duel_planes(
     `predicted` (Z, N) is the rate of each event by each plane, `together` (N,) by their mean; `expected`
     (Z, H, W) are the photons per cell of each plane, `views` (V, H, W) those of their mean in each camera.
     """
-    Z, H, W = expected.shape
+    in_threads(_duel_planes, len(expected), views, expected, rows, cols, predicted, cell, together, n, result)
+
+
+@compiled
+def _duel_planes(
+    first: int,
+    last: int,
+    views: np.ndarray,
+    expected: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    predicted: np.ndarray,
+    cell: np.ndarray,
+    together: np.ndarray,
+    n: np.ndarray,
+    result: np.ndarray,
+) -> None:
+    """Of the planes `first` to `last` - 1."""
+    _, H, W = expected.shape
     across = cols.shape[1]
-    for plane in nb.prange(Z):
-        z = np.int64(plane)
+    for z in range(first, last):
         total = np.zeros((H, W), np.float32)
         number = np.zeros((H, W), np.float32)
         for v in range(views.shape[0]):

@@ -5,10 +5,9 @@ Axes: Z planes or labels, C colours, (H, W) cells.
 
 import math
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper, in_threads
 
 
 @helper
@@ -31,7 +30,6 @@ def _recursive_mean(values: np.ndarray, left: np.ndarray, up: np.ndarray) -> Non
             values[i, j] += up[i + 1, j] * (values[i + 1, j] - values[i, j])
 
 
-@compiled
 def windows_within_edges(
     narrow: np.ndarray,
     picture: np.ndarray,
@@ -47,8 +45,24 @@ def windows_within_edges(
     distance to the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira
     2011.
     """
-    Z, H, W = narrow.shape
-    for z in nb.prange(Z):
+    in_threads(_windows_within_edges, len(narrow), narrow, picture, noise, stiffness, scales, weights, result)
+
+
+@compiled
+def _windows_within_edges(
+    first: int,
+    last: int,
+    narrow: np.ndarray,
+    picture: np.ndarray,
+    noise: float,
+    stiffness: float,
+    scales: np.ndarray,
+    weights: np.ndarray,
+    result: np.ndarray,
+) -> None:
+    """Of the planes `first` to `last` - 1."""
+    _, H, W = narrow.shape
+    for z in range(first, last):
         distance = np.ones((2, H, W), np.float32)
         for i in range(H):
             for j in range(W):
@@ -63,7 +77,9 @@ def windows_within_edges(
                 distance[1, i, j] += stiffness * max(math.sqrt(down) / noise - 1, 0.0) ** 2
         left = np.empty((H, W), np.float32)
         up = np.empty((H, W), np.float32)
-        result[z] = narrow[z]
+        for i in range(H):
+            for j in range(W):
+                result[z, i, j] = narrow[z, i, j]
         for scale in range(scales.size):
             mean = narrow[z].copy()
             for turn in range(2):
@@ -81,8 +97,10 @@ def windows_within_edges(
 @helper
 def _pass_to_neighbour(message: np.ndarray, steps: np.ndarray, jump: float) -> None:
     """Least cost of each label given the neighbour's, in place: `steps` between labels, at most `jump`."""
-    top = message.min() + jump
-    low = message.min()
+    low = message[0]
+    for z in range(1, message.size):
+        low = min(low, message[z])
+    top = low + jump
     for z in range(1, message.size):
         message[z] = min(message[z], message[z - 1] + steps[z - 1])
     for z in range(message.size - 2, -1, -1):
@@ -91,7 +109,6 @@ def _pass_to_neighbour(message: np.ndarray, steps: np.ndarray, jump: float) -> N
         message[z] = min(message[z], top) - low
 
 
-@compiled
 def pass_messages(
     cost: np.ndarray, messages: np.ndarray, direction: int, steps: np.ndarray, jump: float
 ) -> None:
@@ -99,11 +116,25 @@ def pass_messages(
 
     A change to the next label costs `steps` (Z - 1,), any change at most `jump`. Lines are independent.
     """
+    lines = cost.shape[0] if direction < 2 else cost.shape[1]
+    in_threads(_pass_messages, lines, cost, messages, direction, steps, jump)
+
+
+@compiled
+def _pass_messages(
+    first: int,
+    last: int,
+    cost: np.ndarray,
+    messages: np.ndarray,
+    direction: int,
+    steps: np.ndarray,
+    jump: float,
+) -> None:
+    """Along the rows, or for the directions 2 and 3 the columns, `first` to `last` - 1."""
     H, W, Z = cost.shape
     sideways = direction < 2
     opposite = direction + 1 if direction % 2 == 0 else direction - 1
-    for number in nb.prange(H if sideways else W):
-        line = np.int64(number)
+    for line in range(first, last):
         length = W if sideways else H
         message = np.zeros(Z, np.float32)
         for step in range(length):

@@ -1,13 +1,12 @@
-"""Compiled: the rate of each photon's pixel and colour, estimated from all other photons of a section.
+"""The rate of each photon's pixel and colour, estimated from all other photons of a section.
 
 Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 """
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
-from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
+from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted, Scales
 from pcii.evidence.projection_kernels import BLOCK_PX, views_of_blocks
 from pcii.evidence.smoothing_kernels import CENTRE, enclosing_centres, halved, linear_at, smoothed
 
@@ -24,13 +23,36 @@ BASE_SHARE = 0.05
 BATCH = 512
 """Events that are carried through the scales together."""
 
-Scales = tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray], float, np.ndarray, np.ndarray]
-"""A section at each scale, smoothed: views and photons (1, H, W), photons by colour (C, H, W); the mean rate;
-how many camera rows (2 h,) and columns (2 w,) cover each row and column of blocks. A plain tuple, since
-Numba's parallel loops accept named tuples as arguments only."""
+
+def predict(events: PlacedEvents, section: PlaneView, predicted: Predicted) -> None:
+    """Writes to `predicted` the rates of all events and cells of a section, in one thread."""
+    N, h = events.k.size, predicted.mean.shape[0]
+    scales = _scales(events, section, 0)
+    _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, predicted)
+    _predict_cells(0, h, 0, 0, False, section, scales, predicted)
 
 
-@helper
+def predict_shared(
+    selected: np.ndarray,
+    cell_rows: tuple[int, int],
+    finest: int,
+    events: PlacedEvents,
+    section: PlaneView,
+    predicted: Predicted,
+) -> None:
+    """`predict` shared among threads, for the events that are `selected` (N,) bool.
+
+    Rates of cells are those at their centres: sharper, but not the mean over their pixels. Only cells in the
+    rows `cell_rows`, (first, last + 1), are written. With `finest` = BASE_SCALE only the widest window is
+    computed: `base` and `blurred` are valid, `rate` and `mean` are not.
+    """
+    scales = _scales(events, section, finest)
+    in_threads(_predict_events, events.k.size, selected, finest, events, section, scales, predicted)
+    top, bottom = cell_rows
+    in_threads(_predict_cells, bottom - top, top, finest, True, section, scales, predicted)
+
+
+@compiled
 def _scales(events: PlacedEvents, section: PlaneView, finest: int) -> Scales:
     """The section at the scales from `finest` to the coarsest."""
     k, l, i, j, colour, n, weight, cell = events
@@ -51,21 +73,39 @@ def _scales(events: PlacedEvents, section: PlaneView, finest: int) -> Scales:
         for b in range(by_col.size):
             views[0, a, b] = by_row[a] * by_col[b] * view_share[a // 2, b // 2]
     mean_rate = totals.sum() / max(views.sum(), 1e-6)
-    views_at, photons_at, colours_at = [], [], []
+    views_at = np.empty((SCALES, 1, by_row.size, by_col.size))
+    photons_at = np.empty(views_at.shape)
+    colours_at = np.empty((SCALES - COLOUR_SCALE, *counts.shape))
     for scale in range(SCALES):
         if scale > 0:
             totals, views = halved(totals), halved(views)
         if scale > COLOUR_SCALE:
             counts = halved(counts)
-        # Scales that are not used have one element, so that the lists are indexed by scale.
-        used, by_colour = scale >= finest, scale >= max(COLOUR_SCALE, finest)
-        views_at.append(smoothed(views if used else views[:, :1, :1].copy()))
-        photons_at.append(smoothed(totals if used else totals[:, :1, :1].copy()))
-        colours_at.append(smoothed(counts if by_colour else counts[:, :1, :1].copy()))
-    return views_at, photons_at, colours_at, mean_rate, by_row, by_col
+        if scale >= finest:
+            _put(views_at[scale], smoothed(views))
+            _put(photons_at[scale], smoothed(totals))
+        if scale >= max(COLOUR_SCALE, finest):
+            _put(colours_at[scale - COLOUR_SCALE], smoothed(counts))
+    return Scales(views_at[:, 0], photons_at[:, 0], colours_at, by_row, by_col, mean_rate)
 
 
 @helper
+def _put(target: np.ndarray, values: np.ndarray) -> None:
+    """Writes `values` (C, H, W) to the first rows and columns of `target`."""
+    for c in range(values.shape[0]):
+        for i in range(values.shape[1]):
+            line, row = target[c, i], values[c, i]
+            for j in range(row.size):
+                line[j] = row[j]
+
+
+@helper
+def _size_at(scale: int, size: int) -> int:
+    """How many places of a scale cover so many of the finest."""
+    return (size + (1 << scale) - 1) >> scale
+
+
+@compiled
 def _predict_events(
     first: int,
     last: int,
@@ -79,7 +119,7 @@ def _predict_events(
     """Writes `rate` and `base` of those events from `first` to `last` - 1 that are `selected` (N,) bool."""
     k, l, i, j, colour, _, weight, cell = events
     rows, cols, _, _, sites, _, prior = section
-    views_at, photons_at, colours_at, mean_rate, _, _ = scales
+    views_at, photons_at, colours_at, by_row, by_col, mean_rate = scales
     rate, base, _, _, _ = predicted
     share_of_site = sites / sites.sum()
     # Scale by scale for a batch of events: taking an array from a list costs as much as interpolating in it.
@@ -99,8 +139,12 @@ def _predict_events(
             sums[x] = 0.0
         for reverse in range(SCALES - finest):
             scale = SCALES - 1 - reverse
-            views, photons, by_colour = views_at[scale], photons_at[scale], colours_at[scale]
-            _, high, wide = views.shape
+            views, photons, by_colour = (
+                views_at[scale],
+                photons_at[scale],
+                colours_at[max(scale - COLOUR_SCALE, 0)],
+            )
+            high, wide = _size_at(scale, by_row.size), _size_at(scale, by_col.size)
             cells_per_px = 1 / float(BLOCK_PX << scale)
             for x in range(size):
                 e = batch[x]
@@ -108,15 +152,15 @@ def _predict_events(
                 row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
                 if scale == 0:  # the finest blocks are not interpolated
                     self_weight = CENTRE * CENTRE * weight[e]
-                    samples_here = views[0, row // BLOCK_PX, col // BLOCK_PX] * sites[c]
-                    other_photons = max(photons[0, row // BLOCK_PX, col // BLOCK_PX] - self_weight, 0.0)
+                    samples_here = views[row // BLOCK_PX, col // BLOCK_PX] * sites[c]
+                    other_photons = max(photons[row // BLOCK_PX, col // BLOCK_PX] - self_weight, 0.0)
                 else:
                     top, bottom, share_i, self_i = enclosing_centres((float(row) + 0.5) * cells_per_px, high)
                     left, right, share_j, self_j = enclosing_centres((float(col) + 0.5) * cells_per_px, wide)
                     self_weight = self_i * self_j * weight[e]
-                    samples_here = linear_at(views[0], top, bottom, share_i, left, right, share_j) * sites[c]
+                    samples_here = linear_at(views, top, bottom, share_i, left, right, share_j) * sites[c]
                     other_photons = max(
-                        linear_at(photons[0], top, bottom, share_i, left, right, share_j) - self_weight, 0.0
+                        linear_at(photons, top, bottom, share_i, left, right, share_j) - self_weight, 0.0
                     )
                     if scale >= COLOUR_SCALE:
                         same = max(
@@ -133,22 +177,29 @@ def _predict_events(
             base[batch[x]] = widest[x]
 
 
-@helper
+@compiled
 def _predict_cells(
-    first: int, last: int, finest: int, sharp: bool, section: PlaneView, scales: Scales, predicted: Predicted
+    first: int,
+    last: int,
+    top: int,
+    finest: int,
+    sharp: bool,
+    section: PlaneView,
+    scales: Scales,
+    predicted: Predicted,
 ) -> None:
-    """Writes `samples`, `mean` and `blurred` of the rows of cells from `first` to `last` - 1.
+    """Writes `samples`, `mean` and `blurred` of the rows of cells from `first` to `last` - 1 below `top`.
 
     Mean over blocks, in each of which rates are linear, weighted by the views that cover it: so `samples`
     times `mean` is the sum of the rates that `_predict_events` gives the pixels of the cell, wherever events
     are. If `sharp`, coarser scales are evaluated at the centre of the cell instead, as in a picture.
     """
     prior = section.prior_samples
-    views_at, photons_at, _, mean_rate, by_row, by_col = scales
+    views_at, photons_at, _, by_row, by_col, mean_rate = scales
     _, _, samples, mean, blurred = predicted
     blocks = by_col.size
     rates, sums, widest = np.zeros((3, blocks), np.float64)
-    for a in range(first, last):
+    for a in range(top + first, top + last):
         for b in range(mean.shape[1]):
             samples[a, b] = (by_row[2 * a] + by_row[2 * a + 1]) * (by_col[2 * b] + by_col[2 * b + 1])
             mean[a, b] = blurred[a, b] = 0.0
@@ -159,8 +210,8 @@ def _predict_cells(
             sums[:] = 0.0
             for reverse in range(SCALES - finest):
                 scale = SCALES - 1 - reverse
-                views, photons = views_at[scale][0], photons_at[scale][0]
-                high, wide = views.shape
+                views, photons = views_at[scale], photons_at[scale]
+                high, wide = _size_at(scale, by_row.size), _size_at(scale, by_col.size)
                 cells_per_block, centred = 1 / float(1 << scale), sharp and scale > 0
                 row = 2 * a + 1.0 if centred else u + 0.5
                 top, bottom, share_i, _ = enclosing_centres(row * cells_per_block, high)
@@ -179,38 +230,3 @@ def _predict_cells(
                 share = by_row[u] * by_col[v] / max(samples[a, v // 2], 1e-6)
                 mean[a, v // 2] += share * ((1 - BASE_SHARE) * sums[v] + BASE_SHARE * widest[v])
                 blurred[a, v // 2] += share * widest[v]
-
-
-@helper
-def predict(events: PlacedEvents, section: PlaneView, predicted: Predicted) -> None:
-    """Writes to `predicted` the rates of all events and cells of a section, in one thread."""
-    N, h = events.k.size, predicted.mean.shape[0]
-    scales = _scales(events, section, 0)
-    _predict_events(0, N, np.ones(N, np.bool_), 0, events, section, scales, predicted)
-    _predict_cells(0, h, 0, False, section, scales, predicted)
-
-
-@compiled
-def predict_shared(
-    chunks: int,
-    selected: np.ndarray,
-    cell_rows: tuple[int, int],
-    finest: int,
-    events: PlacedEvents,
-    section: PlaneView,
-    predicted: Predicted,
-) -> None:
-    """`predict` in `chunks` shared among threads, for the events that are `selected` (N,) bool.
-
-    Rates of cells are those at their centres: sharper, but not the mean over their pixels. Only cells in the
-    rows `cell_rows`, (first, last + 1), are written. With `finest` = BASE_SCALE only the widest window is
-    computed: `base` and `blurred` are valid, `rate` and `mean` are not.
-    """
-    N, (first, last) = events.k.size, cell_rows
-    scales = _scales(events, section, finest)
-    for chunk in nb.prange(chunks):
-        begin, end = N * chunk // chunks, N * (chunk + 1) // chunks
-        _predict_events(begin, end, selected, finest, events, section, scales, predicted)
-        top = first + (last - first) * chunk // chunks
-        bottom = first + (last - first) * (chunk + 1) // chunks
-        _predict_cells(top, bottom, finest, True, section, scales, predicted)

@@ -44,6 +44,25 @@ class PlaneView(NamedTuple):
     """Weight of the next coarser scale's rate, in samples."""
 
 
+class Scales(NamedTuple):
+    """A section at S scales, smoothed, float64: each in the first rows and columns of its plane.
+
+    Blocks are of 2 px at the finest scale, and twice as wide at each further one.
+    """
+
+    views: np.ndarray
+    """Views that cover each block (S, 2 H, 2 W), and `photons` the photons there."""
+    photons: np.ndarray
+    colours: np.ndarray
+    """Photons by colour (S', C, ...), of the S' coarsest scales."""
+    by_row: np.ndarray
+    """How many camera rows cover each row of the finest blocks (2 H,)."""
+    by_col: np.ndarray
+    """How many camera columns cover each column of the finest blocks (2 W,)."""
+    mean_rate: float
+    """Photons per block and view of the section as a whole."""
+
+
 class Predicted(NamedTuple):
     """Rates that a section predicts, overwritten; float64, as a small share of many photons is many."""
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.base.compiled_loops import helper
+from pcii.base.compiled_loops import compiled, helper
 from pcii.evidence.cells import CELL_PX
 
 BLOCK_PX = 2
@@ -23,7 +23,7 @@ def _whole_blocks(shift: int, size: int) -> tuple[int, int]:
     return first + first % BLOCK_PX, last - last % BLOCK_PX
 
 
-@helper
+@compiled
 def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
     """How many camera rows (or columns) cover each row (or column) of blocks, (blocks,) float64."""
     count = np.zeros(blocks)
@@ -34,7 +34,7 @@ def views_of_blocks(shifts: np.ndarray, size: int, blocks: int) -> np.ndarray:
     return count
 
 
-@helper
+@compiled
 def cells_of_events(
     k: np.ndarray,
     l: np.ndarray,

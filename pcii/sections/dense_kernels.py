@@ -1,9 +1,8 @@
 """Compiled loops that add up whole images, with their variances."""
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled
+from pcii.base.compiled_loops import compiled, in_threads
 from pcii.sections.image_moves import Groups, Moves, Running
 from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
 
@@ -11,7 +10,10 @@ BAND = 16
 """Rows of a section that are summed at a time when all views are in memory: their sums stay in the cache."""
 
 
-@compiled
+def _bands(height: int) -> int:
+    return -(-height // BAND)
+
+
 def sum_views(
     sums: np.ndarray, variance: np.ndarray, images: np.ndarray, moves: Moves, groups: Groups
 ) -> bool:
@@ -19,9 +21,23 @@ def sum_views(
 
     `variance` is empty if it is not wanted. Returns whether the results and all images are finite.
     """
+    return all(in_threads(_sum_views, _bands(images.shape[1]), sums, variance, images, moves, groups))
+
+
+@compiled
+def _sum_views(
+    first_band: int,
+    last_band: int,
+    sums: np.ndarray,
+    variance: np.ndarray,
+    images: np.ndarray,
+    moves: Moves,
+    groups: Groups,
+) -> bool:
+    """Of the bands from `first_band` to `last_band` - 1."""
     height, width = images.shape[1:]
-    bad = bad_rows(images, moves)
-    for band in nb.prange((height + BAND - 1) // BAND):
+    bad = bad_rows(images, moves) if first_band == 0 else 0
+    for band in range(first_band, last_band):
         top = band * BAND
         bottom = min(top + BAND, height)
         shape = (moves.ends.size, bottom - top, width)
@@ -40,27 +56,39 @@ def sum_views(
     return bad == 0
 
 
-@compiled
 def add_views(running: Running, images: np.ndarray, moves: Moves) -> bool:
     """Add shifted images (V, H, N) to running sums of their groups.
 
     Returns whether all pixels that fall outside the section are finite.
     """
-    bad = bad_rows(images, moves)
+    return all(in_threads(_add_views, _bands(images.shape[1]), running, images, moves))
+
+
+@compiled
+def _add_views(first_band: int, last_band: int, running: Running, images: np.ndarray, moves: Moves) -> bool:
+    """Of the bands from `first_band` to `last_band` - 1."""
+    bad = bad_rows(images, moves) if first_band == 0 else 0
     height = running.total.shape[1]
-    for band in nb.prange((height + BAND - 1) // BAND):
+    for band in range(first_band, last_band):
         bad += add_rows(running, images, moves, 0, band * BAND, min((band + 1) * BAND, height))
     return bad == 0
 
 
-@compiled
 def merge_groups(sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups) -> bool:
     """Sums and, unless it is empty, variances (H, W, C) from the running sums of the groups.
 
     Returns whether the results are finite.
     """
+    return all(in_threads(_merge_groups, len(sums), sums, variance, running, groups))
+
+
+@compiled
+def _merge_groups(
+    first: int, last: int, sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups
+) -> bool:
+    """Of the rows `first` to `last` - 1."""
     bad = 0
-    for line in nb.prange(sums.shape[0]):
+    for line in range(first, last):
         merge_line(sums, variance, running, groups, 0, line)
         bad += not_finite(sums[line])
         if variance.size:
@@ -68,7 +96,6 @@ def merge_groups(sums: np.ndarray, variance: np.ndarray, running: Running, group
     return bad == 0
 
 
-@compiled
 def add_fine(
     total: np.ndarray,
     squares: np.ndarray,
@@ -83,8 +110,24 @@ def add_fine(
     Pixel (i, j) belongs to voxel (`rows[i]`, `cols[j]`): no two of an image to the same. `cells` (2, 2) are
     the colours of a mosaic's Bayer cells, empty where every pixel holds all colours.
     """
+    in_threads(_add_fine, len(image), total, squares, first, image, rows, cols, cells)
+
+
+@compiled
+def _add_fine(
+    first_row: int,
+    last_row: int,
+    total: np.ndarray,
+    squares: np.ndarray,
+    first: np.ndarray,
+    image: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    cells: np.ndarray,
+) -> None:
+    """Of the rows `first_row` to `last_row` - 1 of the image."""
     height, width, _ = total.shape
-    for i in nb.prange(image.shape[0]):
+    for i in range(first_row, last_row):
         row = rows[i]
         if row < 0 or row >= height:
             continue

@@ -2,14 +2,36 @@
 
 from typing import NamedTuple
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled
+from pcii.base.compiled_loops import compiled, in_threads, threads
+
+
+def scatter(
+    counts: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    starts: np.ndarray,
+    i: np.ndarray,
+    j: np.ndarray,
+    colour: np.ndarray,
+    n: np.ndarray,
+) -> None:
+    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
+
+    `rows` (Z, K, h) and `cols` (Z, L, w) are the voxels of the pixels of each camera; `starts` (K L + 1,) is
+    where each view's photons begin, which are sorted by row. Each section is divided into bands of rows: a
+    thread clears a band and adds the photons that fall in it.
+    """
+    # Bands give every thread work if there are fewer sections than threads.
+    bands = max(1, threads() // len(counts))
+    in_threads(_scatter, len(counts) * bands, counts, rows, cols, starts, i, j, colour, n, bands)
 
 
 @compiled
-def scatter(
+def _scatter(
+    first_part: int,
+    last_part: int,
     counts: np.ndarray,
     rows: np.ndarray,
     cols: np.ndarray,
@@ -20,18 +42,13 @@ def scatter(
     n: np.ndarray,
     bands: int,
 ) -> None:
-    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
-
-    `rows` (Z, K, h) and `cols` (Z, L, w) are the voxels of the pixels of each camera; `starts` (K L + 1,) is
-    where each view's photons begin, which are sorted by row. Each section is divided into `bands` of rows;
-    a thread clears a band and adds the photons that fall in it.
-    """
-    planes, height, width, _ = counts.shape
+    """Of the parts plane * `bands` + band from `first_part` to `last_part` - 1."""
+    _, height, width, _ = counts.shape
     across = cols.shape[1]
-    for part in nb.prange(planes * bands):
+    for part in range(first_part, last_part):
         plane, band = part // bands, part % bands
         first, last = height * band // bands, height * (band + 1) // bands
-        counts[plane, first:last] = 0
+        counts[plane, first:last, :, :] = 0
         for view in range(starts.size - 1):
             row_of, col_of = rows[plane, view // across], cols[plane, view % across]
             low, high = starts[view], starts[view + 1]
@@ -50,11 +67,18 @@ def scatter(
                     counts[plane, row, col, colour[e]] += n[e]
 
 
-@compiled
 def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
     """Set each row n of `target` (N, M) to row `kinds[n]` of `rows` (P, M)."""
-    for row in nb.prange(target.shape[0]):
-        target[row] = rows[kinds[row]]
+    in_threads(_copy_rows, len(target), target, kinds, rows)
+
+
+@compiled
+def _copy_rows(first: int, last: int, target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
+    """Of the rows `first` to `last` - 1."""
+    for row in range(first, last):
+        source, line = rows[kinds[row]], target[row]
+        for x in range(line.size):
+            line[x] = source[x]
 
 
 class Samples(NamedTuple):
@@ -70,8 +94,23 @@ class Samples(NamedTuple):
     squares: np.ndarray
 
 
-@compiled
 def window_samples(
+    samples: Samples, row: np.ndarray, col: np.ndarray, n: np.ndarray, starts: np.ndarray, window: int
+) -> None:
+    """Statistics of each window's samples that are not zero, from zeros.
+
+    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
+    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
+    thread owns a band of rows. The cost follows the photons times the cells of a window.
+    """
+    bands = threads()
+    in_threads(_window_samples, bands, samples, row, col, n, starts, window, bands)
+
+
+@compiled
+def _window_samples(
+    first_band: int,
+    last_band: int,
     samples: Samples,
     row: np.ndarray,
     col: np.ndarray,
@@ -80,17 +119,12 @@ def window_samples(
     window: int,
     bands: int,
 ) -> None:
-    """Statistics of each window's samples that are not zero, from zeros.
-
-    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
-    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
-    thread owns a band of rows. The cost follows the photons times the cells of a window.
-    """
+    """Of the bands from `first_band` to `last_band` - 1."""
     number, first, difference, squares = samples
     height, width = number.shape
     above = (window - 1) // 2  # the window of a cell reaches further above and left of it if its size is even
     below = window // 2
-    for band in nb.prange(bands):
+    for band in range(first_band, last_band):
         start, stop = height * band // bands, height * (band + 1) // bands
         sample = np.zeros((stop - start, width), np.int64)
         for view in range(starts.size - 1):

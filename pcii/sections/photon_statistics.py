@@ -129,7 +129,6 @@ def view_samples(
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
     """
-    from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
 
     grid, events = counts.grid, counts.events
@@ -141,7 +140,7 @@ def view_samples(
     starts = np.append(0, np.cumsum(inside))[counts.view_starts]
     cells = row[inside] // cell_px, col[inside] // cell_px
     samples = kernels.Samples(number, first, difference, squares)
-    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells, threads())
+    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells)
     mean = (number * first + difference) / np.maximum(number, 1)
     deviations = np.maximum(number * squares - difference.astype(np.float64) ** 2, 0)
     variance = deviations / np.maximum(number * (number - 1), 1)

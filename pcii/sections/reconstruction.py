@@ -7,6 +7,7 @@ interpolated.
 """
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -73,22 +74,22 @@ def reconstruct(
     shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
     rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
     if shifts == "bilinear":
-        coverage = _shared_coverage(planes, cfa, shape)
+        coverage_of = partial(_shared_coverage, planes, cfa, shape)
     else:
-        coverage = _coverage(planes, cfa, shape, rows, cols)
+        coverage_of = partial(_coverage, planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
         if subpixel == 1 and _as_images(data):
             sums = sum_counts(data, planes, shifts)
         else:
             sums = _scatter(data, data.events.n, shape, rows, cols)
         if variance:
-            sample_variance = _count_variance(data, sums, coverage, rows, cols)
+            sample_variance = _count_variance(data, sums, coverage_of(), rows, cols)
     elif subpixel > 1:
-        sums, sample_variance = sum_fine(data, rows, cols, coverage, variance=variance)
+        sums, sample_variance = sum_fine(data, rows, cols, coverage_of(), variance=variance)
     else:
         sums, sample_variance = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
-    return Sections(planes, sums, coverage, subpixel, normalisation, sample_variance, mosaic)
+    return Sections(planes, sums, coverage_of, subpixel, normalisation, sample_variance, mosaic)
 
 
 def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
@@ -121,8 +122,12 @@ def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sec
     return Sections(
         planes,
         np.concatenate([sections.counts, added.counts]),
-        np.concatenate([sections.coverage, added.coverage]),
+        partial(_joined_coverage, sections, added),
     )
+
+
+def _joined_coverage(first: Sections, second: Sections) -> np.ndarray:
+    return np.concatenate([first.coverage, second.coverage])
 
 
 def _check(
@@ -161,16 +166,13 @@ def _scatter(
     cols: np.ndarray,
 ) -> np.ndarray:
     """Sums per voxel and colour of `n` (N,), a whole number for each event; the cost follows the photons."""
-    from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
 
     events = data.events
     # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.
     counts = np.empty(shape, dtype=np.int32 if n is events.n and data.total < 2**31 else np.int64)
-    # Bands give every thread work if there are fewer sections than threads.
-    bands = max(1, threads() // shape[0])
     colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
-    kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n, bands)
+    kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n)
     return counts
 
 

@@ -8,10 +8,9 @@ beside the photons that tell where it is, at some depths in more views than at o
 
 import math
 
-import numba as nb
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper
+from pcii.base.compiled_loops import compiled, helper, in_threads
 from pcii.evidence.cells import CELL_PX
 
 PARTS = CELL_PX * CELL_PX
@@ -56,7 +55,7 @@ def _moved_in_parts(values: np.ndarray, p: int, q: int, times: float) -> np.ndar
     return moved
 
 
-@helper
+@compiled
 def filled(mask: np.ndarray) -> tuple[int, int, int, int]:
     """First and last row + 1, first and last column + 1 in which a mask (H, W) has anything."""
     H, W = mask.shape
@@ -128,20 +127,39 @@ def _look_through(
                     _add(seen[i + 1 - u, x : x + W], high * wide / PARTS**2, band[i])
 
 
-@compiled
 def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, covered: np.ndarray) -> None:
     """Adds `step` times the px of a `mask` (H, W) in each cell of the views to `covered` (V, H, W) uint16."""
-    _, H, W = covered.shape
     top, bottom, left, right = filled(mask)
     cells = mask[top:bottom, left:right].astype(np.uint16)
-    for part in nb.prange(PARTS):
-        p, q = int(np.int64(part) // CELL_PX), int(np.int64(part) % CELL_PX)
+    in_threads(_cover, PARTS, cells, (top, left), rows, cols, step, covered)
+
+
+@compiled
+def _cover(
+    first_part: int,
+    last_part: int,
+    cells: np.ndarray,
+    corner: tuple[int, int],
+    rows: np.ndarray,
+    cols: np.ndarray,
+    step: int,
+    covered: np.ndarray,
+) -> None:
+    """Of the views that are p, q px beyond whole cells, p `CELL_PX` + q from `first_part` to `last_part` - 1.
+
+    `cells` (h, w) are the box of the mask whose first row and column are the `corner`.
+    """
+    _, H, W = covered.shape
+    top, left = corner
+    bottom, right = top + cells.shape[0], left + cells.shape[1]
+    for part in range(first_part, last_part):
+        p, q = part // CELL_PX, part % CELL_PX
         views = _views_at(rows, cols, p, q)
         if views.size == 0:
             continue
         moved = _moved_in_parts(cells, p, q, step)
         for number in range(views.size):
-            v = np.int64(views[number])
+            v = int(views[number])
             first, last, down = _shown(top, bottom, rows[v // cols.size], H)
             begin, end, over = _shown(left, right, cols[v % cols.size], W)
             for i in range(first, last):
@@ -150,23 +168,39 @@ def cover(mask: np.ndarray, rows: np.ndarray, cols: np.ndarray, step: int, cover
                     line[j] += there[j]
 
 
-@compiled
 def paint(
     mask: np.ndarray, light: np.ndarray, rows: np.ndarray, cols: np.ndarray, behind: np.ndarray
 ) -> None:
     """Where a layer's `mask` (H, W) is, views show its `light` (H, W) before what is `behind` (V, H, W)."""
-    _, H, W = behind.shape
     top, bottom, left, right = filled(mask)
-    there = mask[top:bottom, left:right].astype(np.float32)
-    shown = there * light[top:bottom, left:right]
-    for part in nb.prange(PARTS):
-        p, q = int(np.int64(part) // CELL_PX), int(np.int64(part) % CELL_PX)
+    cells = mask[top:bottom, left:right].astype(np.float32)
+    shown = cells * light[top:bottom, left:right]
+    in_threads(_paint, PARTS, cells, shown, (top, left), rows, cols, behind)
+
+
+@compiled
+def _paint(
+    first_part: int,
+    last_part: int,
+    cells: np.ndarray,
+    light: np.ndarray,
+    corner: tuple[int, int],
+    rows: np.ndarray,
+    cols: np.ndarray,
+    behind: np.ndarray,
+) -> None:
+    """Of the parts of `_cover`; `cells` and `light` (h, w) are the box of the mask, and what it shows."""
+    _, H, W = behind.shape
+    top, left = corner
+    bottom, right = top + cells.shape[0], left + cells.shape[1]
+    for part in range(first_part, last_part):
+        p, q = part // CELL_PX, part % CELL_PX
         views = _views_at(rows, cols, p, q)
         if views.size == 0:
             continue
-        shares, lights = _moved_in_parts(there, p, q, 1 / PARTS), _moved_in_parts(shown, p, q, 1 / PARTS)
+        shares, lights = _moved_in_parts(cells, p, q, 1 / PARTS), _moved_in_parts(light, p, q, 1 / PARTS)
         for number in range(views.size):
-            v = np.int64(views[number])
+            v = int(views[number])
             first, last, down = _shown(top, bottom, rows[v // cols.size], H)
             begin, end, over = _shown(left, right, cols[v % cols.size], W)
             for i in range(first, last):
@@ -177,34 +211,68 @@ def paint(
                     line[j] = line[j] * (1 - share[j]) + own[j]
 
 
-@compiled
 def views_of(covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray) -> None:
     """How many views see a layer's cells past what is `covered` (V, H, W): `total` (H, W), overwritten."""
-    for part in nb.prange((total.shape[0] + BAND - 1) // BAND):
-        top = int(np.int64(part) * BAND)
+    in_threads(_views_of, -(-len(total) // BAND), covered, rows, cols, total)
+
+
+@compiled
+def _views_of(
+    first_band: int,
+    last_band: int,
+    covered: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    total: np.ndarray,
+) -> None:
+    """Of the bands from `first_band` to `last_band` - 1."""
+    for top in range(first_band * BAND, last_band * BAND, BAND):
         _look_through(covered, None, rows, cols, top, total[top : top + BAND])
 
 
-@compiled
 def light_of(
     behind: np.ndarray, covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray
 ) -> None:
     """What they see there of what is `behind` (V, H, W), all views together: `total` (H, W), overwritten."""
-    for part in nb.prange((total.shape[0] + BAND - 1) // BAND):
-        top = int(np.int64(part) * BAND)
-        _look_through(covered, behind, rows, cols, top, total[top : top + BAND])
+    in_threads(_light_of, -(-len(total) // BAND), behind, covered, rows, cols, total)
 
 
 @compiled
+def _light_of(
+    first_band: int,
+    last_band: int,
+    behind: np.ndarray,
+    covered: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    total: np.ndarray,
+) -> None:
+    """Of the bands from `first_band` to `last_band` - 1."""
+    for top in range(first_band * BAND, last_band * BAND, BAND):
+        _look_through(covered, behind, rows, cols, top, total[top : top + BAND])
+
+
 def gathered(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, result: np.ndarray) -> None:
     """The views' `values` (V, H, W) where a layer would show them, summed: `result` (H, W), overwritten.
 
     What a view shows beside the layer's frame counts at its nearest border.
     """
+    in_threads(_gathered, len(result), values, rows, cols, result)
+
+
+@compiled
+def _gathered(
+    first_row: int,
+    last_row: int,
+    values: np.ndarray,
+    rows: np.ndarray,
+    cols: np.ndarray,
+    result: np.ndarray,
+) -> None:
+    """Of the rows `first_row` to `last_row` - 1."""
     _, H, W = values.shape
-    for line in nb.prange(H):
-        a = np.int64(line)
-        result[a] = 0
+    for a in range(first_row, last_row):
+        result[a, :] = np.float32(0)
         for v in range(values.shape[0]):
             down, right = rows[v // cols.size], cols[v % cols.size]
             first, last = a - down, a - down
@@ -225,7 +293,7 @@ def gathered(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, result: np.
                     result[a, W - 1] += row[j]
 
 
-@helper
+@compiled
 def better_predicted(
     cell: np.ndarray,
     n: np.ndarray,
@@ -241,7 +309,7 @@ def better_predicted(
             gain[cell[e] // W, cell[e] % W] += n[e] * math.log(rate[e] / rate_behind[e])
 
 
-@helper
+@compiled
 def hide(mask: np.ndarray, cell: np.ndarray, step: int, hidden: np.ndarray) -> None:
     """Adds `step` to `hidden` (N,), how many nearer layers an event comes from or is hidden by."""
     W = mask.shape[1]
@@ -250,7 +318,7 @@ def hide(mask: np.ndarray, cell: np.ndarray, step: int, hidden: np.ndarray) -> N
             hidden[e] += step
 
 
-@helper
+@compiled
 def claim(mask: np.ndarray, cell: np.ndarray, rate: np.ndarray, rate_behind: np.ndarray) -> None:
     """Events in the layer's `mask` have its `rate`, then behind what is nearer: `rate_behind` (N,)."""
     W = mask.shape[1]

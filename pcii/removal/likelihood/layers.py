@@ -278,7 +278,6 @@ class Layers:
         Rates are wanted of the events that are `asked` for (N,), light of the cells in `asked_rows`, the
         first and the last + 1; of all if not given. If `blurred`, by the widest window alone.
         """
-        from pcii.base.compiled_loops import threads
         from pcii.evidence.prediction_kernels import BASE_SCALE, predict_shared
 
         self._look(layer)
@@ -302,7 +301,7 @@ class Layers:
         )
         predicted = Predicted(self.rate, self.base, self.samples, self.light, self.blurred)
         finest = BASE_SCALE if blurred else 0
-        predict_shared(threads(), asked, (first, last), finest, events, section, predicted)
+        predict_shared(asked, (first, last), finest, events, section, predicted)
         for light in (self.blurred,) if blurred else (self.light, self.blurred):
             light[first:last] *= 4  # from blocks to cells
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from pcii.base.compiled_loops import helper
+from pcii.base.compiled_loops import compiled
 
 
-@helper
+@compiled
 def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside: np.ndarray) -> None:
     """The mask that gains most, less `length_cost` per px of its outline: relaxed to [0, 1] in `inside`.
 
@@ -20,7 +20,7 @@ def least_outline(gain: np.ndarray, length_cost: float, iterations: int, inside:
     shorten_outline(gain, length_cost, iterations, inside, inside.copy(), across, down)
 
 
-@helper
+@compiled
 def shorten_outline(
     gain: np.ndarray,
     length_cost: float,

@@ -1,8 +1,9 @@
-"""The loops that predict photons from a section: in chunks, and where views are hidden."""
+"""The loops that predict photons from a section: by threads, and where views are hidden."""
 
 import numpy as np
 from twins import even_light, unit_grid
 
+from pcii.base.compiled_loops import threads, use_threads
 from pcii.core.bayer import sites_of_colours
 from pcii.evidence.prediction_kernels import predict, predict_shared
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
@@ -34,7 +35,7 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     assert abs(rates[hidden].mean() / rate - 1) < 0.02
 
 
-def test_events_are_predicted_the_same_in_chunks_and_only_if_selected():
+def test_events_are_predicted_the_same_by_any_number_of_threads_and_only_if_selected():
     K, L, H, W = 4, 5, 96, 128
     counts = even_light(unit_grid(K, L, H, W), 0.02, seed=3, cfa="GRBG")
     events = counts.events
@@ -55,21 +56,24 @@ def test_events_are_predicted_the_same_in_chunks_and_only_if_selected():
         return Predicted(*np.full((2, N), -1, np.float32), *np.full((3, h, w), -1, np.float32))
 
     whole, by_one = outputs(), outputs()
-    predict_shared(1, np.ones(N, dtype=bool), (0, h), 0, *about, whole)
+    predict_shared(np.ones(N, dtype=bool), (0, h), 0, *about, whole)
     predict(*about, by_one)
     for found, expected in zip(by_one[:3], whole[:3], strict=True):
         np.testing.assert_array_equal(found, expected)
     selected = rng.random(N) < 0.5
     in_rows = ((np.arange(h) >= 5) & (np.arange(h) < h - 2))[:, None] & np.ones(w, dtype=bool)
-    for chunks in (1, 3):
+    before = threads()
+    for count in (1, 2):
+        use_threads(count)
         rate, base, samples, mean, blurred = predicted = outputs()
-        predict_shared(chunks, selected, (5, h - 2), 0, *about, predicted)
+        predict_shared(selected, (5, h - 2), 0, *about, predicted)
         for found, expected in ((rate, whole[0]), (base, whole[1])):
             np.testing.assert_array_equal(found, np.where(selected, expected, -1))
         for found, expected in zip((samples, mean, blurred), whole[2:], strict=True):
             np.testing.assert_array_equal(found, np.where(in_rows, expected, -1))
         # The widest window alone: scale 4, of 2 px << 4.
         rate, base, samples, mean, blurred = predicted = outputs()
-        predict_shared(chunks, selected, (0, h), 4, *about, predicted)
+        predict_shared(selected, (0, h), 4, *about, predicted)
         np.testing.assert_array_equal(base, np.where(selected, whole[1], -1))
         np.testing.assert_array_equal(blurred, whole[4])
+    use_threads(before)
