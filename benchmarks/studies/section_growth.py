@@ -195,9 +195,9 @@ def reading(measured: Measured) -> str:
     dense = measured.one(GROWTH, "dense", axis="views").values["exponent"].value
     return (
         "What does a section cost at the paper's size, and what makes it cost more? A ratio says how often"
-        " ours could be made while the other makes one: the photons of three colours, whose coverage is computed"
-        f" when it is asked for, {fastest.ratio.value:.0f} times for {fastest.name}, which makes one channel's"
-        f" mean; with their coverage {with_coverage.ratio.value:.0f} times. An exponent"
+        f" ours could be made while the other makes one: photons of three colours {fastest.ratio.value:.0f}"
+        f" times for {fastest.name}, which makes one channel's mean, and {with_coverage.ratio.value:.0f}"
+        " times if their coverage is asked for. An exponent"
         f" of 1 is time in proportion: sections from events grow with the power {photons_:.2f} of the"
         f" photons and {pixels:.2f} of the pixels, dense ones with the power {dense:.2f} of the views."
     )

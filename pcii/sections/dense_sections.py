@@ -19,6 +19,7 @@ from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Shifts
 from pcii.sections.image_moves import Moves, Running, axis_moves, groups_of, moves_of
+from pcii.sections.recycled_memory import empty
 
 BATCH = 8
 """Views in memory at a time when they are read from disk."""
@@ -114,9 +115,8 @@ class _Plane:
         self.is_mosaic, self.with_variance = cfa is not None, variance
         self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
         self.groups = groups_of(self.row_moves, self.col_moves, grid, cfa)
-        # One block of memory: allocators return one large block to the system sooner than two smaller ones.
-        block = np.empty((1 + variance, grid.height, grid.width, C), dtype)
-        self.sums, self.variance = block[0], block[1] if variance else block[:0, 0]
+        self.sums = empty((grid.height, grid.width, C), dtype)
+        self.variance = empty(self.sums.shape if variance else (0, grid.width, C), dtype)
 
     def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Make the section of images (V, H, N) of all views; returns whether it and the images are finite."""

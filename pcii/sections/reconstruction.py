@@ -20,6 +20,7 @@ from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts
 from pcii.core.section_stack import Normalisation, Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
 from pcii.sections.image_moves import AxisMoves, axis_moves, step_px
+from pcii.sections.recycled_memory import empty
 
 DENSE_SHARE = 1 / 16
 """If a larger share of the pixels has photons, adding whole images takes less time than adding each photon.
@@ -170,7 +171,7 @@ def _scatter(
 
     events = data.events
     # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.
-    counts = np.empty(shape, dtype=np.int32 if n is events.n and data.total < 2**31 else np.int64)
+    counts = empty(shape, np.int32 if n is events.n and data.total < 2**31 else np.int64)
     colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
     kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n)
     return counts
@@ -238,7 +239,7 @@ def _coverage(
     from pcii.sections import event_kernels as kernels
 
     _, H, W, C = shape
-    coverage = np.empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
+    coverage = empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
     for plane in range(len(planes)):
         by_row, by_col = (
             np.array([_samples_at(targets[plane, :, parity::2], size) for parity in (0, 1)])

@@ -31,7 +31,8 @@ def test_every_index_is_visited_once_and_results_come_in_order(several_threads, 
     np.testing.assert_array_equal(visits, 1)
     assert sum(sizes) == count
     starts = in_threads(lambda first, last: first, count)
-    assert starts == sorted(starts) and starts[0] == 0
+    assert starts == sorted(starts)
+    assert starts[0] == 0
 
 
 def test_an_error_in_any_range_is_raised(several_threads):
