@@ -9,7 +9,7 @@ import hashlib
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -45,7 +45,7 @@ class Steps:
         """A depth map within a range, by the default method."""
         return timed(make)
 
-    def kept(self) -> tuple[str, ...]:
+    def kept(self) -> Collection[str]:
         """Names of the steps that were done before, as in `Outcome.timings_s`."""
         return ()
 
@@ -68,9 +68,9 @@ class KeptSteps(Steps):
         self._results = results
         self._kept: list[str] = []
 
-    def kept(self) -> tuple[str, ...]:
+    def kept(self) -> Collection[str]:
         """Names of the steps that were done before."""
-        return tuple(self._kept)
+        return self._kept
 
     def removal(
         self, method: str, sections: Sections, make: Callable[[], Segmented]

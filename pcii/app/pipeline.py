@@ -1,6 +1,7 @@
 """Analysis of a dataset, from sections to scores, in the order of the paper's sections 2 and 3."""
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -76,17 +77,21 @@ def analyse(
         sections = finished("sections", (full_light, 0.0))
     else:
         sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
-    focus: list[Segmented] = []
-    for method in chosen:
-        assert counts is not None
-        remove = partial(find_method(method), counts, sections)
-        focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
     seen = dataset.views if counts is None else counts
     assert seen is not None
-    depth = finished(DEPTH_STEP, steps.depth(z_range, lambda: estimate_depth(seen, z_range)))
+    focus: list[Segmented] = []
+    # Depth needs nothing of the other steps, and most of its time leaves the interpreter to them.
+    with ThreadPoolExecutor(1) as beside:
+        mapped = beside.submit(steps.depth, z_range, lambda: estimate_depth(seen, z_range))
+        for method in chosen:
+            assert counts is not None
+            remove = partial(find_method(method), counts, sections)
+            focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
+        depth = finished(DEPTH_STEP, mapped.result())
     scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
     result = finished("score", timed(lambda: scored(dataset=dataset.name)))
-    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, steps.kept())
+    kept = tuple(step for step in seconds if step in steps.kept())
+    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, kept)
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = silent) -> Sections | None:

@@ -77,7 +77,7 @@ def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
         ("command", _command(outcome)),
         ("date", f"{now:%Y-%m-%d %H:%M} UTC"),
         ("machine", _machine()),
-        ("time", _stages(outcome.timings_s, 2)),
+        ("time", f"{_stages(outcome.timings_s, 2)}; depth was mapped beside the removal"),
         ("software", _versions(versions)),
     ]
 

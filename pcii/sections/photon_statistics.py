@@ -86,7 +86,15 @@ def pooled_samples(sections: Sections, window_px: int) -> np.ndarray:
 def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
     from scipy.ndimage import uniform_filter
 
-    return uniform_filter(values.astype(np.float64), window_px, axes=(1, 2), mode="constant")
+    from pcii.base.compiled_loops import in_threads
+
+    def of_planes(first: int, last: int) -> None:
+        planes = values[first:last].astype(np.float64)
+        uniform_filter(planes, window_px, means[first:last], "constant", axes=(1, 2))
+
+    means = np.empty(values.shape)
+    in_threads(of_planes, len(values))
+    return means
 
 
 def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:
