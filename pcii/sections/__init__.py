@@ -12,6 +12,7 @@ photon_statistics  Statistics of photon counts: pooled samples, entropy, and the
                    noise.
 probe_planes       Planes to compare: an object is in focus at z only if no other depth explains it
                    better.
+recycled_memory    Memory of sections that nobody holds any more, for the next ones.
 reconstruction     Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.
 row_kernels        Compiled functions for one row of a section: sums of shifted images, and of their
                    squared deviations.

@@ -2,6 +2,7 @@
 
 duel               Duels of depths, photon by photon: what does each predict that the others do not?
 guesses            Pieces that may belong to another layer than the one that is seen there now.
+hiding_kernels     Compiled loops over events: which layers hide them, and how well layers predict them.
 layer_kernels      Compiled loops over rays: which layer does each camera see, and what is behind it?
 layer_search       The search for the opaque layers of least energy: from several starts, then guess by
                    guess.

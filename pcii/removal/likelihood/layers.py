@@ -196,6 +196,7 @@ class Layers:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Rates (N,) of the events and light (V, h, w) of the views, all layers in front of the dark."""
         from pcii.removal.likelihood import layer_kernels as kernels
+        from pcii.removal.likelihood.hiding_kernels import claim
 
         self._predict(0, None if fit else self.hidden == 0, blurred=True)
         least, most = self.least_dark / CELL_PX**2, self.most_dark / CELL_PX**2
@@ -217,7 +218,7 @@ class Layers:
                 top, bottom, _, _ = kernels.filled(mask)
                 self._predict(layer, self._claimed(layer), (top, bottom), beside=beside)
             kernels.paint(mask, self.light, self.rows[layer], self.cols[layer], behind)
-            kernels.claim(mask, self.cells[layer], self.rate, rate)
+            claim(mask, self.cells[layer], self.rate, rate)
         self._cover_all(1)
         return rate, behind
 
@@ -256,12 +257,13 @@ class Layers:
 
     def _gain(self, layer: int, rate: np.ndarray, behind: np.ndarray) -> np.ndarray:
         """Nats (h, w) that the layer as it is predicted explains better than what is behind it."""
-        from pcii.removal.likelihood import layer_kernels as kernels
+        from pcii.removal.likelihood.hiding_kernels import better_predicted
+        from pcii.removal.likelihood.layer_kernels import light_of
 
         gain = np.empty(self.light.shape, np.float32)
-        kernels.light_of(behind, self.covered, self.rows[layer], self.cols[layer], gain)
+        light_of(behind, self.covered, self.rows[layer], self.cols[layer], gain)
         gain -= self.light * self.free  # photons that are expected less
-        kernels.better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
+        better_predicted(self.cells[layer], self.n, self.hidden, self.rate, rate, gain)
         return gain
 
     def _predict(
@@ -328,7 +330,8 @@ class Layers:
             self._cover(layer, step)
 
     def _cover(self, layer: int, step: int) -> None:
-        from pcii.removal.likelihood.layer_kernels import cover, hide
+        from pcii.removal.likelihood.hiding_kernels import hide
+        from pcii.removal.likelihood.layer_kernels import cover
 
         mask = self.masks[layer]
         if mask.any():
