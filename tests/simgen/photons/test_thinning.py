@@ -12,6 +12,7 @@ from scipy import stats
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.candidates import Setup, even_film_points
+from simgen.photons.exploration import Exploration, explore
 from simgen.photons.majorant import Majorant, fit
 from simgen.photons.thinning import pairs_allowed, thin_photons
 from simgen.renderer import backend
@@ -46,9 +47,24 @@ def radiance(scene: RenderScene) -> np.ndarray:
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
 
 
+def setup_of(scene: RenderScene) -> Setup:
+    return Setup(scene, GRID, "GRBG", DEPTH)
+
+
+found_out: dict[tuple[int, str], tuple[RenderScene, Exploration]] = {}
+
+
+def explored(scene: RenderScene, settings: Photons) -> Exploration:
+    """It is the same for all seeds, and takes longer than a draw of few photons."""
+    key = id(scene), settings.model_dump_json()
+    if key not in found_out:
+        found_out[key] = scene, explore(setup_of(scene), settings)
+    return found_out[key][1]
+
+
 def draw_with_log(scene: RenderScene, seed: int, **photons: object) -> tuple[PhotonTable, dict[str, Any]]:
     settings = Photons.model_validate(photons)
-    return thin_photons(Setup(scene, GRID, "GRBG", DEPTH), settings, seed=seed)
+    return thin_photons(setup_of(scene), settings, seed=seed, explored=explored(scene, settings))
 
 
 def draw(scene: RenderScene, seed: int, **photons: object) -> PhotonTable:
