@@ -137,7 +137,7 @@ def _planes(grid: CameraGrid, z_range_mm: tuple[float, float] | None, small: Sma
 
 
 def _distinct(grid: CameraGrid, total_px: np.ndarray, small: SmallViews) -> np.ndarray:
-    """Those depths of total disparities (P,) at which views move by other whole pixels than at the one before."""
+    """Depths of those total disparities (P,) at which views move by other whole pixels than before."""
     z_mm = depth_of_total_disparity_mm(grid, total_px)
     whole = np.floor(shifts_px(small, grid, z_mm) + 0.5)
     return z_mm[np.append(True, (np.diff(whole, axis=1) != 0).any(axis=(0, 2)))]
@@ -193,11 +193,12 @@ def _closer(fine: SmallViews, grid: CameraGrid, z_mm: np.ndarray, found: Sweep) 
     sharp = np.flatnonzero(_mass(found) >= PEAK_SHARE / 4)
     if not sharp.size:
         return z_mm, found
-    ends = total_disparity_px(grid, z_mm[[max(sharp[0] - 1, 0), min(sharp[-1] + 1, z_mm.size - 1)]])
-    count = int(np.ceil((ends[1] - ends[0]) / fine.scale)) + 1
+    total = total_disparity_px(grid, z_mm)
+    first, last = total[max(sharp[0] - 1, 0)], total[min(sharp[-1] + 1, total.size - 1)]
+    count = int(np.ceil((last - first) / fine.scale)) + 1
     if count > MOST_CLOSE:
         return z_mm, found
-    planes = _distinct(grid, np.linspace(*ends, count), fine)
+    planes = _distinct(grid, np.linspace(first, last, count), fine)
     close = sweep(fine, grid, planes)
     return (planes, close) if _peaks(close) else (z_mm, found)
 

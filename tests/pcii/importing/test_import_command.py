@@ -240,7 +240,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
     ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; it is empty"),
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
-    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "of 5 x 5 views 1 are missing: 1_1.png"),
+    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "of 5 x 5 views 1 is missing: 1_1.png"),
     ("pattern without field", folder(), ["--pattern", "a.png", *CAMERAS], "pattern: expected {row} and {col}"),
     ("pattern with one field", folder(), ["--pattern", "{row}.png", *CAMERAS], "pattern: expected {row}"),
     ("pattern of another field", folder(), ["--pattern", "{x}_{row}.png", *CAMERAS], "pattern: expected"),
