@@ -90,6 +90,20 @@ def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
     assert "--pitch-mm" in said
 
 
+@pytest.mark.parametrize(
+    ("lengths", "told"),
+    [
+        ((0.002, 0.002, 0.035, "--sensor-mm", 0.012), "lengths are in mm, not in m"),
+        ((2, 2, 35, "--pixel-mm", 300), "nearer than a tenth of the focal length"),
+    ],
+)
+def test_a_wrong_unit_is_told(photos: Path, tmp_path: Path, capsys, lengths, told) -> None:
+    across, down, focal, *size = lengths
+    options = ["--pattern", "{col}_{row}.png", "--pitch-mm", across, down, "--focal-mm", focal, *size]
+    assert run("import", photos, "-o", tmp_path / "mine", *options) == 0
+    assert told in capsys.readouterr().out
+
+
 def test_other_sources(tmp_path: Path, capsys) -> None:
     root = hci_folder(tmp_path / "hci")
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
