@@ -132,6 +132,9 @@ def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False
         answer_json(result.to_dict())
     else:
         say(f"{path}")
+        if data.truth is None:
+            say("the dataset has no truth: what is compared with it is null")
+            return
         say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report
 from pcii.core.bayer import mosaic
+from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
@@ -22,6 +23,8 @@ from pcii.importing.image_folders import import_images
 from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.importing.light_encoding import Encoding
 
+FINEST_PIXEL_MM = 2e-4
+"""No sensor has smaller pixels: a third of a wavelength of light."""
 FLAGS = {"swap_axes": "--swap-axes", "flip_rows": "--flip-rows", "flip_cols": "--flip-cols"}
 
 
@@ -193,6 +196,21 @@ def _warning(
             f"most is sharp at about {z:.3g} mm, outside of {near:g} to {far:g} mm; if nothing is there, "
             f"--pitch-mm is wrong, and {across * factor:.2g} {down * factor:.2g} would bring it to "
             f"{end:g} mm (or --focal-mm or the size of pixels is wrong by this factor)"
+        )
+    return _wrong_unit(found, imported.images.grid)
+
+
+def _wrong_unit(found: GridCheck, grid: CameraGrid) -> str | None:
+    """What tells that a length was given in metres or micrometres."""
+    if grid.pixel_mm < FINEST_PIXEL_MM:
+        return (
+            f"a pixel would be {grid.pixel_mm:.3g} mm, less than a third of a wavelength of light; "
+            "lengths are in mm, not in m"
+        )
+    if found.z_mm and found.z_mm[-1] < grid.focal_mm / 10:
+        return (
+            f"things are sharp up to {found.z_mm[-1]:.3g} mm away, nearer than a tenth of the focal length; "
+            "--pitch-mm, --focal-mm and --sensor-mm or --pixel-mm are all in mm"
         )
     return None
 

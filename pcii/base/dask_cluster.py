@@ -33,8 +33,8 @@ def run_on_cluster(job: Job, pieces: Sequence[int], address: str, resource: str 
     try:
         from distributed import Client, Future, as_completed
     except ImportError:
-        install = "pip install 'photon-integral-imaging[cluster]'"
-        raise InputError(f"scheduler: Dask is not installed; install the extra: {install}") from None
+        install = "pip install '.[cluster]'"
+        raise InputError(f"scheduler: Dask is not installed; type in the source tree: {install}") from None
     try:
         client = Client(address, timeout=ANSWER_S)
     except (OSError, ValueError) as fault:

@@ -42,9 +42,7 @@ def labelled_dataset(
     try:
         import xarray
     except ImportError:
-        raise InputError(
-            "to_xarray: needs the package xarray: pip install 'photon-integral-imaging[xarray]'"
-        ) from None
+        raise InputError("to_xarray: needs the package xarray: pip install xarray") from None
     variables = {
         name: (labels[name].dims, array, dict(labels[name].conventional)) for name, array in arrays.items()
     }

@@ -47,7 +47,9 @@ def tasks_of(
     tasks: dict[str, list[Task]] = {}
     for dataset in datasets:
         if not dataset.has(TRUTH):
-            raise InputError(f"{dataset.path}: has no truth to score with; its recipe left it out")
+            raise InputError(
+                f"{dataset.path}: has no truth to score with: images of others, or left out by its recipe"
+            )
         if dataset.grid.view_count < 2:
             raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
         lights = _lights(dataset, budgets)

@@ -130,8 +130,9 @@ def _table(
     if missing:
         names = ", ".join(_named(pattern, camera) for camera in missing[:MOST_NAMED])
         more = f" and {len(missing) - MOST_NAMED} more" if len(missing) > MOST_NAMED else ""
+        are = "is" if len(missing) == 1 else "are"
         raise InputError(
-            f"{folder}: of {size[0]} x {size[1]} views {len(missing)} are missing: {visible(names)}{more}"
+            f"{folder}: of {size[0]} x {size[1]} views {len(missing)} {are} missing: {visible(names)}{more}"
         )
     table = np.empty(len(cameras), dtype=object)
     table[:] = [found[camera] for camera in cameras]

@@ -18,7 +18,7 @@ from pcii.io.dataset_writer import check_depth_range
 
 COARSE_PX, FINE_PX = 144, 512
 """Largest side of the reduced views of which all mistakes are tried, and of those that refine depths."""
-MOST_PLANES, MOST_FINE = 160, 16
+MOST_PLANES, MOST_CLOSE, MOST_FINE = 160, 32, 16
 FEWEST_PX = 24
 """Smaller views are not judged."""
 CLEARLY = 0.75
@@ -97,7 +97,8 @@ def check_grid(
         if outside is not None:
             return GridCheck(outside_mm=outside)
     fine = small_views(view, grid, FINE_PX)
-    found = {_refined(fine, grid, z_mm, told, peak) for peak in _peaks(told)}
+    z_close, close = _closer(fine, grid, z_mm, told)
+    found = {_refined(fine, grid, z_close, close, peak) for peak in _peaks(close)}
     return GridCheck(tuple(sorted(found)))
 
 
@@ -132,7 +133,12 @@ def _planes(grid: CameraGrid, z_range_mm: tuple[float, float] | None, small: Sma
         near, far = (float(total_disparity_px(grid, z)) for z in z_range_mm)
         near = min(near, far + 2 * largest)
     count = int(np.clip(np.ceil((near - far) / small.scale) + 1, 2, MOST_PLANES))
-    z_mm = depth_of_total_disparity_mm(grid, np.linspace(far, near, count))
+    return _distinct(grid, np.linspace(far, near, count), small)
+
+
+def _distinct(grid: CameraGrid, total_px: np.ndarray, small: SmallViews) -> np.ndarray:
+    """Depths of those total disparities (P,) at which views move by other whole pixels than before."""
+    z_mm = depth_of_total_disparity_mm(grid, total_px)
     whole = np.floor(shifts_px(small, grid, z_mm) + 0.5)
     return z_mm[np.append(True, (np.diff(whole, axis=1) != 0).any(axis=(0, 2)))]
 
@@ -177,6 +183,24 @@ def _peaks(found: Sweep) -> list[int]:
     around = padded[:-2] + padded[1:-1] + padded[2:]
     is_peak = (mass > padded[:-2]) & (mass >= padded[2:]) & (around >= PEAK_SHARE)
     return sorted(np.flatnonzero(is_peak).tolist(), key=lambda plane: -around[plane])[:MOST_PEAKS]
+
+
+def _closer(fine: SmallViews, grid: CameraGrid, z_mm: np.ndarray, found: Sweep) -> tuple[np.ndarray, Sweep]:
+    """Planes a pixel of `fine` apart where anything is sharp, and their sweep; unchanged if these are many.
+
+    Surfaces that are at neighbouring planes of the reduced views are one peak, whose depth is between them.
+    """
+    sharp = np.flatnonzero(_mass(found) >= PEAK_SHARE / 4)
+    if not sharp.size:
+        return z_mm, found
+    total = total_disparity_px(grid, z_mm)
+    first, last = total[max(sharp[0] - 1, 0)], total[min(sharp[-1] + 1, total.size - 1)]
+    count = int(np.ceil((last - first) / fine.scale)) + 1
+    if count > MOST_CLOSE:
+        return z_mm, found
+    planes = _distinct(grid, np.linspace(first, last, count), fine)
+    close = sweep(fine, grid, planes)
+    return (planes, close) if _peaks(close) else (z_mm, found)
 
 
 def _refined(fine: SmallViews, grid: CameraGrid, z_mm: np.ndarray, found: Sweep, peak: int) -> float:

@@ -166,9 +166,9 @@ def _read_parameters(path: Path) -> _Parameters:
     focus_m = number("extrinsics", "focus_distance_m")
     if focus_m < 0:
         raise InputError(f"{path}: [extrinsics] focus_distance_m: expected 0 or more, got {focus_m:g}")
-    ends = None
-    if parser.has_option("meta", "disp_min") and parser.has_option("meta", "disp_max"):
-        ends = number("meta", "disp_min"), number("meta", "disp_max")
+    # A missing end, or nan as `simgen export` writes it where it knows no depths, says nothing.
+    said = [parser.get("meta", name, fallback="nan").strip().lower() for name in ("disp_min", "disp_max")]
+    ends = None if "nan" in said else (number("meta", "disp_min"), number("meta", "disp_max"))
     return _Parameters(
         rows=whole("extrinsics", "num_cams_y", MOST_CAMERAS),
         cols=whole("extrinsics", "num_cams_x", MOST_CAMERAS),

@@ -12,6 +12,6 @@ def check_installed() -> None:
     missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(
-            f"{' and '.join(missing)}: not installed, and needed for rendering; type:  "
-            "pip install 'photon-integral-imaging[render]'"
+            f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
+            "pip install '.[render]'"
         )

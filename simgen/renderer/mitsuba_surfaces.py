@@ -69,7 +69,8 @@ def _reflectance(
         return reflectance_plugin(mi, material.reflectance)
     if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
         raise InputError(
-            f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates"
+            f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
+            "add them to the file, or give the material a reflectance instead"
         )
     pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
     assert pixels is not None

@@ -52,6 +52,7 @@ from pcii.removal.likelihood.regions import (
     bright_cells,
     regions_of,
     settled,
+    unseen,
 )
 from pcii.sections.reconstruction import reconstruct
 
@@ -108,6 +109,7 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
         # and none is to have it. It is left alone, unless there is too little light to see where it ends.
         fitted = ~dilated(bright & ~touching & (not faint), HALO_CELLS)
         plane = np.where(fitted, layered(enough, own_spread, starts), starts[0])
+        plane = np.where(unseen(plane, bright), -1, plane)
         numbers, regions = regions_of(plane, plane >= 0, focus, planes, halves)
     inner = fitted & ~dilated(plane < 0, OUTLINE_CELLS)
     masks, belongs = _outlines(counts, regions, numbers, inner, own_spread.size)

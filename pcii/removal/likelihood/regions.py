@@ -201,6 +201,20 @@ def regions_of(
     return numbers, found
 
 
+def unseen(plane: np.ndarray, bright: np.ndarray) -> np.ndarray:
+    """Pieces of one plane that are dark everywhere, (h, w) bool.
+
+    Layers take such a piece where it is darker than the dark is elsewhere: as a surface it explains the
+    photons that are missing, but nobody sees it.
+    """
+    found = np.zeros(bright.shape, dtype=bool)
+    for own in np.unique(plane[plane >= 0]):
+        for box, piece in _pieces(plane == own):
+            if not (piece & bright[box]).any():
+                found[box] |= piece
+    return found
+
+
 def _agreed(bright: np.ndarray, halves: Halves) -> np.ndarray:
     """Which of the connected pieces of what is bright the halves of the cameras agree on, (h, w) bool."""
     least = least_agreement(halves.planes)

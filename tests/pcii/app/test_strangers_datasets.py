@@ -32,7 +32,7 @@ def run(*arguments: object) -> int:
 
 
 @pytest.mark.parametrize("has", ["counts", "counts truth", "counts views", "counts views depth"])
-def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, has: str) -> None:
+def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: str) -> None:
     truth = None
     if "truth" in has:
         truth = Truth(Z_MM, IDS, {1: "ball"})
@@ -47,7 +47,9 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, has: str) -> N
     assert all(
         text in page for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16])
     )
+    capsys.readouterr()
     assert run("score", tmp_path / "d", tmp_path / "out") == 0
+    assert ("has no truth" in capsys.readouterr().out) == (truth is None)
     assert verify(tmp_path / "out") > 5
     if "depth" in has:
         assert outcome.score.depth["hci"]["answered"] is not None

@@ -162,6 +162,17 @@ def test_photons_are_shown_where_there_is_no_radiance(tmp_path):
     assert f"255 is {most} photons" in " ".join((found.folder / "README.txt").read_text().split())
 
 
+def test_what_is_exported_without_truth_is_imported_again(tmp_path):
+    views = pcii.Views(np.full((2, 3, 16, 24, 3), 0.5, np.float32), grid_of(2, 3, height=16, width=24))
+    pcii.save_dataset(tmp_path / "data", views)
+    found = exported(tmp_path / "data")
+    assert math.isnan(found.disp_min)
+    assert math.isnan(found.disp_max)
+    again = pcii.import_hci(found.folder)
+    assert again.views.grid.shape_KLHW == (2, 3, 16, 24)
+    assert (again.truth, again.z_range_mm) == (None, None)
+
+
 @pytest.mark.parametrize(
     ("changes", "word"),
     [

@@ -43,6 +43,16 @@ def test_right_views_are_not_warned_about_and_their_depths_are_found(views, z_ra
     assert [total / z for z in found.z_mm] == pytest.approx([total / z for z in (50, 80, 180)], abs=0.5)
 
 
+@pytest.mark.parametrize("z_range", [(300.0, 1200.0), None])
+def test_surfaces_at_neighbouring_planes_of_the_reduced_views_are_told_apart(z_range) -> None:
+    grid = CameraGrid(rows=5, cols=5, pitch_mm=(4, 4), focal_mm=35, pixel_mm=0.048, height=200, width=300)
+    cards = [Card(900, seed=1), Card(600, (0.1, 0.8, 0.1, 0.45), 2), Card(400, (0.2, 0.7, 0.55, 0.85), 3)]
+    found = check_grid(light(render(grid, cards, cell=8)), grid, z_range)
+    # Total disparities of 13.0, 19.4 and 29.2 px: 1.6 and 2.4 of the reduced views' 4 px apart.
+    total = 35 * 4 * 4 / 0.048
+    assert [total / z for z in found.z_mm] == pytest.approx([total / z for z in (400, 600, 900)], abs=0.5)
+
+
 @pytest.mark.parametrize("z_range", RANGES)
 @pytest.mark.parametrize("mended_by", ORDERS[1:], ids=str)
 def test_every_wrong_order_is_found(views, mended_by, z_range) -> None:

@@ -90,6 +90,20 @@ def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
     assert "--pitch-mm" in said
 
 
+@pytest.mark.parametrize(
+    ("lengths", "told"),
+    [
+        ((0.002, 0.002, 0.035, "--sensor-mm", 0.012), "lengths are in mm, not in m"),
+        ((2, 2, 35, "--pixel-mm", 300), "nearer than a tenth of the focal length"),
+    ],
+)
+def test_a_wrong_unit_is_told(photos: Path, tmp_path: Path, capsys, lengths, told) -> None:
+    across, down, focal, *size = lengths
+    options = ["--pattern", "{col}_{row}.png", "--pitch-mm", across, down, "--focal-mm", focal, *size]
+    assert run("import", photos, "-o", tmp_path / "mine", *options) == 0
+    assert told in capsys.readouterr().out
+
+
 def test_other_sources(tmp_path: Path, capsys) -> None:
     root = hci_folder(tmp_path / "hci")
     pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
@@ -240,7 +254,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
     ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; it is empty"),
     ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
-    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "of 5 x 5 views 1 are missing: 1_1.png"),
+    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "of 5 x 5 views 1 is missing: 1_1.png"),
     ("pattern without field", folder(), ["--pattern", "a.png", *CAMERAS], "pattern: expected {row} and {col}"),
     ("pattern with one field", folder(), ["--pattern", "{row}.png", *CAMERAS], "pattern: expected {row}"),
     ("pattern of another field", folder(), ["--pattern", "{x}_{row}.png", *CAMERAS], "pattern: expected"),

@@ -25,6 +25,8 @@ def test_what_is_missing_is_told_in_a_sentence(
     monkeypatch.chdir(str(tmp_path))
     assert command_line.run(simgen_cli.app, command.split()) == 2
     said = capsys.readouterr().err
-    assert said.startswith("error: mitsuba: not installed, and needed for rendering; type:  pip install")
-    assert "photon-integral-imaging[render]" in said
+    assert said.startswith(
+        "error: mitsuba: not installed, and needed for rendering; type in the source tree:  pip install"
+    )
+    assert "pip install '.[render]'" in said
     assert said.count("\n") == 1

@@ -10,6 +10,7 @@ from pcii.removal.likelihood.regions import (
     bright_cells,
     regions_of,
     settled,
+    unseen,
 )
 
 SHAPE = (30, 40)
@@ -202,6 +203,14 @@ def test_the_halves_need_not_agree_on_each_part_of_a_piece():
     focus = focus_with((FIRST, part, 40.0), (SECOND, rest, 40.0))
     _, regions = regions_of(np.where(rest, 1, 0), part | rest, focus, PLANES, halves)
     assert [region.is_there for region in regions] == [True, True]
+
+
+def test_a_piece_of_a_plane_that_is_dark_everywhere_is_unseen():
+    lit, half_lit, dark = box(2, 2, 6, 6), box(12, 2, 8, 8), box(2, 20, 12, 12)
+    plane = np.where(lit | dark, 0, np.where(half_lit, 1, -1))
+    bright = lit | box(12, 2, 1, 1) | box(25, 35, 2, 2)
+    np.testing.assert_array_equal(unseen(plane, bright), dark)
+    np.testing.assert_array_equal(unseen(np.full(SHAPE, -1), bright), False)
 
 
 def test_pieces_are_numbered_and_specks_left_out():
