@@ -25,7 +25,7 @@ helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapp
 """Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
 
 PARTS_PER_THREAD = 4
-"""Ranges per thread: threads that are done early take over those of others."""
+"""Ranges per thread: who is done early takes one more."""
 
 _threads: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _pool: ThreadPoolExecutor | None = None
@@ -40,10 +40,19 @@ def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[An
     parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1
     if parts <= 1:
         return [loop(0, count, *arguments)]
-    ranges = [(count * part // parts, count * (part + 1) // parts) for part in range(parts)]
-    own = parts // _threads
-    others = [_thread_pool().submit(loop, *ends, *arguments) for ends in ranges[own:]]
-    return [loop(*ends, *arguments) for ends in ranges[:own]] + [other.result() for other in others]
+    results: list[Any] = [None] * parts
+    waiting = iter(range(parts))
+
+    def work() -> None:
+        for part in waiting:
+            results[part] = loop(count * part // parts, count * (part + 1) // parts, *arguments)
+
+    others = [_thread_pool().submit(work) for _ in range(min(_threads, parts) - 1)]
+    work()
+    for other in others:
+        if not other.cancel():  # it had not begun: all is done
+            other.result()
+    return results
 
 
 def use_threads(count: int) -> None:

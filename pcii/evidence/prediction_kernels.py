@@ -122,7 +122,7 @@ def _predict_events(
     views_at, photons_at, colours_at, by_row, by_col, mean_rate = scales
     rate, base, _, _, _ = predicted
     share_of_site = sites / sites.sum()
-    # Scale by scale for a batch of events: taking an array from a list costs as much as interpolating in it.
+    # Scale by scale for a batch of events, so that one scale at a time is in the cache.
     batch = np.empty(BATCH, np.int64)
     shares, rates, widest, sums = np.empty((4, BATCH), np.float64)
     for begin in range(first, last, BATCH):
