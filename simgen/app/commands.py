@@ -114,7 +114,7 @@ def generate(
             say(_made(out, manifest))
             say_next("pcii", "run", out, "-o", results_folder(out))
             return 0
-        if sweep.recipe(0).products.radiance != "none":
+        if len(sweep) > 1 and sweep.recipe(0).products.radiance != "none":
             say(
                 f"radiance is rendered for each of {len(sweep)} datasets, which may take most of the time; "
                 "--set products.radiance=none leaves it out"
