@@ -141,6 +141,22 @@ def test_a_quiet_command_prints_only_what_was_asked_for(capsys: pytest.CaptureFi
     assert not is_quiet()
 
 
+def test_the_time_left_follows_from_the_pace_of_the_last_minute(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = 0.0
+    monkeypatch.setattr("time.monotonic", lambda: clock)
+    report = Stages()
+    for done in range(1, 301):  # made by an earlier run
+        report("datasets", done, 400)
+    for done in range(301, 309):
+        clock += 12.0
+        report("datasets", done, 400)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "datasets: 301/400, 12.0 s, 4 s left"
+    assert lines[-1] == "datasets: 308/400, 96.0 s, 1104 s left"
+
+
 def test_the_next_command_is_told_at_a_terminal_alone(tmp_path: Path) -> None:
     (tmp_path / "works.py").write_text(WORKS)
     command = [sys.executable, str(tmp_path / "works.py"), "work"]

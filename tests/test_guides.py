@@ -39,6 +39,9 @@ def given_cameras(request: pytest.FixtureRequest) -> None:
 
 def given_collections(request: pytest.FixtureRequest) -> None:
     simgen.generate_collection("paper", "out/dimmer", [*TINY, "photons.budget=[100,300]"])
+    (recipe,) = (block.text for block in blocks(DOCS / "collections.md") if "# training.toml" in block.text)
+    Path("training.toml").write_text(recipe, encoding="utf-8")
+    simgen.generate_collection("training.toml", "out/training", ["scene_number={ range = [0, 2] }"])
 
 
 def given_exchange(request: pytest.FixtureRequest) -> None:
@@ -115,12 +118,27 @@ def check_plugins(names: dict[str, Any]) -> None:
     assert names["score"].depth["bad_3px"] < 0.2  # 0.07
 
 
+def check_collections(names: dict[str, Any]) -> None:
+    """Examples to learn from have sections of even light, and planes where there are objects alone."""
+    sections, plane = names["sections"], names["plane"]
+    assert len(names["examples"]) == 2
+    assert sections.shape == (12, *plane.shape) == (12, 96, 96)
+    assert sections.mean() == pytest.approx(1, rel=1e-4)
+    assert plane.min() == -1
+    assert 0 <= plane.max() < 12
+
+
 def check_cluster(names: dict[str, Any]) -> None:
     (call,) = names["simgen"].generate_collection.call_args_list
     assert call.kwargs["crew"].scheduler == "tcp://127.0.0.1:8786"
 
 
-CHECKS = {"exchange.md": check_exchange, "plugins.md": check_plugins, "cluster.md": check_cluster}
+CHECKS = {
+    "collections.md": check_collections,
+    "exchange.md": check_exchange,
+    "plugins.md": check_plugins,
+    "cluster.md": check_cluster,
+}
 """What is to come of a page, beside that it runs."""
 
 

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from types import TracebackType
@@ -11,6 +12,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 LOG_EVERY_S = 10.0
+RECENT_LINES = 6
+"""The time left follows from the pace since so many lines of a log ago."""
 
 
 class Stages(AbstractContextManager["Stages"]):
@@ -24,6 +27,7 @@ class Stages(AbstractContextManager["Stages"]):
         self._tasks: dict[str, TaskID] = {}
         self._started: dict[str, float] = {}
         self._logged: dict[str, float] = {}
+        self._recent: dict[str, deque[tuple[float, int]]] = {}
         self._shown = ExitStack()
 
     def __enter__(self) -> "Stages":
@@ -71,12 +75,15 @@ class Stages(AbstractContextManager["Stages"]):
             return
         now = time.monotonic()
         start = self._started.setdefault(stage, now)
-        last = self._logged.get(stage, start)
-        if done == total or now - last >= LOG_EVERY_S:
+        recent = self._recent.setdefault(stage, deque([(now, done)], RECENT_LINES))
+        if done == total or now - self._logged.get(stage, start) >= LOG_EVERY_S:
             self._logged[stage] = now
-            elapsed = now - start
-            left = f", {elapsed / done * (total - done):.0f} s left" if 0 < done < total else ""
-            print(f"{stage}: {done}/{total}, {elapsed:.1f} s{left}", file=sys.stderr, flush=True)
+            # By the pace of the last minute: what an earlier run has finished passes in an instant.
+            before, done_before = recent[0]
+            new = done - done_before
+            left = f", {(now - before) / new * (total - done):.0f} s left" if new > 0 and done < total else ""
+            recent.append((now, done))
+            print(f"{stage}: {done}/{total}, {now - start:.1f} s{left}", file=sys.stderr, flush=True)
 
     def compiling(self, loops: int, running: bool) -> None:
         """Report how many loops were compiled, the last of which may be `running`; the total is unknown."""

@@ -75,6 +75,9 @@ def evaluate(
     with all_rows(folder) as rows:
         measured = {key_of(row) for row in rows}
     remaining = [task for task in tasks if task.key not in measured]
+    if len(remaining) < len(tasks):
+        kept = len(tasks) - len(remaining)
+        report("scores of an earlier run", kept, kept)
     with closing(crew.run(Measuring(remaining, folder.resolve()), range(len(remaining)))) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:

@@ -17,7 +17,7 @@ from pcii.io.collection_layout import (
     read_collection,
     read_index,
 )
-from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, read_manifest
+from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, MARKER, read_manifest
 from pcii.io.evaluation_layout import EVALUATION, is_evaluation, read_evaluation
 from pcii.io.results_list import RESULTS, read_results
 from pcii.io.sealed_json import check_file, read_sealed, strays
@@ -25,7 +25,7 @@ from pcii.io.sealed_json import check_file, read_sealed, strays
 Item = TypeVar("Item")
 CARD_REMEDY = "the same `simgen generate` command writes it again"
 MOST_NAMED = 5
-"""Most unlisted files that an error names."""
+"""Most unlisted files, or unfinished datasets, that an error names."""
 
 
 def verify(path: Path, report: Report = silent) -> int:
@@ -63,7 +63,14 @@ def _verify_collection(path: Path, report: Report) -> int:
     )
     card = _verify_card(path, {})
     listed = {COLLECTION, INDEX, *card, *(row["path"] for row in rows)}
-    _refuse(path, sorted(entry.name for entry in path.iterdir() if entry.name not in listed), INDEX)
+    extra = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
+    begun = [name for name in extra if (path / name / MARKER).is_file()]
+    _refuse(path, [name for name in extra if name not in begun], INDEX)
+    if begun:
+        raise InputError(
+            f"{path}: not finished: {_named(begun)}; the same `simgen generate` command goes on with them; "
+            "the others match the index"
+        )
     return 2 + len(card) + files
 
 
@@ -129,5 +136,9 @@ def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, repo
 def _refuse(path: Path, extra: list[str], name: str) -> None:
     """Raise `InputError` if there are files or folders that `name` does not list."""
     if extra:
-        named = ", ".join(extra[:MOST_NAMED]) + (", ..." if len(extra) > MOST_NAMED else "")
-        raise InputError(f"{path}: not listed in {name}, and read by nothing: {named}; move it away")
+        raise InputError(f"{path}: not listed in {name}, and read by nothing: {_named(extra)}; move it away")
+
+
+def _named(files: list[str]) -> str:
+    """The first few names of files or folders."""
+    return ", ".join(files[:MOST_NAMED]) + (", ..." if len(files) > MOST_NAMED else "")

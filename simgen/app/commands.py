@@ -114,6 +114,11 @@ def generate(
             say(_made(out, manifest))
             say_next("pcii", "run", out, "-o", results_folder(out))
             return 0
+        if len(sweep) > 1 and sweep.recipe(0).products.radiance != "none":
+            say(
+                f"radiance is rendered for each of {len(sweep)} datasets, which may take most of the time; "
+                "--set products.radiance=none leaves it out"
+            )
         faults = generate_collection(sweep, out, crew, report)
         write_card(out, terms)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")

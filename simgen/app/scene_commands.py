@@ -92,7 +92,7 @@ def check(
 
     Disparities, blur between objects, what is hidden or cut, colours that shifts leave out, photons per
     object and voxel, size, memory and time. Leaves with exit code 0 if nothing is bad, 1 if something
-    is, 2 for a file that is not valid.
+    is, 2 for a file that is not valid. Of a field with several values the first is looked at.
 
     Examples of use:
 
@@ -138,7 +138,8 @@ def preview(
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
 
-    In full light and in sRGB, whatever the recipe's camera and photons.
+    In full light and in sRGB, whatever the recipe's camera and photons. Of a field with several values the
+    first is drawn.
 
     Examples of use:
 

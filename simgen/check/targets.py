@@ -9,9 +9,10 @@ from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import suggestion
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.spec.materials import Glass
-from simgen.spec.recipe import Recipe, Render, load_recipe
+from simgen.spec.recipe import Render
 from simgen.spec.scene import is_scene, scene_names
 from simgen.spec.scene_generators import generators
+from simgen.spec.sweeps import Sweep, load_sweep
 
 GLASS_DEPTH = 8
 """Longest light path with which a scene with glass is looked at: through a ball or a pane and back."""
@@ -24,9 +25,11 @@ def load_target(
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
     longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
-    .toml at its end, the recipe. Raises `InputError` for what is missing or not valid.
+    .toml at its end, the recipe. Of fields with several values the first is taken. Raises `InputError` for
+    what is missing or not valid.
     """
-    recipe, near = target_recipe(name_or_path, overrides)
+    sweep, near = target_sweep(name_or_path, overrides)
+    recipe = sweep.recipe(0)
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})
     target = prepare(recipe, near)
@@ -36,17 +39,18 @@ def load_target(
     return target
 
 
-def target_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path | None]:
+def target_sweep(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Sweep, Path | None]:
     """The recipe that a name or path means, and its folder; of a scene one that says nothing else, and None.
 
     Raises `InputError` for what is missing or not valid.
     """
     if not is_scene(name_or_path):
         _check_name(name_or_path)
-        return load_recipe(name_or_path, overrides)
+        sweep = load_sweep(name_or_path, overrides)
+        return sweep, sweep.near
     if overrides:
         raise InputError(f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe")
-    return Recipe(scene=name_or_path), None
+    return Sweep({"scene": name_or_path}, (), name_or_path, Path()), None
 
 
 def _check_name(name_or_path: str) -> None:

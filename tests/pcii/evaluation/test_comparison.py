@@ -259,7 +259,10 @@ def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, ca
     first = rows_of(tmp_path / "out")
     evaluate([series, series / "seed_3"], tmp_path / "out", methods=["by count"])
     assert len(calls) == 8
-    evaluate([series], tmp_path / "out", methods=FAKES)
+    told = list[tuple[str, int, int]]()
+    evaluate([series], tmp_path / "out", methods=FAKES, report=lambda *stage: told.append(stage))
+    assert told[0] == ("scores of an earlier run", 6, 6)
+    assert told[-1] == ("scores", 6, 6)
     assert set(calls[8:]) == {"two rows"}
     assert rows_of(tmp_path / "out")[:6] == first
 

@@ -1,5 +1,6 @@
 """Findings on many draws of a distribution: scenes with one fault each, made by hand."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -8,6 +9,7 @@ from pcii.base.errors import InputError
 from simgen.check.linter import DRAWS, lint
 from simgen.check.many_draws import draw_findings
 from simgen.check.scene_facts import Finding
+from simgen.check.targets import load_target
 from simgen.spec.camera_grid import Grid
 from simgen.spec.scene import Scene
 
@@ -76,3 +78,19 @@ def test_scenes_that_ship_are_drawn_without_a_warning(name: str) -> None:
     line, found = lint(name)
     assert line.startswith(f"{name}, draws 0 to {DRAWS - 1}: 10 x 10 views")
     assert {finding.verdict for finding in found} <= {"ok", "note"}
+
+
+def test_a_recipe_with_several_values_is_looked_at_by_its_first_ones(tmp_path: Path) -> None:
+    recipe = tmp_path / "many.toml"
+    recipe.write_text(
+        'scene = "drawn_plain"\nscene_number = { range = [30, 90] }\n[photons]\nbudget = [100, 300]\n'
+    )
+    line, _ = lint(str(recipe))
+    assert line.startswith(f"drawn_plain, draws 30 to {30 + DRAWS - 1}: 10 x 10 views")
+    assert line.endswith("; of photons.budget the first of 2 values, 100")
+    target = load_target(str(recipe))
+    assert target.recipe.scene_number == 30
+    assert target.recipe.photons.budget == 100
+    assert load_target(str(recipe), scene_number=3).recipe.scene_number == 3
+    with pytest.raises(InputError, match="budget = -1"):
+        lint(str(recipe), ["photons.budget=[100,-1]"])

@@ -18,7 +18,7 @@ from pcii.base.errors import InputError
 from pcii.io.collection import open_collection
 from pcii.io.collection_layout import COLLECTION, INDEX
 from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import CARD, CROISSANT
+from pcii.io.dataset_layout import CARD, CROISSANT, MARKER
 from pcii.io.verification import verify
 from simgen.app import commands as cli
 from simgen.collection import dataset_job
@@ -157,6 +157,34 @@ def test_other_software_neither_extends_a_collection_nor_works_on_it(
     with pytest.raises(InputError, match=r"is made with .* mitsuba 9\.9.*; install those versions"):
         job(0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_radiance_of_many_datasets_is_told_of(
+    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["generate", str(recipe_file), "--seeds", "1", "--set", "grid.rows=1", "--set", "grid.cols=1"]
+    for radiance, budget, told in (
+        ("mosaic", "[100,200]", True),
+        ("mosaic", "[100]", False),
+        ("none", "[100,200]", False),
+    ):
+        values = ["--set", f"products.radiance={radiance}", "--set", f"photons.budget={budget}"]
+        assert command_line.run(cli.app, [*command, *values, "-o", str(tmp_path / radiance / budget)]) == 0
+        assert ("radiance is rendered for each of 2 datasets" in capsys.readouterr().out) is told
+
+
+def test_verification_says_what_is_unfinished_and_what_belongs_to_nothing(
+    collection: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "stopped"
+    shutil.copytree(collection, out)
+    (out / "budget_100_seed_10").mkdir()
+    (out / "budget_100_seed_10" / MARKER).write_text("{}")
+    with pytest.raises(InputError, match=r"not finished: budget_100_seed_10; the same .* goes on with them"):
+        verify(out)
+    (out / "mine").mkdir()
+    with pytest.raises(InputError, match=r"not listed in index.jsonl, and read by nothing: mine; move it"):
+        verify(out)
 
 
 def test_workers_make_the_same_bytes_and_the_same_index_but_for_times(
