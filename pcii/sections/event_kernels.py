@@ -8,7 +8,7 @@ from pcii.base.compiled_loops import compiled, in_threads, threads
 
 BAND_BYTES = 1 << 18
 """Size of a band of a section. It fits in the cache of a core, so that photons are added there and not in
-memory; halved or doubled, a section takes 5 % longer at most."""
+memory; halved or doubled, a section takes a tenth longer at most."""
 
 
 def scatter(
