@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
+from threading import Lock
 from typing import Any, TypeVar
 
 import pcii.base
@@ -67,6 +68,7 @@ class KeptSteps(Steps):
     def __init__(self, results: Results) -> None:
         self._results = results
         self._kept: list[str] = []
+        self._folder = Lock()  # steps run side by side, and one at a time looks into the folder or writes
 
     def kept(self) -> Collection[str]:
         """Names of the steps that were done before."""
@@ -78,24 +80,26 @@ class KeptSteps(Steps):
         """Masks of the sections by a method, from the folder if it has them."""
         step = removal_step(method)
         key = self._key({"step": step, "z_mm": sections.z_mm.tolist()})
-        found = self._results.kept_masks(method, sections, key) if method in METHODS else None
+        with self._folder:
+            found = self._results.kept_masks(method, sections, key) if method in METHODS else None
         if found is not None:
             self._kept.append(step)
             return found
         focus, seconds = super().removal(method, sections, make)
-        with self._results.writing() as results:
+        with self._folder, self._results.writing() as results:
             results.save_segmented(focus, Making(key, seconds) if method in METHODS else None)
         return focus, seconds
 
     def depth(self, z_range_mm: tuple[float, float], make: Callable[[], DepthMap]) -> tuple[DepthMap, float]:
         """A depth map within a range, from the folder if it has it."""
         key = self._key({"step": DEPTH_STEP, "z_range_mm": list(z_range_mm)})
-        found = self._results.kept_depth(key)
+        with self._folder:
+            found = self._results.kept_depth(key)
         if found is not None:
             self._kept.append(DEPTH_STEP)
             return found
         depth, seconds = super().depth(z_range_mm, make)
-        with self._results.writing() as results:
+        with self._folder, self._results.writing() as results:
             results.save_depth(depth, Making(key, seconds))
         return depth, seconds
 

@@ -1,13 +1,17 @@
 """An analysis that was interrupted goes on: what is finished and valid is kept, with the same bytes."""
 
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from threading import Barrier
+from typing import Any
 
 import pytest
 
 import pcii
-from pcii.app import long_steps, pipeline, single_run
+from pcii.app import long_steps, pipeline, results, single_run
 from pcii.app.results import masks_name
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.io.dataset import Dataset
@@ -114,3 +118,31 @@ def test_masks_of_a_single_step_are_not_taken_for_those_of_a_run(dataset: Datase
     with single_run.Results(out, dataset).writing() as results:
         results.save_segmented(Segmented(~other.in_focus, "brightness", other.sections))
     assert run(dataset, out) == (REMOVALS[1], long_steps.DEPTH_STEP)
+
+
+def test_steps_that_end_together_do_not_take_each_other_for_strangers(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    together, write = Barrier(2), results.write_results
+
+    def slowly(out: Path, content: dict[str, object]) -> None:
+        """As `write_results`, with its temporary file there for long enough to be met."""
+        temporary = out / "temporary"
+        temporary.touch()
+        time.sleep(0.3)
+        temporary.unlink()
+        write(out, content)
+
+    def steps_at_once(done: Any) -> Any:
+        together.wait()
+        return done
+
+    focus = pcii.segment(dataset.counts, z_mm=[540, 620], method="brightness")
+    depth = pcii.estimate_depth(dataset.counts, z_range_mm=(450, 750), method="variance-sweep")
+    monkeypatch.setattr(results, "write_results", slowly)
+    steps = long_steps.KeptSteps(single_run.Results(tmp_path / "out", dataset))
+    with ThreadPoolExecutor(1) as beside:
+        mapped = beside.submit(steps.depth, (450, 750), partial(steps_at_once, depth))
+        steps.removal("brightness", focus.sections, partial(steps_at_once, focus))
+        mapped.result()
+    assert set(read_results(tmp_path / "out")["made"]) == {"depth.zarr", masks_name("brightness")}
