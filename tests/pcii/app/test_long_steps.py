@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from threading import Barrier
-from typing import Any
+from threading import Event
 
 import pytest
 
@@ -123,26 +122,27 @@ def test_masks_of_a_single_step_are_not_taken_for_those_of_a_run(dataset: Datase
 def test_steps_that_end_together_do_not_take_each_other_for_strangers(
     dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    together, write = Barrier(2), results.write_results
+    begun, write = Event(), results.write_results
 
     def slowly(out: Path, content: dict[str, object]) -> None:
         """As `write_results`, with its temporary file there for long enough to be met."""
         temporary = out / "temporary"
         temporary.touch()
+        begun.set()
         time.sleep(0.3)
         temporary.unlink()
         write(out, content)
 
-    def steps_at_once(done: Any) -> Any:
-        together.wait()
-        return done
+    def once_the_other_writes() -> DepthMap:
+        begun.wait(10)
+        return depth
 
     focus = pcii.segment(dataset.counts, z_mm=[540, 620], method="brightness")
     depth = pcii.estimate_depth(dataset.counts, z_range_mm=(450, 750), method="variance-sweep")
     monkeypatch.setattr(results, "write_results", slowly)
     steps = long_steps.KeptSteps(single_run.Results(tmp_path / "out", dataset))
     with ThreadPoolExecutor(1) as beside:
-        mapped = beside.submit(steps.depth, (450, 750), partial(steps_at_once, depth))
-        steps.removal("brightness", focus.sections, partial(steps_at_once, focus))
+        mapped = beside.submit(steps.depth, (450, 750), once_the_other_writes)
+        steps.removal("brightness", focus.sections, lambda: focus)
         mapped.result()
     assert set(read_results(tmp_path / "out")["made"]) == {"depth.zarr", masks_name("brightness")}
