@@ -73,11 +73,12 @@ def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
     """Rows (name, value) on the analysis that this report shows."""
     versions = {PACKAGE: version(PACKAGE)} | {name: version(name) for name in ANALYSED_WITH}
     now = datetime.now(UTC)
+    beside = "; depth was mapped beside the removal" if outcome.focus else ""
     return [
         ("command", _command(outcome)),
         ("date", f"{now:%Y-%m-%d %H:%M} UTC"),
         ("machine", _machine()),
-        ("time", f"{_stages(outcome.timings_s, 2)}; depth was mapped beside the removal"),
+        ("time", _stages(outcome.timings_s, 2) + beside),
         ("software", _versions(versions)),
     ]
 

@@ -25,16 +25,17 @@ helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapp
 """Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
 
 PARTS_PER_THREAD = 4
-"""Ranges per thread: who is done early takes one more."""
+"""Ranges per thread: who is done early takes one more. Results do not depend on it."""
 
 _threads: int = nb.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
 _pool: ThreadPoolExecutor | None = None
 
 
 def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[Any]:
-    """Results of a compiled `loop(first, last, *arguments)` for ranges that share 0 .. `count` - 1.
+    """Results of `loop(first, last, *arguments)` for ranges that share 0 .. `count` - 1.
 
-    Several threads run the ranges, this one among them. Results come in the order of the ranges; how many
+    The loop is compiled, or spends its time in a library that lets other threads run. Several threads run the
+    ranges, this one among them. Results come in the order of the ranges; how many
     there are depends on the number of threads.
     """
     parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1

@@ -16,6 +16,7 @@ SMALLEST_BYTES = 1 << 20
 LARGEST_BYTES = 1 << 26
 """Larger ones are given back: nobody wants a program that keeps gigabytes."""
 MOST_BLOCKS = 4
+"""Sums and coverage of two sections that are compared."""
 
 
 class _Block:

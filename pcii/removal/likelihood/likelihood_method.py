@@ -50,9 +50,9 @@ from pcii.removal.likelihood.regions import (
     Planes,
     Region,
     bright_cells,
+    dark_pieces,
     regions_of,
     settled,
-    unseen,
 )
 from pcii.sections.reconstruction import reconstruct
 
@@ -109,7 +109,7 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
         # and none is to have it. It is left alone, unless there is too little light to see where it ends.
         fitted = ~dilated(bright & ~touching & (not faint), HALO_CELLS)
         plane = np.where(fitted, layered(enough, own_spread, starts), starts[0])
-        plane = np.where(unseen(plane, bright), -1, plane)
+        plane = np.where(dark_pieces(plane, bright), -1, plane)
         numbers, regions = regions_of(plane, plane >= 0, focus, planes, halves)
     inner = fitted & ~dilated(plane < 0, OUTLINE_CELLS)
     masks, belongs = _outlines(counts, regions, numbers, inner, own_spread.size)

@@ -201,8 +201,8 @@ def regions_of(
     return numbers, found
 
 
-def unseen(plane: np.ndarray, bright: np.ndarray) -> np.ndarray:
-    """Pieces of one plane that are dark everywhere, (h, w) bool.
+def dark_pieces(plane: np.ndarray, bright: np.ndarray) -> np.ndarray:
+    """Connected pieces of each plane's cells that are nowhere bright, (h, w) bool; `plane` is -1 for none.
 
     Layers take such a piece where it is darker than the dark is elsewhere: as a surface it explains the
     photons that are missing, but nobody sees it.

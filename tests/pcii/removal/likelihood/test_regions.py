@@ -8,9 +8,9 @@ from pcii.evidence.half_agreement import Halves, halves_of
 from pcii.removal.likelihood.regions import (
     Planes,
     bright_cells,
+    dark_pieces,
     regions_of,
     settled,
-    unseen,
 )
 
 SHAPE = (30, 40)
@@ -209,8 +209,8 @@ def test_a_piece_of_a_plane_that_is_dark_everywhere_is_unseen():
     lit, half_lit, dark = box(2, 2, 6, 6), box(12, 2, 8, 8), box(2, 20, 12, 12)
     plane = np.where(lit | dark, 0, np.where(half_lit, 1, -1))
     bright = lit | box(12, 2, 1, 1) | box(25, 35, 2, 2)
-    np.testing.assert_array_equal(unseen(plane, bright), dark)
-    np.testing.assert_array_equal(unseen(np.full(SHAPE, -1), bright), False)
+    np.testing.assert_array_equal(dark_pieces(plane, bright), dark)
+    np.testing.assert_array_equal(dark_pieces(np.full(SHAPE, -1), bright), False)
 
 
 def test_pieces_are_numbered_and_specks_left_out():
