@@ -42,7 +42,7 @@ def batches(collection: pcii.Collection, size: int, seed: int) -> Iterator[tuple
 
 def main(folder: Path) -> None:
     """Four small scenes, and a pass over their training part: a regression on the photons of 8 x 8 pixels."""
-    overrides = ["scene=drawn_plain", "analysis.z_mm=[]", "photons.budget=400", "products.radiance=none"]
+    overrides = ["scene=drawn_plain", "photons.budget=400", "products.radiance=none"]
     collection = simgen.generate_collection("small", folder, overrides, scenes=4)
     print(collection)
     weight, bias = 0.0, 0.0

@@ -17,6 +17,7 @@ description = """
 Colour against photon noise: the 24 patches of a ColorChecker at 540 mm in even light, so that a patch of
 reflectance r has the radiance r x 500 lux / pi and nothing is out of focus.
 """
+planes_mm = [540.0]
 
 # Light from all around has no direction: no shading, the same on every patch.
 [[lights]]

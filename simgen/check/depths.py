@@ -41,6 +41,7 @@ def depth_findings(facts: Facts) -> list[Finding]:
     return [
         *disparity_findings(facts),
         *separation_findings(facts),
+        *no_planes_findings(facts),
         *focus_findings(facts),
         *overlap_findings(facts),
         *alias_findings(facts),
@@ -105,6 +106,15 @@ def _separation(facts: Facts, near: ObjectFacts, far: ObjectFacts) -> Finding:
     if factor <= MOST_PITCH_FACTOR or not ways:
         ways.append(f"take a pitch of {' x '.join(f'{p * factor:.3g}' for p in facts.grid.pitch_mm)} mm")
     return Finding("warn", "separation", f"{text} of blur apart", " or ".join(ways))
+
+
+def no_planes_findings(facts: Facts) -> list[Finding]:
+    """Whether neither scene nor recipe names depths, which analysis then has to be told each time."""
+    if facts.analysis.z_mm:
+        return []
+    listed_mm = ", ".join(f"{z:g}" for z in facts.planes_mm) or "..."
+    text = "neither the scene nor the recipe names depths to look at, and pcii asks for --z-mm"
+    return [Finding("warn", "focus", text, f"add planes_mm = [{listed_mm}] to the scene")]
 
 
 def focus_findings(facts: Facts) -> list[Finding]:

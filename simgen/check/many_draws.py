@@ -49,7 +49,7 @@ def draw_findings(
     else:
         found.append(Finding("ok", "overlap", "in no draw do bounds of objects overlap"))
     if not any(own.size for own in planes.values()):
-        found.append(Finding("note", "focus", "no planes are named", "add planes_mm to the scene"))
+        found.append(Finding("warn", "focus", "no planes are named", "add planes_mm to the scene"))
     elif any(unfocused.values()):
         text = _summary(unfocused, scenes, "have objects that are in focus at no plane, such as")
         found.append(Finding("warn", "focus", text, "let planes_mm follow the depths that are drawn"))

@@ -42,6 +42,8 @@ MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
+OF_ITS_SCENE = ("title", "analysis")
+"""What a recipe says of its own scene alone."""
 SEED_LIMIT = 1 << 63
 """Seeds are less."""
 APERTURE_TOLERANCE = 0.01
@@ -247,7 +249,7 @@ def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recip
     """A recipe by path or shipped name, with `key=value` overrides; and its folder.
 
     A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string. With another scene the
-    recipe's title, which is of its own scene, is dropped unless another is given too.
+    recipe's title and analysis, which are of its own scene, are dropped but for what is given too.
     Raises `InputError` for a recipe that is missing or wrong.
     """
     values, source, near = read_recipe(name_or_path, overrides)
@@ -263,8 +265,9 @@ def read_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[dict[
     values = read_toml(path)
     scene = values.get("scene")
     override(values, overrides)
-    if values.get("scene") != scene and not any(text.startswith("title=") for text in overrides):
-        values.pop("title", None)
+    if values.get("scene") != scene:
+        values = {name: value for name, value in read_toml(path).items() if name not in OF_ITS_SCENE}
+        override(values, overrides)
     source = str(path) if not overrides else f"{path} with --set {' '.join(overrides)}"
     return values, source, path.parent
 

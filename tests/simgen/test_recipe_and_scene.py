@@ -6,7 +6,7 @@ import pytest
 
 from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
-from simgen.spec.recipe import Recipe, load_recipe
+from simgen.spec.recipe import Analysis, Recipe, load_recipe
 from simgen.spec.scene import Scene, is_drawn, load_scene, scene_names
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
@@ -75,13 +75,15 @@ def test_a_sensor_has_no_faults_and_a_recipe_no_exposure_unless_told() -> None:
     assert (recipe.photons.nested, recipe.photons.statistics) == ((), "poisson")
 
 
-def test_another_scene_does_not_keep_the_title_of_the_recipes_own() -> None:
+def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> None:
     own, _ = load_recipe("small")
     assert own.title == "Ball and bird, small"
     assert load_recipe("small", ["scene=same_colour"])[0].title == ""  # so the scene's own title is told
     assert load_recipe("small", ["scene=two_objects", "seed=3"])[0].title == own.title
     assert load_recipe("small", ["title=Balls", "scene=same_colour"])[0].title == "Balls"
     assert load_recipe("small", ["scene=same_colour", f"title={own.title}"])[0].title == own.title
+    assert load_recipe("small", ["scene=overlap"])[0].analysis == Analysis()  # so the scene's own are taken
+    assert load_recipe("small", ["analysis.z_mm=[500]", "scene=overlap"])[0].analysis == Analysis(z_mm=(500,))
 
 
 def test_overrides_reach_the_sensor_the_exposure_and_nested_budgets() -> None:

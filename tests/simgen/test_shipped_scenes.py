@@ -122,7 +122,7 @@ def test_the_scenes_show_all_that_scenes_can_hold() -> None:
 @pytest.mark.parametrize("name", RECIPES)
 def test_a_recipe_looks_where_its_objects_are(name: str) -> None:
     recipe, near = load_recipe(str(ROOT / "data_recipes" / f"{name}.toml"))
-    load_scene(recipe.scene, near)
+    assert load_scene(recipe.scene, near)[0].planes_mm == recipe.analysis.z_mm
     centre, _, _ = seen(recipe.scene)
     limits = recipe.analysis.z_range_mm
     assert limits is not None
@@ -131,7 +131,15 @@ def test_a_recipe_looks_where_its_objects_are(name: str) -> None:
         return
     objects = centre.z_mm[centre.object_id > 0]
     assert limits[0] <= objects.min() <= objects.max() <= limits[1]
-    for z_mm in recipe.analysis.z_mm:
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_names_planes_where_its_objects_are(name: str) -> None:
+    scene, centre = scene_of(name), seen(name)[0]
+    assert scene.planes_mm
+    objects = centre.z_mm[centre.object_id > 0]
+    for z_mm in scene.planes_mm if scene.objects else ():
         assert np.abs(objects - z_mm).min() < 5  # the paper's 540 and 620 mm are those of whole objects
 
 

@@ -51,9 +51,11 @@ def test_a_recipe_is_of_the_scene_of_its_name_or_of_the_one_that_is_told() -> No
 
 @pytest.mark.renders
 def test_of_a_scene_that_names_no_planes_the_depths_of_its_objects_are_looked_at() -> None:
+    path = write_new_scene("mine", "two_objects")
+    path.write_text(path.read_text().replace("planes_mm", "# planes_mm"))
     write_new_recipe("mine")
     recipe, _ = load_recipe("data_recipes/mine.toml")
-    assert recipe.scene == "two_objects"
+    assert recipe.scene == "mine"
     near, far = recipe.analysis.z_mm
     assert abs(near - 540) < 5
     assert abs(far - 620) < 5

@@ -32,6 +32,7 @@ from simgen.check.depths import (
     disparity_findings,
     focus_findings,
     focus_share,
+    no_planes_findings,
     overlap_findings,
     separation_findings,
 )
@@ -156,6 +157,13 @@ def test_share_in_focus_is_what_blurs_by_one_pixel() -> None:
     assert verdicts(found) == ["ok", "warn"]
     assert "75% of it in focus at 540 mm" in found[0].text
     assert "no object is in focus at the plane 620 mm" in found[1].text
+
+
+def test_depths_that_nobody_names_are_warned_of() -> None:
+    found = no_planes_findings(facts(thing("a", 540), thing("b", 620)))
+    assert verdicts(found) == ["warn"]
+    assert found[0].remedy == "add planes_mm = [540, 620] to the scene"
+    assert not no_planes_findings(facts(thing("a", 540), recipe={"analysis": {"z_mm": [540]}}))
 
 
 def test_objects_outside_the_depth_range_are_named() -> None:

@@ -65,7 +65,7 @@ def test_objects_must_reach_a_plane() -> None:
         assert f"{verdict} focus" in verdicts(scene(ball("a", 0, 500), planes_mm=planes)), plane
         # What the recipe names comes first.
         assert f"{verdict} focus" in verdicts(scene(ball("a", 0, 500)), z_mm=planes), plane
-    assert "note focus" in verdicts(scene(ball("a", 0, 500), planes_mm=()))
+    assert "warn focus" in verdicts(scene(ball("a", 0, 500), planes_mm=()))
 
 
 def test_a_draw_that_is_not_valid_is_bad() -> None:
