@@ -1,4 +1,4 @@
-"""Make a small dataset, open it, and check that it is whole. The folder to make it in is the argument."""
+"""Make a small dataset, open it, and check that it is whole. The folder to make it in may be an argument."""
 
 import sys
 from pathlib import Path

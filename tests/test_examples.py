@@ -1,4 +1,4 @@
-"""Every example runs, and says something."""
+"""Every example runs without an argument, and says something."""
 
 import subprocess
 import sys
@@ -17,7 +17,7 @@ def _case(example: Path) -> object:
 @pytest.mark.parametrize("example", [_case(example) for example in EXAMPLES])
 def test_an_example_runs(example: Path, tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, str(example), str(tmp_path / "out")], capture_output=True, text=True, check=False
+        [sys.executable, str(example)], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.splitlines()) >= 2

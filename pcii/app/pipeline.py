@@ -9,9 +9,8 @@ from typing import Any
 from pcii.app.long_steps import ALL_STEPS, DEPTH_STEP, Made, Steps, removal_step, timed
 from pcii.base.progress import Report, silent
 from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.focal_planes import FocalPlanes
+from pcii.core.focal_planes import FocalPlanes, check_depth_counts
 from pcii.core.images import ArrayLike5D, Views
-from pcii.core.photon_counts import check_depth_counts
 from pcii.core.section_stack import Sections
 from pcii.depth.methods import estimate_depth
 from pcii.io.dataset import Dataset

@@ -8,6 +8,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 
+LARGEST_TOTAL = (1 << 63) - 1
+
 
 def read_only(array: np.ndarray) -> np.ndarray:
     """A view of `array` that cannot be written to."""
@@ -34,3 +36,13 @@ def check_z_mm(z_mm: object) -> np.ndarray:
         bad = z[~(np.isfinite(z) & (z > 0))][0]
         raise InputError(f"z_mm: a depth must be a finite number above 0 mm, got {bad:g}")
     return z
+
+
+def check_total(name: str, counts: np.ndarray) -> None:
+    """Raise `InputError` if whole numbers, each below 2^63, add up to more than int64 holds."""
+    if counts.size == 0 or counts.size * int(counts.max()) <= LARGEST_TOTAL:
+        return
+    wide, half = counts.astype(np.uint64), np.uint64(32)
+    total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
+    if total > LARGEST_TOTAL:
+        raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")

@@ -1,7 +1,7 @@
 """The grid of cameras: positions and intrinsic parameters."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
@@ -103,24 +103,74 @@ class CameraGrid(Brief):
         """Shape (K, L, H, W) of one monochrome stack of views."""
         return (self.rows, self.cols, self.height, self.width)
 
-    def plot(self, axes: "Axes | None" = None) -> "Axes":
+    def plot(self, axes: "Axes | None" = None) -> np.ndarray:
         """Draw where the cameras stand, in mm, with both baselines and the virtual centre.
 
-        Draws into `axes`, by default of a new figure, and returns them. Raises `InputError` if they are no
-        Matplotlib axes.
+        Draws into `axes`, by default of a new figure, and returns them, (1,). Raises `InputError` if they are
+        no Matplotlib axes.
         """
         from pcii.figures.charts import draw_cameras
-        from pcii.figures.panels import one_axes
+        from pcii.figures.panels import several_axes
 
-        axes = one_axes(axes, (4.0, 4.0))
+        panels = several_axes(axes, 1, (4.0, 4.0))
         (across, down), K, L = self.baseline_mm, self.rows, self.cols
         x_mm, y_mm = np.linspace(-across / 2, across / 2, L), np.linspace(-down / 2, down / 2, K)
         pitch = "{:g}, {:g}".format(*self.pitch_mm)
-        draw_cameras(axes, x_mm, y_mm, f"{K} x {L} cameras, pitch {pitch} mm (x, y)")
-        return axes
+        draw_cameras(panels[0], x_mm, y_mm, f"{K} x {L} cameras, pitch {pitch} mm (x, y)")
+        return panels
 
 
 def check_camera(grid: CameraGrid, k: int, l: int) -> None:
     """Raise `InputError` for a camera outside the grid."""
     if not (0 <= k < grid.rows and 0 <= l < grid.cols):
         raise InputError(f"view: there is no camera ({k}, {l}) in a grid of {grid.rows} x {grid.cols}")
+
+
+def chosen_cameras(grid: CameraGrid, cameras: object) -> tuple[range, range]:
+    """Rows and columns of the cameras that an index [k, l] chooses, each by a number or a slice.
+
+    Raises `InputError` for another index, a camera outside the grid, none, or a step that is not above 0.
+    """
+    if not (isinstance(cameras, tuple) and len(cameras) == 2):
+        raise InputError(f"cameras: expected two numbers or slices [k, l], got {cameras!r}")
+    rows, cols = (
+        _chosen(name, chosen, count)
+        for name, chosen, count in zip(("k", "l"), cameras, (grid.rows, grid.cols), strict=True)
+    )
+    return rows, cols
+
+
+def _chosen(name: str, chosen: object, count: int) -> range:
+    if isinstance(chosen, slice):
+        cameras = range(count)[chosen]
+        if cameras.step < 1 or not cameras:
+            raise InputError(f"{name}: a slice must choose cameras of 0 .. {count - 1} in their order")
+        return cameras
+    if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer):
+        raise InputError(f"{name}: expected a number or a slice of cameras, got {chosen!r}")
+    if not -count <= chosen < count:
+        raise InputError(f"{name}: there is no camera {chosen} of 0 .. {count - 1}")
+    number = int(chosen) % count
+    return range(number, number + 1)
+
+
+def grid_of(grid: CameraGrid, rows: range, cols: range) -> CameraGrid:
+    """The grid of some rows and columns of cameras, whose own centre is its virtual centre.
+
+    Raises `InputError` if the grid is sheared and they do not lie symmetrically in it: their images would
+    have to move.
+    """
+    for name, cameras, count, shear_px in (
+        ("k", rows, grid.rows, grid.shear_px[1]),
+        ("l", cols, grid.cols, grid.shear_px[0]),
+    ):
+        if shear_px and cameras[0] + cameras[-1] != count - 1:
+            raise InputError(f"{name}: cameras of a sheared grid must lie symmetrically around its middle")
+    (pitch_x, pitch_y), (shear_x, shear_y) = grid.pitch_mm, grid.shear_px
+    return replace(
+        grid,
+        rows=len(rows),
+        cols=len(cols),
+        pitch_mm=(pitch_x * cols.step, pitch_y * rows.step),
+        shear_px=(shear_x * cols.step, shear_y * rows.step),
+    )

@@ -123,18 +123,20 @@ class DepthMap(Brief):
         caption = f"{limits[0]:.4g} mm (yellow) to {limits[1]:.4g} mm (violet)"
         return {caption: depth_thumbnail(self.z_mm, self.confidence, limits)}
 
-    def plot(self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None) -> "Axes":
-        """Draw depth in mm, darker where less sure, with a colour bar; return the Matplotlib axes.
+    def plot(
+        self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None
+    ) -> np.ndarray:
+        """Draw depth in mm, darker where less sure, with a colour bar; return the Matplotlib axes (1,).
 
         The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
         those of a new figure. Raises `InputError` if they are no Matplotlib axes.
         """
         from pcii.figures.maps import draw_depth
-        from pcii.figures.panels import one_axes
+        from pcii.figures.panels import several_axes
 
-        axes = one_axes(axes, self.z_mm.shape)
-        draw_depth(axes, self.z_mm, self.confidence, z_range_mm, "depth, darker where less sure")
-        return axes
+        panels = several_axes(axes, 1, self.z_mm.shape)
+        draw_depth(panels[0], self.z_mm, self.confidence, z_range_mm, "depth, darker where less sure")
+        return panels
 
     def to_xarray(self) -> "xarray.Dataset":
         """`z_mm` and `confidence` over pixels."""
@@ -185,27 +187,27 @@ class DepthPosterior(Brief):
         logarithm = np.log2(all_of_it, out=np.zeros(all_of_it.shape), where=all_of_it > 0)
         return np.maximum(-(all_of_it * logarithm).sum(axis=0), 0)
 
-    def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> "Axes":
+    def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> np.ndarray:
         """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
 
         The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
-        Matplotlib `axes`, by default those of a new figure. Raises `InputError` for a pixel outside the view.
+        Matplotlib axes (1,), by default of a new figure. Raises `InputError` for a pixel outside the view.
         """
         from pcii.figures.charts import draw_depth_probability
         from pcii.figures.maps import draw_entropy
-        from pcii.figures.panels import one_axes
+        from pcii.figures.panels import several_axes
 
         film = self.planes.grid.height, self.planes.grid.width
         if pixel is None:
-            axes = one_axes(axes, film)
-            draw_entropy(axes, self.entropy_bits(), self._most_bits(), film, self.block_px)
-            return axes
+            panels = several_axes(axes, 1, film)
+            draw_entropy(panels[0], self.entropy_bits(), self._most_bits(), film, self.block_px)
+            return panels
         i, j = _checked_pixel(pixel, film)
-        axes = one_axes(axes)
+        panels = several_axes(axes, 1)
         a, b = i // self.block_px, j // self.block_px
         title = f"pixel ({i}, {j}), no surface: {self.no_surface[a, b]:.1%}"
-        draw_depth_probability(axes, self.planes.z_mm, self.probability[:, a, b], title)
-        return axes
+        draw_depth_probability(panels[0], self.planes.z_mm, self.probability[:, a, b], title)
+        return panels
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.

@@ -15,7 +15,8 @@ from pcii.base.short_form import Brief, listed
 from pcii.core.arrays import check_z_mm, read_only
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
-from pcii.core.photon_counts import PhotonEvents
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts, PhotonEvents
 from pcii.core.truth import PhotonTruth
 
 
@@ -166,3 +167,27 @@ def planes_at(grid: CameraGrid, z_mm: object) -> FocalPlanes:
     if z_mm.grid != grid:
         raise InputError("z_mm: these focal planes are of another camera grid")
     return z_mm
+
+
+def check_data(data: object) -> None:
+    """Raise `InputError` unless sections can be made of `data`: `PhotonCounts` or `Views`."""
+    if not isinstance(data, PhotonCounts | Views):
+        raise InputError(
+            "data: expected PhotonCounts or Views (of a dataset its .counts or .views), "
+            f"got {type(data).__name__}"
+        )
+
+
+def check_depth_counts(counts: object) -> None:
+    """Raise `InputError` unless `counts` are `PhotonCounts` of at least two views, which depth needs."""
+    if isinstance(counts, Views):
+        raise InputError(
+            "counts: needs photon counts, and these are images; draw them with pcii.limit_photons, or import "
+            "with --photons N"
+        )
+    if not isinstance(counts, PhotonCounts):
+        raise InputError(
+            f"counts: expected PhotonCounts (of a dataset its .counts), got {type(counts).__name__}"
+        )
+    if counts.grid.view_count < 2:
+        raise InputError("counts: one view has no depth; at least 2 cameras are needed")

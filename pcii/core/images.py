@@ -88,8 +88,8 @@ class Views(Brief):
 
     def plot(
         self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
-    ) -> "Axes":
-        """Draw the elemental image of the camera `view`, (k, l), in colours and return the Matplotlib axes.
+    ) -> np.ndarray:
+        """Draw the elemental image of the camera `view`, (k, l), in colours; return the Matplotlib axes (1,).
 
         The default is the camera in the middle; "mean" is the mean of all views. The 98th percentile of what
         is lit is white. A mosaic's pixels take the colours that they lack from those around. `axes` are by

@@ -3,17 +3,16 @@
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, overload
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, times
 from pcii.core.array_labels import COUNTS_LABELS
-from pcii.core.arrays import read_only
+from pcii.core.arrays import check_total, read_only
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
-from pcii.core.camera_grid import CameraGrid, check_camera
-from pcii.core.images import Views
+from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of
 from pcii.core.view_figures import chosen_camera, draw_light, draw_photons, middle_camera, photon_thumbnail
 from pcii.core.xarray_form import labelled_dataset
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-LARGEST_TOTAL = (1 << 63) - 1
 LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 
@@ -72,7 +70,7 @@ class PhotonCounts(Brief):
         counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
-        _check_total("counts", counts)
+        check_total("counts", counts)
         return cls(grid, cfa, _dense=read_only(counts))
 
     @classmethod
@@ -114,7 +112,7 @@ class PhotonCounts(Brief):
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*indices.values(), photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
-        _check_total("n", photons)
+        check_total("n", photons)
         events = _canonical_events(tuple(indices.values()), photons, grid)
         whole_counts("n", events.n)  # after those of one pixel are added up
         return cls(grid, cfa, _events=events)
@@ -135,10 +133,18 @@ class PhotonCounts(Brief):
 
     @property
     def dense(self) -> np.ndarray:
-        """The dense stack of counts (K, L, H, W); raises `InputError` if they are kept as events."""
-        if self._dense is None:
-            raise InputError("dense: these counts are kept as events; use .view(k, l) or .events")
-        return self._dense
+        """The dense stack of counts (K, L, H, W); of events it is made at each call, int32 if they fit."""
+        if self._dense is not None:
+            return self._dense
+        events = self.events
+        dtype = np.int32 if events.n.max(initial=0) < 1 << 31 else np.int64  # signed: differences do not wrap
+        dense = np.zeros(self.grid.shape_KLHW, dtype)
+        dense[events.k, events.l, events.i, events.j] = events.n
+        return dense
+
+    def to_numpy(self) -> np.ndarray:
+        """The dense stack of counts (K, L, H, W), integers: `dense`, by the name that data frames use."""
+        return self.dense
 
     @cached_property
     def occupied_share(self) -> float:
@@ -178,6 +184,30 @@ class PhotonCounts(Brief):
         image[events.i[of_view], events.j[of_view]] = events.n[of_view]
         return image
 
+    @overload
+    def __getitem__(self, cameras: tuple[int, int]) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, cameras: tuple[slice, int | slice] | tuple[int, slice]) -> "PhotonCounts": ...
+    def __getitem__(self, cameras: tuple[int | slice, int | slice]) -> "np.ndarray | PhotonCounts":
+        """Dense counts (H, W) of one camera, `counts[k, l]`, or `PhotonCounts` of some, `counts[1:4, ::2]`.
+
+        A number below 0 counts from the end; beside a slice a number chooses one row (column) of cameras. The
+        chosen cameras have their own virtual centre, which depth and truth of the whole grid share only if
+        they lie symmetrically in it. Raises `InputError` for cameras that are none or in another order, and
+        in a sheared grid for cameras that do not lie symmetrically.
+        """
+        rows, cols = chosen_cameras(self.grid, cameras)
+        if not any(isinstance(chosen, slice) for chosen in cameras):
+            return self.view(rows[0], cols[0])
+        grid = grid_of(self.grid, rows, cols)
+        if self._dense is not None:
+            dense = self._dense[rows.start : rows.stop : rows.step, cols.start : cols.stop : cols.step]
+            return PhotonCounts(grid, self.cfa, _dense=dense)
+        e = self.events
+        kept = np.isin(e.k, rows) & np.isin(e.l, cols)
+        k, l = (e.k[kept] - rows.start) // rows.step, (e.l[kept] - cols.start) // cols.step
+        return PhotonCounts(grid, self.cfa, _events=_events((k, l, e.i[kept], e.j[kept]), e.n[kept]))
+
     @cached_property
     def total(self) -> int:
         """Number of photons of all views."""
@@ -192,8 +222,8 @@ class PhotonCounts(Brief):
 
     def plot(
         self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
-    ) -> "Axes":
-        """Draw the photons of the camera `view`, (k, l), and return the Matplotlib axes.
+    ) -> np.ndarray:
+        """Draw the photons of the camera `view`, (k, l), and return the Matplotlib axes (1,).
 
         The default is the camera in the middle. "mean" is the mean of all views, in colours. `axes` are by
         default those of a new figure. Raises `InputError` for a camera outside the grid.
@@ -209,9 +239,8 @@ class PhotonCounts(Brief):
         return draw_light(axes, light[..., None], self.cfa, title)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The counts as they are kept: events `k`, `l`, `i`, `j`, `n`, or `dense` over cameras and pixels."""
-        arrays = {n: getattr(self.events, n) for n in "klijn"} if self.is_sparse else {"dense": self.dense}
-        return labelled_dataset(arrays, COUNTS_LABELS, grid=self.grid, cfa=self.cfa)
+        """`dense` over cameras and pixels."""
+        return labelled_dataset({"dense": self.dense}, COUNTS_LABELS, grid=self.grid, cfa=self.cfa)
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.
@@ -229,19 +258,6 @@ class PhotonCounts(Brief):
         kept = n > 0
         pixels = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
         return PhotonCounts(self.grid, self.cfa, _events=_events(pixels, n[kept]))
-
-
-def check_depth_counts(value: object) -> None:
-    """Raise `InputError` unless `value` is `PhotonCounts` of at least two views, which depth needs."""
-    if isinstance(value, Views):
-        raise InputError(
-            "counts: needs photon counts, and these are images; draw them with pcii.limit_photons, or import "
-            "with --photons N"
-        )
-    if not isinstance(value, PhotonCounts):
-        raise InputError(f"counts: expected PhotonCounts, got {type(value).__name__}")
-    if value.grid.view_count < 2:
-        raise InputError("counts: one view has no depth; at least 2 cameras are needed")
 
 
 def _check_grid(value: object) -> None:
@@ -267,16 +283,6 @@ def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     if array.size and array.max() > LARGEST_COUNT:
         raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
     return array
-
-
-def _check_total(name: str, counts: np.ndarray) -> None:
-    """Raise `InputError` if the counts, each at most `LARGEST_COUNT`, add up to more than int64 holds."""
-    if counts.size == 0 or counts.size * int(counts.max()) <= LARGEST_TOTAL:
-        return
-    wide, half = counts.astype(np.uint64), np.uint64(32)
-    total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
-    if total > LARGEST_TOTAL:
-        raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")
 
 
 def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:

@@ -42,26 +42,29 @@ def _samples_and_colours(light: np.ndarray, cfa: str | None) -> tuple[np.ndarray
     return by_colour(light[..., 0], cfa), by_colour(samples[..., 0], cfa)
 
 
-def draw_light(axes: "Axes | None", light: np.ndarray, cfa: str | None, title: str) -> "Axes":
-    """Draw light (H, W, C), a mosaic if `cfa` is given, in its colours."""
+def draw_light(axes: "Axes | None", light: np.ndarray, cfa: str | None, title: str) -> np.ndarray:
+    """Draw light (H, W, C), a mosaic if `cfa` is given, in its colours; returns the axes (1,)."""
     from pcii.figures.exposure import PANEL_PX, block_px, exposed
-    from pcii.figures.panels import one_axes, show_picture
+    from pcii.figures.panels import several_axes, show_picture
 
-    axes = one_axes(axes, light.shape[:2])
+    panels = several_axes(axes, 1, light.shape[:2])
     (image,) = exposed([_samples_and_colours(light, cfa)], PANEL_PX)
-    show_picture(axes, image, light.shape[:2], title, block_px(light.shape, PANEL_PX))
-    return axes
+    show_picture(panels[0], image, light.shape[:2], title, block_px(light.shape, PANEL_PX))
+    return panels
 
 
-def draw_photons(axes: "Axes | None", counts: np.ndarray, title: str) -> "Axes":
-    """Draw photon counts (H, W) of one view, in grey: of so few, neighbours would only take false colours."""
+def draw_photons(axes: "Axes | None", counts: np.ndarray, title: str) -> np.ndarray:
+    """Draw photon counts (H, W) of one view, in grey: of so few, neighbours would only take false colours.
+
+    Returns the axes (1,).
+    """
     from pcii.figures.exposure import PANEL_PX, block_px, photon_picture
-    from pcii.figures.panels import one_axes, show_picture
+    from pcii.figures.panels import several_axes, show_picture
 
-    axes = one_axes(axes, counts.shape)
+    panels = several_axes(axes, 1, counts.shape)
     image = photon_picture(counts, PANEL_PX)
-    show_picture(axes, image, counts.shape, title, block_px(counts.shape, PANEL_PX))
-    return axes
+    show_picture(panels[0], image, counts.shape, title, block_px(counts.shape, PANEL_PX))
+    return panels
 
 
 def light_thumbnail(light: np.ndarray, cfa: str | None) -> str:

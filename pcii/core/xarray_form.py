@@ -36,8 +36,9 @@ def labelled_dataset(
     """A dataset of these arrays; `labels` has one for each.
 
     Cameras, rows and columns are numbered from 0, pixels (of which a view's are divided into `subpixel`) by
-    their centres in px of a view. With a grid each camera has its position `camera_x_mm`, `camera_y_mm`, and
-    the fields of the grid and `cfa` are attributes. Raises `InputError` if xarray is not installed.
+    their centres in px of a view; planes are found by their depths in mm, `.sel(plane=540)`. With a grid each
+    camera has its position `camera_x_mm`, `camera_y_mm`, and the fields of the grid and `cfa` are attributes.
+    Raises `InputError` if xarray is not installed.
     """
     try:
         import xarray
@@ -61,7 +62,7 @@ def labelled_dataset(
         coordinates["axis"] = ("axis", list("XYZ"), {"long_name": "right, down, forward"})
     if planes_mm is not None:
         attributes = {"units": "mm", "long_name": "planar depth of the plane"}
-        coordinates["z_mm"] = ("plane", planes_mm, attributes)
+        coordinates |= dict.fromkeys(("plane", "z_mm"), ("plane", planes_mm, attributes))
     if grid is not None and "camera_row" in sizes:
         for name, dim, cameras, pitch_mm in (
             ("camera_x_mm", "camera_col", grid.cols, grid.pitch_mm[0]),

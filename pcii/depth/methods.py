@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pcii.base.errors import InputError
 from pcii.base.extensions import load_function, package_of, registered
 from pcii.core.estimates import DepthMap, DepthPosterior
+from pcii.core.focal_planes import check_data
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
@@ -82,9 +83,8 @@ def depth_posterior(data: PhotonCounts | Views, z_range_mm: tuple[float, float])
     return PosteriorDepth().posterior(data, z_range_mm)
 
 
-def _checked_range_mm(data: object, z_range_mm: tuple[float, float]) -> tuple[float, float]:
-    if not isinstance(data, PhotonCounts | Views):
-        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
+def _checked_range_mm(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> tuple[float, float]:
+    check_data(data)
     if data.grid.view_count < 2:
         raise InputError("data: one view has no depth; at least 2 cameras are needed")
     return check_range_mm(data.grid, z_range_mm)

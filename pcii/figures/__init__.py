@@ -5,8 +5,8 @@ arrays with their captions; so this room comes before `core`, and all imports ca
 a table of functions registered by later rooms would hide.
 
 Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it is given, or else into a new figure of
-`pyplot`, and returns them: one `Axes`, or where a type has several panels an array (N,) of them, which it
-takes as a list. Matplotlib is imported on the first picture.
+`pyplot`, and returns them as an array (N,), one for each panel; it takes them as a list, one panel's alone
+too. Matplotlib is imported on the first picture.
 
 charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
 exposure      What of an image is shown, and how bright: blocks of pixels, means of colours, a common

@@ -22,18 +22,10 @@ GRID_COLOUR = "#8a94a6"
 """Of lines behind what is drawn: seen on light and on dark pages."""
 
 
-def one_axes(axes: "Axes | None", shape: Sequence[float] = (3.0, 4.0)) -> "Axes":
-    """`axes`, or those of a new figure of the proportions `shape`, (height, width).
-
-    Raises `InputError` if `axes` are no Matplotlib axes.
-    """
-    return several_axes(None if axes is None else [axes], 1, shape)[0]
-
-
 def several_axes(
     axes: "Axes | Sequence[Axes] | np.ndarray | None", count: int, shape: Sequence[float] = (3.0, 4.0)
 ) -> np.ndarray:
-    """The `count` axes (N,) of panels of these proportions: those given, or those of a new figure.
+    """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those given, or new ones.
 
     For one panel the axes may be given without a list. Raises `InputError` if the number of axes is not
     `count`, or if something given is no Matplotlib axes.

@@ -56,9 +56,15 @@ class Collection(Brief, Sequence[Dataset]):
         """The datasets of whose row `condition` is true and which have these values.
 
         Values are of columns and of swept fields; of a dotted field the last part is enough where that is
-        unique: `where(budget=300, split="train")`. Raises `InputError` for an unknown name.
+        unique: `where(budget=300, split="train")`. Raises `InputError` for an unknown name, and for a value
+        that no dataset has.
         """
         named = {self._column(name): value for name, value in values.items()}
+        for column, value in named.items():
+            held = [_cell(row, column) for row in self.rows]
+            if held and value not in held:
+                known = listed([str(one) for one in dict.fromkeys(map(str, held))])
+                raise InputError(f"where: no dataset has {column} = {value!r}; there are {known}")
         rows = [
             row
             for row in self.rows

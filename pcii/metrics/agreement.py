@@ -70,6 +70,7 @@ def _by_photon(by_event: np.ndarray, photons: PhotonTruth) -> np.ndarray:
     events = int(event[-1]) + 1 if event.size else 0
     if by_event.size != events:
         raise InputError(
-            f"photon_in_focus: has {by_event.size} events, but the truth's photons belong to {events}"
+            f"photon_in_focus: has {by_event.size} events, but the truth's photons belong to {events}, "
+            "so these are other counts; for counts drawn anew give dataclasses.replace(truth, photons=None)"
         )
     return by_event[event]

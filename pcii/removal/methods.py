@@ -3,7 +3,8 @@
 from pcii.base.errors import InputError
 from pcii.base.extensions import registered
 from pcii.core.estimates import Segmented
-from pcii.core.photon_counts import PhotonCounts, check_depth_counts
+from pcii.core.focal_planes import check_depth_counts
+from pcii.core.photon_counts import PhotonCounts
 from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import PosteriorMasks

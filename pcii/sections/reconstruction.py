@@ -14,7 +14,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import colour_cells
-from pcii.core.focal_planes import FocalPlanes, planes_at
+from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
 from pcii.core.images import Views
 from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts
 from pcii.core.section_stack import Normalisation, Sections, Shifts
@@ -106,6 +106,7 @@ def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -
     >>> [float(section.estimate.max()) for section in pcii.reconstruct_each(views, [1000, 2000])]
     [1.0, 1.0]
     """
+    check_data(data)
     planes = planes_at(data.grid, z_mm)
     for plane in range(len(planes)):
         yield reconstruct(data, planes.take([plane]), **options)
@@ -134,8 +135,7 @@ def _joined_coverage(first: Sections, second: Sections) -> np.ndarray:
 def _check(
     data: PhotonCounts | Views, subpixel: int, normalisation: Normalisation, shifts: Shifts, variance: bool
 ) -> None:
-    if not isinstance(data, PhotonCounts | Views):
-        raise InputError(f"data: expected PhotonCounts or Views, got {type(data).__name__}")
+    check_data(data)
     if isinstance(subpixel, bool) or not isinstance(subpixel, int | np.integer) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
     if normalisation not in ("overlap", "views"):

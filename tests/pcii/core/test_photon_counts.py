@@ -47,6 +47,9 @@ def test_dense_and_events_hold_the_same_counts_in_any_order(dense, shuffle):
         for k, l in np.ndindex(grid.rows, grid.cols):
             np.testing.assert_array_equal(sparse.view(k, l), dense[k, l])
             np.testing.assert_array_equal(from_dense.view(k, l), dense[k, l])
+            np.testing.assert_array_equal(sparse[k - grid.rows, l], dense[k, l])
+        np.testing.assert_array_equal(sparse.to_numpy(), dense)
+        np.testing.assert_array_equal(from_dense.to_numpy(), dense)
 
 
 def test_no_events_is_a_valid_dark_exposure():
@@ -189,3 +192,43 @@ def test_a_dense_stack_of_more_than_int64_holds_is_refused_by_name() -> None:
     grid = unit_grid(1, 1, 2048, 4096)
     with pytest.raises(InputError, match=r"^counts: 9223372036854775808 photons in all"):
         PhotonCounts.from_dense(np.full(grid.shape_KLHW, MOST), grid)
+
+
+@pytest.mark.parametrize("kept", ["events", "dense"])
+def test_some_cameras_see_a_point_where_all_of_them_do(kept: str):
+    """A point at 1 mm falls on itself in sections of any cameras, at the place that their centre says."""
+    grid = unit_grid(5, 6, 40, 40, pitch_mm=(4.0, 2.0))
+    dense = np.zeros(grid.shape_KLHW, dtype=int)
+    for k, l in np.ndindex(5, 6):  # the disparity is 4 px across and 2 down
+        dense[k, l, 20 - 2 * (k - 2), 26 - 4 * (l - 2)] = 1 + l
+    counts = PhotonCounts.from_dense(dense, grid)
+    if kept == "events":
+        e = counts.events
+        counts = PhotonCounts.from_events(e.k, e.l, e.i, e.j, e.n, grid)
+    some = counts[1:4, 1::2]
+    assert some.is_sparse == (kept == "events")
+    np.testing.assert_array_equal(some.to_numpy(), dense[1:4, 1::2])
+    assert some.grid.pitch_mm == (8.0, 2.0)
+    section = reconstruct(some, z_mm=1.0).counts[0, ..., 0]
+    assert np.argwhere(section).tolist() == [[20, 22]]  # of the cameras 1, 3, 5 the middle one is 3
+    assert section.max() == 3 * (2 + 4 + 6)
+    assert counts[2, -2:].grid.shape_KLHW == (1, 2, 40, 40)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "message"),
+    [
+        ((3, 0), "k: there is no camera 3 of 0 .. 2"),
+        ((0, slice(4, None)), "l: a slice must choose cameras of 0 .. 3"),
+        ((slice(None, None, -1), 0), "k: a slice must choose cameras of 0 .. 2 in their order"),
+        ((0.5, slice(None)), "k: expected a number or a slice of cameras"),
+        (0, "cameras: expected two numbers or slices"),
+        ((slice(None), slice(2)), "l: cameras of a sheared grid must lie symmetrically"),
+    ],
+)
+def test_cameras_that_cannot_be_chosen_are_named(cameras, message):
+    grid = unit_grid(3, 4, 2, 2, shear_px=(0.5, 0.0))
+    counts = PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid)
+    assert counts[:2, 1:3].grid.shear_px == (0.5, 0.0)
+    with pytest.raises(InputError, match=f"^{message}"):
+        counts[cameras]

@@ -48,7 +48,7 @@ def words(axes: Axes) -> str:
 
 
 def test_cameras_stand_where_the_grid_says() -> None:
-    axes = GRID.plot()
+    (axes,) = GRID.plot()
     x, y = axes.collections[0].get_offsets().data.T  # type: ignore[union-attr]
     assert sorted(set(x)) == [-10, 0, 10]
     assert sorted(set(y)) == [-5, 0, 5]
@@ -60,16 +60,16 @@ def test_cameras_stand_where_the_grid_says() -> None:
 
 def test_a_photon_is_drawn_in_its_view_at_its_pixel() -> None:
     counts = photons(GRID, k=0, l=2, i=3, j=5)
-    image = picture(counts.plot(view=(0, 2)))
+    image = picture(counts.plot(view=(0, 2))[0])
     assert np.argwhere(image.any(axis=-1)).tolist() == [[3, 5]]
-    assert not picture(counts.plot()).any()
-    assert "photons: 1" in counts.plot(view="mean").get_title()
-    assert picture(counts.plot(view="mean")).any()
+    assert not picture(counts.plot()[0]).any()
+    assert "photons: 1" in counts.plot(view="mean")[0].get_title()
+    assert picture(counts.plot(view="mean")[0]).any()
 
 
 @pytest.mark.parametrize(("j", "channel"), [(4, 1), (5, 0)])
 def test_means_of_a_mosaic_have_its_colours(j: int, channel: int) -> None:
-    image = picture(photons(GRID, "GRBG", k=1, l=1, i=4, j=j).plot(view="mean"))
+    image = picture(photons(GRID, "GRBG", k=1, l=1, i=4, j=j).plot(view="mean")[0])
     assert image[4, j, channel] == 255
     assert not np.delete(image[4, j], channel).any()
 
@@ -79,8 +79,8 @@ def test_views_are_drawn_one_by_one_and_as_a_mean() -> None:
     radiance[0, 1, 2, 3] = 1, 0, 0
     radiance[2, 2, 7, 8] = 0, 0, 1
     views = pcii.Views(radiance, GRID)
-    assert np.argwhere(picture(views.plot(view=(0, 1)))).tolist() == [[2, 3, 0]]
-    assert np.argwhere(picture(views.plot(view="mean"))).tolist() == [[2, 3, 0], [7, 8, 2]]
+    assert np.argwhere(picture(views.plot(view=(0, 1))[0])).tolist() == [[2, 3, 0]]
+    assert np.argwhere(picture(views.plot(view="mean")[0])).tolist() == [[2, 3, 0], [7, 8, 2]]
 
 
 def test_single_bright_voxels_do_not_darken_a_section() -> None:
@@ -134,7 +134,7 @@ def test_an_outline_follows_the_sides_of_the_mask() -> None:
 
 def test_depth_is_darker_where_less_sure_and_its_scale_is_in_mm() -> None:
     depth = pcii.DepthMap(np.full((12, 16), 600.0), np.linspace(0, 1, 16)[None].repeat(12, axis=0))
-    axes = depth.plot(z_range_mm=(500, 700))
+    (axes,) = depth.plot(z_range_mm=(500, 700))
     brightness = picture(axes).sum(axis=-1)[0].astype(int)
     assert (np.diff(brightness) > 0).all()
     bar = axes.figure.axes[-1]
@@ -145,7 +145,7 @@ def test_depth_is_darker_where_less_sure_and_its_scale_is_in_mm() -> None:
 def test_an_outlying_depth_does_not_set_the_scale() -> None:
     z_mm = np.linspace(540, 620, 500).reshape(20, 25)
     z_mm[0, 0] = 1e6
-    bar = pcii.DepthMap(z_mm, np.ones(z_mm.shape)).plot().figure.axes[-1]
+    bar = pcii.DepthMap(z_mm, np.ones(z_mm.shape)).plot()[0].figure.axes[-1]
     assert 535 < min(bar.get_ylim()) < max(bar.get_ylim()) < 625
 
 
@@ -155,12 +155,12 @@ def test_a_posterior_shows_a_pixel_or_all_entropies() -> None:
     probability[:, 0, 0] = 0.9, 0.0
     no_surface = (1 - probability.sum(axis=0)).astype(np.float32)
     posterior = pcii.DepthPosterior(planes, probability, no_surface, 2)
-    curve = posterior.plot(pixel=(1, 1)).lines[0]
+    curve = posterior.plot(pixel=(1, 1))[0].lines[0]
     assert np.asarray(curve.get_xdata()).tolist() == Z_MM
     np.testing.assert_allclose(np.asarray(curve.get_ydata(), float), [0.9, 0], atol=1e-6)
     bits = posterior.entropy_bits()
     np.testing.assert_allclose(bits[0, :2], [-0.9 * np.log2(0.9) - 0.1 * np.log2(0.1), 1.5], atol=1e-5)
-    axes = posterior.plot()
+    (axes,) = posterior.plot()
     assert axes.get_images()[0].get_extent() == [-0.5, 15.5, 11.5, -0.5]
     assert axes.figure.axes[-1].get_ylabel() == "entropy (bits)"
 
@@ -199,7 +199,7 @@ def test_pictures_are_drawn_into_given_axes() -> None:
 
     left, right = Figure().subplots(1, 2)
     counts = photons(GRID, k=1, l=1, i=4, j=4)
-    assert counts.plot(left) is left
+    assert counts.plot(left).tolist() == [left]
     assert pcii.reconstruct(counts, Z_MM).plot([left, right]).tolist() == [left, right]
     assert pcii.reconstruct(counts, 1.0).plot(right).tolist() == [right]
 
@@ -208,7 +208,7 @@ def test_pictures_are_drawn_into_given_axes() -> None:
     ("call", "message"),
     [
         (lambda counts: counts.plot(axes="left"), "axes: expected Matplotlib axes, got str"),
-        (lambda counts: pcii.reconstruct(counts, Z_MM).plot([counts.plot()]), "axes: 2 panels are drawn"),
+        (lambda counts: pcii.reconstruct(counts, Z_MM).plot(counts.plot()), "axes: 2 panels are drawn"),
         (lambda counts: counts.plot(view=(3, 0)), r"view: there is no camera \(3, 0\)"),
         (lambda counts: counts.plot(view="middle"), "view: expected a camera"),
         (lambda counts: counts.plot(view=(0, 0.5)), "view: expected a camera"),
@@ -243,8 +243,9 @@ def test_hardly_any_data_is_drawn_without_a_warning(size: tuple[int, int, int, i
     values: list[Any] = [grid, counts, sections, depth, nothing, focus]
     values += [pcii.Views(np.zeros((*size, 3)), grid), pcii.score(focus, depth, nothing, grid=grid)]
     for value in values:
-        axes = np.ravel(value.plot())[0]
-        axes.figure.draw_without_rendering()
+        axes = value.plot()
+        assert isinstance(axes, np.ndarray)
+        axes[0].figure.draw_without_rendering()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e308, -1.0])

@@ -59,6 +59,11 @@ def test_datasets_are_found_by_any_value(collection: Collection) -> None:
     assert len(collection.where(lambda row: row["scene_number"] < 3)) == 6
     with pytest.raises(InputError, match="no column 'sead'; there are path, scene"):
         collection.where(sead=2)
+    with pytest.raises(
+        InputError, match=r"no dataset has split = 'tset'; there are \[train, validation, test\]"
+    ):
+        collection.where(split="tset")
+    assert len(collection.where(split="test", scene_number=0)) == 0
 
 
 def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None:

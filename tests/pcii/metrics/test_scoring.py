@@ -206,5 +206,5 @@ def test_what_is_said_of_events_goes_before_the_mask() -> None:
 
 
 def test_photons_of_other_events_are_refused() -> None:
-    with pytest.raises(InputError, match=r"^photon_in_focus: has 3 events, .* to 4$"):
+    with pytest.raises(InputError, match=r"^photon_in_focus: has 3 events, .* to 4, .*photons=None"):
         photon_score([True] * 3)
