@@ -2,6 +2,7 @@
 
 import math
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any
 
@@ -11,6 +12,7 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
+from pcii.importing.image_decoding import check_unpacked
 from pcii.importing.image_folders import check_size
 from pcii.importing.light_encoding import Encoding, check_encoding, to_radiance
 
@@ -87,14 +89,23 @@ def _from_npz(path: Path, array: str | None) -> tuple[np.ndarray, str]:
         chosen = array or names[0]
         if chosen not in names:
             raise InputError(f"{path}: has no array {chosen!r}; there are {', '.join(names[:9])}")
-        with archive.open(archive.namelist()[names.index(chosen)]) as file:
-            _check_header(file, path)
+        check_archive(path, archive, [archive.namelist()[names.index(chosen)]])
     with np.load(path, allow_pickle=False) as loaded:
         return loaded[chosen], f"{path}: {chosen}"
 
 
-def _check_header(file: IO[bytes], path: Path) -> None:
-    """Raise `InputError` for an array of objects, or of more bytes than are allowed."""
+def check_archive(path: Path, archive: zipfile.ZipFile, members: Iterable[str], beside: int = 0) -> None:
+    """Raise `InputError` if arrays of an .npz file need too much memory, with `beside` bytes for others."""
+    unpacked, packed = beside, 0
+    for member in members:
+        with archive.open(member) as file:
+            unpacked += _check_header(file, path)
+        packed += archive.getinfo(member).compress_size
+    check_unpacked(path, unpacked, packed, "save a .npy file, which is read piece by piece")
+
+
+def _check_header(file: IO[bytes], path: Path) -> int:
+    """Bytes that an array needs, as float32 at least; `InputError` for objects, or more than are allowed."""
     version = np.lib.format.read_magic(file)
     read: Any = (
         np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
@@ -105,3 +116,4 @@ def _check_header(file: IO[bytes], path: Path) -> None:
     size = math.prod(shape) * dtype.itemsize
     if size > LARGEST_BYTES:
         raise InputError(f"{path}: {size / 2**30:.1f} GiB, and at most {LARGEST_BYTES / 2**30:g} are read")
+    return math.prod(shape) * max(dtype.itemsize, 4)

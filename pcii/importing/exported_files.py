@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,8 @@ from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 from pcii.exporting.event_archive import ARCHIVE as EVENTS
 from pcii.exporting.exr_parts import CENTRE
 from pcii.exporting.exr_parts import FILE as PARTS
-from pcii.importing.array_files import opened_array
-from pcii.importing.image_folders import check_size
+from pcii.importing.array_files import check_archive, opened_array
+from pcii.importing.image_decoding import check_unpacked
 
 GRID = tuple(field.name for field in fields(CameraGrid))
 
@@ -72,6 +72,9 @@ def _events(path: Path) -> Exported:
         return read(name) if name in names else None
 
     grid = _grid(path, {name: read(name).tolist() for name in GRID})
+    one_view = 8 * grid.height * grid.width  # as whoever looks at the photons makes it
+    with zipfile.ZipFile(path) as archive:
+        check_archive(path, archive, [name for name in archive.namelist() if name.endswith(".npy")], one_view)
     try:
         pixels = {name: read(name) for name in "klijn"}
         counts = PhotonCounts.from_events(**pixels, grid=grid, cfa=str(read("cfa")) or None)
@@ -81,6 +84,8 @@ def _events(path: Path) -> Exported:
             photons = None
             if "photon_z_mm" in names:
                 events = counts.events
+                if read("photon_z_mm").shape != (counts.total,):
+                    raise InputError("photon_z_mm: expected as many depths as photons")
                 at = {name: getattr(events, name).repeat(events.n) for name in "klij"}
                 photons = PhotonTruth(**at, object_id=read("photon_object_id"), z_mm=read("photon_z_mm"))
             maps = {name: optional(f"truth_{name}") for name in OPTIONAL_MAPS}
@@ -95,11 +100,12 @@ def _parts(path: Path) -> Exported:
     import OpenEXR
 
     with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
-        told = json.loads(file.parts[0].header.get("comments", "null"))
+        headers = [dict(part.header) for part in file.parts]  # gone when the file is closed
+    told = json.loads(headers[0].get("comments", "null"))
     if not isinstance(told, Mapping) or not isinstance(told.get("grid"), Mapping):
         raise InputError(f"{path}: its comments do not say which cameras saw it; not of `simgen export`")
     grid, cfa = _grid(path, told["grid"]), told.get("cfa")
-    check_size(path, (*grid.shape_KLHW, 3))
+    _check_parts(path, headers, grid)
     with OpenEXR.File(str(path), separate_channels=True) as file:
         # Pixels are gone when the file is closed.
         parts = {
@@ -107,9 +113,9 @@ def _parts(path: Path) -> Exported:
             for part in file.parts
         }
     views = {place: channels for name, channels in parts.items() if (place := _place(name)) is not None}
-    missing = [place for place in np.ndindex(grid.rows, grid.cols) if place not in views]
-    if views and missing:
-        raise InputError(f"{path}: the view of camera {missing[0]} is missing")
+    missing = next((place for place in np.ndindex(grid.rows, grid.cols) if place not in views), None)
+    if views and missing is not None:
+        raise InputError(f"{path}: the view of camera {missing} is missing")
     images: list[PhotonCounts | Views] = []
     try:
         for names in (("R", "G", "B"), ("Y",)):
@@ -131,6 +137,18 @@ def _parts(path: Path) -> Exported:
     return Exported(tuple(images), truth)
 
 
+def _check_parts(path: Path, headers: Sequence[Mapping[str, Any]], grid: CameraGrid) -> None:
+    """Raise `InputError`, before pixels are decoded, for parts of another size, or of too many pixels."""
+    size, channels = (grid.height, grid.width), 0
+    for header in headers:
+        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
+        if (found := (bottom - top + 1, right - left + 1)) != size:
+            raise InputError(f"{path}: part {header['name']}: expected {size} pixels, got {found}")
+        channels += len(header["channels"])
+    unpacked = 4 * channels * grid.height * grid.width
+    check_unpacked(path, unpacked, path.stat().st_size, "export events, or fewer or smaller views")
+
+
 def _place(part: str) -> tuple[int, int] | None:
     """Camera (k, l) of a part named k03_l04, None for other parts."""
     row, _, col = part.partition("_")
@@ -147,10 +165,7 @@ def _stacked(
     stacked = np.empty((*grid.shape_KLHW, len(names)), dtype)
     for place in np.ndindex(grid.rows, grid.cols):
         for channel, name in enumerate(names):
-            pixels = views[place][name]
-            if pixels.shape != stacked.shape[2:4]:
-                raise InputError(f"camera {place}: expected {stacked.shape[2:4]} pixels, got {pixels.shape}")
-            stacked[(*place, ..., channel)] = pixels
+            stacked[(*place, ..., channel)] = views[place][name]
     return stacked
 
 

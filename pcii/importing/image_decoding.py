@@ -4,6 +4,7 @@ Files may be damaged or hostile: size and layout are read from the header, and c
 decoded.
 """
 
+import math
 import struct
 import warnings
 from collections.abc import Iterator
@@ -20,6 +21,9 @@ from pcii.io.dataset_layout import read_exr
 
 MOST_PIXELS = 1 << 27
 """Most pixels of a picture, 134 million; larger ones are refused before they are decoded."""
+UNPACKED_BYTES, MOST_GROWTH = 1 << 29, 32
+"""Most memory for what a compressed file holds: 512 MiB, or so many times its own size if that is more.
+Zeros may unpack to a thousand times their size; pictures and photons of that size are at most 10 times."""
 KINDS = {
     b"\x89PNG\r\n\x1a\n": "PNG",
     b"\xff\xd8\xff": "JPEG",
@@ -68,7 +72,10 @@ def picture_of(path: Path) -> Picture:
         raise InputError(f"{path}: {visible(str(fault))}") from None
     except Exception as fault:  # decoders raise various exceptions for damaged content
         raise InputError(f"{path}: its header cannot be read ({visible(str(fault))})") from None
-    return Picture(path, kind, shape, np.dtype(dtype), pages)
+    picture = Picture(path, kind, shape, np.dtype(dtype), pages)
+    unpacked = math.prod(shape) * picture.dtype.itemsize
+    check_unpacked(path, unpacked, path.stat().st_size, "make the picture smaller")
+    return picture
 
 
 def decode(picture: Picture) -> Iterator[np.ndarray]:
@@ -91,6 +98,16 @@ def decode(picture: Picture) -> Iterator[np.ndarray]:
         if pixels.shape != picture.shape or pixels.dtype != picture.dtype:
             raise InputError(f"{path}: {DAMAGED} (its content is not as its header says)")
         yield pixels
+
+
+def check_unpacked(path: Path, unpacked: int, packed: int, instead: str) -> None:
+    """Raise `InputError` if a file of `packed` bytes asks for too many, with what to do instead."""
+    most = max(UNPACKED_BYTES, MOST_GROWTH * packed)
+    if unpacked > most:
+        raise InputError(
+            f"{path}: {packed / 2**20:.1f} MiB that unpack to {unpacked / 2**20:.0f} MiB of memory, and at "
+            f"most {most / 2**20:.0f} are allowed; {instead}"
+        )
 
 
 def _png_header(path: Path) -> tuple[tuple[int, int, int], Any, int]:

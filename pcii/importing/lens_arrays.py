@@ -75,14 +75,14 @@ def import_lens_array(
 
 def _starts(count: int, pitch: float, offset: float, size: int, how: str, path: str | Path) -> np.ndarray:
     """Where the images of the lenses of an axis begin, (count,), in px."""
-    starts = offset + pitch * np.arange(count) + (pitch - math.floor(pitch)) / 2
-    end = starts[-1] + math.floor(pitch)
-    if starts[0] < 0 or end > size + 1e-6:
+    first = offset + (pitch - math.floor(pitch)) / 2
+    end = first + pitch * (count - 1) + math.floor(pitch)
+    if first < 0 or end > size + 1e-6:
         raise InputError(
             f"{path}: {count} lenses of {pitch:g} px from {offset:g} px on reach to {end:g}, and the picture "
             f"is {size} px {how}"
         )
-    return starts
+    return first + pitch * np.arange(count)
 
 
 def _cut(picture: np.ndarray, starts: np.ndarray, size: int, axis: int) -> np.ndarray:

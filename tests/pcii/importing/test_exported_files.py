@@ -1,7 +1,12 @@
 """What `simgen export` writes comes back as it was."""
 
+import json
+import re
+import tracemalloc
 import zipfile
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +15,7 @@ from stored_datasets import make_dataset, one_sentence
 import pcii
 from pcii.app.commands import app
 from pcii.core.truth import Truth
+from pcii.importing import image_decoding
 from pcii.importing.exported_files import import_exported
 
 
@@ -97,3 +103,59 @@ def test_a_damaged_file_is_refused(dataset: pcii.Dataset, tmp_path: Path, damage
 def test_another_exr_file_is_refused(dataset: pcii.Dataset) -> None:
     one_view = dataset.path / "radiance" / "view_00_00.exr"
     assert "do not say which cameras" in one_sentence(lambda: import_exported(one_view), one_view)
+
+
+def changed(file: Path, **changes: Any) -> Path:
+    """The archive with other arrays."""
+    with np.load(file) as archive:
+        arrays: dict[str, Any] = dict(archive)
+    np.savez(file, **arrays | changes)
+    return file
+
+
+def large_views(dataset: pcii.Dataset, root: Path) -> Path:
+    """Few photons of views that are large."""
+    return changed(pcii.export_dataset(dataset, "events", root) / "events.npz", height=10_000, width=10_000)
+
+
+def many_photons(dataset: pcii.Dataset, root: Path) -> Path:
+    """More photons in a pixel than origins are told of."""
+    n = dataset.counts.events.n.copy()
+    n[0] = 10_000_000
+    return changed(pcii.export_dataset(dataset, "events", root) / "events.npz", n=n)
+
+
+def larger_parts(dataset: pcii.Dataset, root: Path) -> Path:
+    """Pixels of zeros, of which its cameras have 4 x 5."""
+    import OpenEXR
+
+    root.mkdir()
+    header = {"comments": json.dumps({"grid": asdict(dataset.grid)}), "compression": OpenEXR.ZIP_COMPRESSION}
+    with OpenEXR.File([OpenEXR.Part(header, {"Y": np.zeros((2000, 2000), "f4")}, name="k00_l00")]) as file:
+        file.write(str(root / "views.exr"))
+    return root / "views.exr"
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (large_views, "unpack to 763 MiB of memory, and at most 512"),
+        (many_photons, "expected as many depths as photons"),
+        (larger_parts, r"part k00_l00: expected \(4, 5\) pixels, got \(2000, 2000\)"),
+    ],
+)
+def test_what_is_too_large_is_refused_before_memory_is_taken(dataset, tmp_path: Path, make, words) -> None:
+    file = make(dataset, tmp_path / "out")
+    tracemalloc.start()
+    message = one_sentence(lambda: import_exported(file), file)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert re.search(words, message), message
+    assert peak < 8e6  # half of what the least of these would take
+
+
+def test_parts_that_unpack_to_much_are_refused(dataset, tmp_path: Path, monkeypatch) -> None:
+    file = pcii.export_dataset(dataset, "exr", tmp_path / "out") / "views.exr"
+    monkeypatch.setattr(image_decoding, "UNPACKED_BYTES", 2000)  # 26 channels of 20 pixels are 2080 bytes
+    monkeypatch.setattr(image_decoding, "MOST_GROWTH", 0)
+    assert "unpack to" in one_sentence(lambda: import_exported(file), file)

@@ -4,6 +4,7 @@
 import io
 import re
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -242,9 +243,19 @@ def stack(root: Path) -> None:
 
 def huge_header(root: Path) -> Path:
     with (root / "in.npy").open("wb") as opened:
-        description = {"descr": "<f8", "fortran_order": False, "shape": (100, 100, 10_000, 10_000)}
-        np.lib.format.write_array_header_1_0(opened, description)
+        np.lib.format.write_array_header_1_0(opened, described((100, 100, 10_000, 10_000), "<f8"))
     return root / "in.npy"
+
+
+def described(shape: tuple[int, ...], dtype: str) -> dict[str, Any]:
+    return {"descr": dtype, "fortran_order": False, "shape": shape}
+
+
+def zeros_in_npz(root: Path) -> Path:
+    """16 views of 4000 x 4000 pixels, of which a file of a few MB may hold all the zeros."""
+    with zipfile.ZipFile(root / "in.npz", "w") as archive, archive.open("a.npy", "w") as opened:
+        np.lib.format.write_array_header_1_0(opened, described((4, 4, 4000, 4000), "|u1"))
+    return root / "in.npz"
 
 
 PNG, EXR, TIF = ({"ending": ending} for ending in ("png", "exr", "tif"))
@@ -291,6 +302,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("header only", folder(content("0_0.png", b"\x89PNG\r\n\x1a\n")), NAMED, "0_0.png: its header cannot be read"),
     ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "60000 x 60000 px, and at most"),
     ("many large", folder(content("0_0.png", png_of(11_000, 11_000)), rows=1, cols=1), [*NAMED, "--grid", 1, 1], "damaged"),
+    ("bomb of 16 bits", folder(content("0_0.png", png_of(11_000, 11_000, bits=16))), NAMED, "unpack to 692 MiB of memory, and at most 512"),
     ("no pixels", folder(content("0_0.png", png_of(0, 5))), NAMED, "0 x 5 px"),
     ("4 bits", folder(content("0_0.png", png_of(W, H, bits=4, colour=0))), NAMED, "a PNG picture of 4 bits"),
     ("alpha in EXR", folder(exr_alpha, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "has an alpha channel"),
@@ -308,6 +320,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("objects", array(np.array([None, {}], dtype=object)), CAMERAS, "holds Python objects"),
     ("no array", file("in.npy", b"not an array"), CAMERAS, "not a NumPy array"),
     ("huge array", huge_header, CAMERAS, "GiB, and at most 16 are read"),
+    ("zeros in .npz", zeros_in_npz, [*CAMERAS, "--linear"], "unpack to 977 MiB of memory, and at most 512"),
     ("several arrays", npz, CAMERAS, "has 2 arrays; name one by --array: a, b"),
     ("unknown array", npz, [*CAMERAS, "--array", "c"], "has no array 'c'"),
     ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),

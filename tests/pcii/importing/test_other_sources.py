@@ -1,5 +1,6 @@
 """Benchmark scenes, arrays, lens arrays and photon frames: each against a few numbers worked out by hand."""
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +157,16 @@ def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
     for l in range(5):
         start = 1.5 + 20.3 * l + 0.15
         np.testing.assert_allclose(views.view(0, l)[0, :, 0], start + np.arange(20), rtol=1e-5)
+
+
+def test_lenses_are_counted_before_their_places_are_made(tmp_path: Path) -> None:
+    write(tmp_path / "few.png", numbers(0, 0))
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="10000000 lenses of 2 px"):
+        import_lens_array(tmp_path / "few.png", LensArray(rows=10**7, cols=2, pitch_px=(2, 2)), OPTICS)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 10**7  # a byte a lens
 
 
 FRAMES = (np.random.default_rng(2).random((2, 3, 7, H, W)) < 0.2).astype(np.uint8)
