@@ -76,7 +76,7 @@ def results_of(out: Path) -> Content:
 def rows_of(out: Path) -> Content:
     """Every row, but for the time, by its key."""
     with all_rows(out) as rows:
-        return {key_of(row): json.dumps(row | {"seconds": 0}) for row in rows}
+        return {key_of(row): json.dumps(row | {"seconds": 0, "date": ""}) for row in rows}
 
 
 def datasets_of(out: Path) -> Content:

@@ -49,8 +49,8 @@ def run(
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
-    What earlier runs finished, interrupted ones too, is kept where dataset, options and software are the
-    same: the command goes on from there.
+    What earlier runs finished, interrupted ones too, is kept where dataset, options and software (with that
+    of methods of other packages) are the same: the command goes on from there.
 
     Examples of use:
 
@@ -150,7 +150,7 @@ def evaluate(
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
     Writes evaluation.json, evaluation.html and evaluation.md, and each score, as it is measured, to
-    rows.jsonl.
+    rows.jsonl. Scores that other software made are made again.
 
     Examples of use:
 
@@ -172,7 +172,9 @@ def evaluate(
     from pcii.evaluation.comparison import evaluate as compare
 
     with Stages() as report:
-        compare(datasets, out, methods=method, budgets=budget, crew=crew, report=report)
+        evaluation = compare(datasets, out, methods=method, budgets=budget, crew=crew, report=report)
+    for again in evaluation["again"]:
+        say(f"made again: {again['rows']} scores of {', '.join(again['methods'])}, since {again['why']}")
     say(f"report: {out / 'evaluation.html'}")
     say_next_page(out / "evaluation.html")
 

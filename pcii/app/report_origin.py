@@ -1,21 +1,16 @@
 """How a report was made: commands, dates, machine, recipe, versions, hashes, and what was skipped."""
 
 import json
-import os
-import platform
 import shlex
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from pcii.app.pipeline import Outcome
+from pcii.depth.methods import DEFAULT_METHOD
+from pcii.evaluation.method_names import depth_name
+from pcii.evaluation.provenance import machine, software_of
 from pcii.evaluation.tables import Table
-
-PACKAGE = "photon-integral-imaging"
-ANALYSED_WITH = ("numpy", "scipy", "scikit-image", "numba", "zarr")
-"""Packages on which results depend; the manifest of a dataset lists those that made it."""
 
 
 def origin(outcome: Outcome) -> dict[str, Any]:
@@ -71,13 +66,14 @@ def _has(part: Mapping[str, Any], *names: str) -> bool:
 
 def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
     """Rows (name, value) on the analysis that this report shows."""
-    versions = {PACKAGE: version(PACKAGE)} | {name: version(name) for name in ANALYSED_WITH}
+    methods = (*(focus.method for focus in outcome.focus), depth_name(DEFAULT_METHOD))
+    versions = {name: text for method in methods for name, text in software_of(method).items()}
     now = datetime.now(UTC)
     beside = "; depth was mapped beside the removal" if outcome.focus else ""
     return [
         ("command", _command(outcome)),
         ("date", f"{now:%Y-%m-%d %H:%M} UTC"),
-        ("machine", _machine()),
+        ("machine", machine()),
         ("time", _stages(outcome.timings_s, 2) + beside),
         ("software", _versions(versions)),
     ]
@@ -93,21 +89,6 @@ def _command(outcome: Outcome) -> str:
     if outcome.dataset.budget is not None:
         words += ["--budget", f"{outcome.dataset.budget:g}"]
     return shlex.join(words)
-
-
-def _machine() -> str:
-    """Processor and system, without a name by which the machine could be found."""
-    system = f"{platform.system()}, Python {platform.python_version()}"
-    return f"{_processor()}, {os.cpu_count()} logical cores, {system}"
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0]} ({platform.machine()})" if models else platform.machine()
 
 
 def _skipped(manifest: Mapping[str, Any]) -> Table:

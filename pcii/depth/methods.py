@@ -37,7 +37,9 @@ FOR_VIEWS: dict[str, Method] = {
     "variance-sweep": variance_sweep,
     "structure-tensor": structure_tensor,
 }
-"""The built-in methods by what they take; the first is the default."""
+"""The built-in methods by what they take."""
+DEFAULT_METHOD = "posterior"
+"""Of photon counts and of radiance."""
 BUILT_IN = FOR_COUNTS | FOR_VIEWS
 
 
@@ -68,7 +70,7 @@ def estimate_depth(
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
     if method is None:
-        method = next(iter(FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS))
+        method = DEFAULT_METHOD
     estimate = method if callable(method) else find_depth_method(method, data)
     return estimate(data, z_range_mm)
 

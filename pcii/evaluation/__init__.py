@@ -11,6 +11,8 @@ paired_tests      Means over seeds with confidence intervals, and paired tests o
                   datasets.
 plots             Plots of an evaluation: accuracy against photons per view and run time, and reliability
                   of confidence.
+provenance        What made a figure: the source and the weights of what computes, versions, and the
+                  machine.
 rows              rows.jsonl: one JSON object per measured score, written safely by several processes at
                   once.
 summary           Summary of the rows of an evaluation: means over seeds, and paired comparisons of

@@ -1,8 +1,10 @@
 """Methods compared over many datasets: each dataset, budget and method is scored and timed once."""
 
 import re
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from contextlib import closing
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +18,11 @@ from pcii.core.section_stack import Sections
 from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import estimator_of
+from pcii.evaluation.provenance import differences, machine, software_of
 from pcii.evaluation.rows import (
     FULL_LIGHT,
     Budget,
+    Key,
     Row,
     all_rows,
     append_row,
@@ -56,11 +60,13 @@ def evaluate(
     of depth. Without, all that can take the data. `budgets` default to all that each dataset has; among them
     "full-light", its radiance, which some methods of depth take. `crew` does the work.
 
-    Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again;
-    evaluation.json, .html and .md summarise all of them. The seconds of a row are the wall time of the method
-    alone, after a warm-up call, in a call in which no code was compiled or imported; where several processes
-    work at a time, each is slower. Raises `InputError` for a dataset without truth, depths, or counts and
-    radiance, for an unknown method or budget, and for a named method that cannot take the data of a dataset:
+    Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
+    unless other software made them (see `pcii.evaluation.provenance`): `again` in the result says how many
+    were, of which methods, and why. evaluation.json, .html and .md summarise the last row of each. The
+    seconds of a row are the wall time of the method alone, after a warm-up call, in a call in which no code
+    was compiled or imported; where several processes work at a time, each is slower. Raises `InputError` for
+    a dataset without truth, depths, or counts and radiance, for an unknown method or budget, and for a named
+    method that cannot take the data of a dataset:
 
     >>> evaluate(["out/no-such-dataset"], "out/compared")
     Traceback (most recent call last):
@@ -73,20 +79,37 @@ def evaluate(
     tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], methods, budgets)
     claim_rows(folder)
     with all_rows(folder) as rows:
-        measured = {key_of(row) for row in rows}
-    remaining = [task for task in tasks if task.key not in measured]
+        made_by = {key_of(row): row.get("software") for row in rows}
+    software = {method: software_of(method) for method in dict.fromkeys(task.method for task in tasks)}
+    remaining = [task for task in tasks if made_by.get(task.key) != software[task.method]]
     if len(remaining) < len(tasks):
         kept = len(tasks) - len(remaining)
         report("scores of an earlier run", kept, kept)
+    again = _again(remaining, made_by, software)
+    for entry in again:
+        report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
     with closing(crew.run(Measuring(remaining, folder.resolve()), range(len(remaining)))) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)
             report("scores", finished, len(remaining))
     with all_rows(folder) as rows, named_in_errors(folder):
-        result = summarise(rows)
+        result = summarise(rows) | {"again": again}
         write_evaluation(folder, result)
     return result
+
+
+def _again(
+    remaining: Sequence[Task],
+    made_by: Mapping[Key, Mapping[str, str] | None],
+    software: Mapping[str, Mapping[str, str]],
+) -> list[dict[str, Any]]:
+    """Which of the remaining tasks have a row already, by why that does not count any more."""
+    methods: dict[str, list[str]] = defaultdict(list)
+    for task in remaining:
+        if task.key in made_by:
+            methods[differences(made_by[task.key], software[task.method])].append(task.method)
+    return [{"why": why, "rows": len(names), "methods": sorted(set(names))} for why, names in methods.items()]
 
 
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
@@ -128,6 +151,7 @@ class Measuring:
     def __init__(self, tasks: Sequence[Task], out: Path) -> None:
         self.tasks, self.out = tasks, out
         self.warm: set[tuple[Budget, str]] = set()
+        self.software: dict[str, dict[str, str]] = {}
         self.full_light: tuple[str, Sections] | None = None
         """Identity of the last dataset with bounds, and the sections of its radiance."""
 
@@ -162,6 +186,8 @@ class Measuring:
         if (task.budget, task.method) not in self.warm:
             work()
             self.warm.add((task.budget, task.method))
+        if task.method not in self.software:  # that of this process, which may be on another machine
+            self.software[task.method] = software_of(task.method)
         seconds, estimate = timed(work)
         photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
         row = described(data) | {
@@ -169,6 +195,9 @@ class Measuring:
             "photons_per_view": photons,
             "method": task.method,
             "seconds": round(seconds, 6),
+            "software": self.software[task.method],
+            "date": f"{datetime.now(UTC):%Y-%m-%d}",
+            "machine": machine(),
         }
         if estimator is not None:
             depth = dict(score(None, estimate, data.truth, grid=data.grid).depth)

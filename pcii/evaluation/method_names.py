@@ -1,7 +1,7 @@
 """Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME."""
 
 from pcii.base.errors import InputError
-from pcii.depth.methods import BUILT_IN, FOR_COUNTS, FOR_VIEWS, depth_methods
+from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.removal.methods import removal_methods
 
 DEPTH = "depth"
@@ -49,7 +49,7 @@ def full_name(method: str, *, full_light: bool) -> str | None:
     """
     known = methods_for(full_light=full_light)
     if method == DEPTH:
-        return next(name for name in known if estimator_of(name) is not None)
+        return depth_name(DEFAULT_METHOD)
     return method if method in known else None
 
 

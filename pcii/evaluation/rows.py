@@ -1,7 +1,8 @@
 """rows.jsonl: one JSON object per measured score, written safely by several processes at once.
 
-A row belongs to a dataset (by its identity), a photon budget or full light, and a method; none is measured
-twice. It ends in a checksum of its line (see `pcii.io.sealed_json`).
+A row belongs to a dataset (by its identity), a photon budget or full light, and a method. What is measured
+again, since other software made it, is added below, and the last row counts. Each ends in a checksum of its
+line (see `pcii.io.sealed_json`).
 """
 
 import hashlib
@@ -109,7 +110,7 @@ def claim_rows(out: Path) -> None:
 
 @contextmanager
 def all_rows(out: Path) -> Iterator[list[Row]]:
-    """All rows of the folder, each key once; other processes wait until the block ends before they add any.
+    """The last row of each key in the folder; other processes wait until the block ends before they add any.
 
     A last line without a line break is left by a process that was killed, and is ignored. Raises `InputError`
     for any other line that is not a row as it was written.
@@ -122,7 +123,7 @@ def all_rows(out: Path) -> Iterator[list[Row]]:
                 check_seal(line)
                 row = json.loads(line)
                 del row["sha256"]
-                rows.setdefault(key_of(row), row)
+                rows[key_of(row)] = row
             except (ValueError, KeyError, TypeError) as fault:
                 raise InputError(f"{out / ROWS}: line {number}: {fault}; delete that line") from None
         yield list(rows.values())

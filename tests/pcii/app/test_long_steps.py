@@ -91,16 +91,6 @@ def test_what_other_options_made_is_made_anew(dataset: Dataset, tmp_path: Path) 
     assert run(dataset, out, z_mm=(620.0,)) == ALL
 
 
-def test_what_other_software_made_is_made_anew(
-    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    out = tmp_path / "out"
-    run(dataset, out)
-    monkeypatch.setattr(long_steps, "_software", lambda: {"pcii": "another"})
-    assert run(dataset, out) == ()
-    assert run(dataset, out) == ALL
-
-
 def test_what_is_damaged_is_made_anew(dataset: Dataset, whole: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run(dataset, out)

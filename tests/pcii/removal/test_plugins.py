@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from other_packages import install_package
 from twins import even_light, unit_grid
 
 from pcii.base.errors import InputError
@@ -42,14 +43,9 @@ number = 3
 
 
 def install(folder: Path, monkeypatch: pytest.MonkeyPatch, **points: str) -> None:
-    """Put a package `strange` with these entry points (underscores for hyphens) on the path."""
-    lines = [f"{name.replace('_', '-')} = {value}\n" for name, value in points.items()]
-    about = folder / "strange-1.0.dist-info"
-    about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: strange\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text("[pcii.methods]\n" + "".join(lines))
-    (folder / "strange_code.py").write_text(CODE)
-    monkeypatch.syspath_prepend(str(folder))
+    """Install `CODE` as strange_code.py with these entry points (underscores for hyphens)."""
+    points = {name.replace("_", "-"): value for name, value in points.items()}
+    install_package(folder, monkeypatch, {"pcii.methods": points}, {"strange_code.py": CODE})
 
 
 def counts() -> PhotonCounts:

@@ -1,0 +1,136 @@
+"""What other software made is made again, in evaluations and in results alike, and it is said why."""
+
+import ast
+import re
+import sys
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from other_packages import install_package
+from tiny_datasets import OWN, write_dataset
+
+import pcii
+from pcii.app import long_steps, pipeline, single_run
+from pcii.core.estimates import DepthMap
+from pcii.evaluation import provenance
+from pcii.evaluation.comparison import evaluate
+from pcii.evaluation.provenance import differences, software_of
+from pcii.evaluation.rows import all_rows, append_row, claim_rows
+
+COMPUTES = ("base", "core", "imaging", "sections", "evidence", "depth", "removal", "metrics")
+DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}
+CODE = """
+from pcii import DepthMap, Segmented
+from pathlib import Path
+import numpy as np
+
+def remove(counts, sections):
+    threshold = float((Path(__file__).parent / "weights.txt").read_text())
+    return Segmented(sections.counts.sum(axis=-1) > threshold, "learned", sections)
+
+def map_depth(data, z_range_mm):
+    film = data.grid.height, data.grid.width
+    return DepthMap(np.full(film, z_range_mm[0]), np.ones(film))
+"""
+POINTS = {"pcii.methods": {"learned": "strange:remove"}, "pcii.depth_methods": {"near": "strange:map_depth"}}
+CHANGES = {
+    "source": ({"strange/__init__.py": CODE + "\n"}, {}, "the source of strange has changed"),
+    "weights": ({"strange/weights.txt": "2"}, {}, "the source of strange has changed"),
+    "version": ({}, {"version": "1.1"}, "strange 1.0 is now 1.1"),
+    "requirement": ({}, {"requires": "pytest>=1 ; python_version > '3'"}, "pytest absent is now .*"),
+}
+
+
+def strange(folder: Path, monkeypatch: pytest.MonkeyPatch, change: str = "") -> None:
+    """Install a package with two methods and weights, or what a change makes of it."""
+    files, about, _ = CHANGES.get(change, ({}, {}, ""))
+    files = {"strange/__init__.py": CODE, "strange/weights.txt": "1"} | files
+    install_package(folder, monkeypatch, POINTS, files, **about)
+
+
+def test_every_package_that_computes_is_recorded() -> None:
+    imported = set[str]()
+    for room in COMPUTES:
+        for file in (Path(pcii.__file__).parent / room).rglob("*.py"):
+            for node in ast.walk(ast.parse(file.read_text())):
+                if isinstance(node, ast.Import):
+                    imported |= {alias.name for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module)
+    roots = {name.split(".")[0] for name in imported} - sys.stdlib_module_names - {"pcii"}
+    packages = {name for root in roots for name in packages_distributions().get(root, [root])}
+    assert packages - DRAWS_OR_TALKS <= set(software_of("likelihood"))
+
+
+def test_weights_of_the_network_are_part_of_its_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = list[dict[str, str]]()
+    for name, weights in (("a", b"1"), ("b", b"1"), ("c", b"2")):
+        package = tmp_path / name / "pcii"
+        (package / "weights").mkdir(parents=True)
+        (package / "weights" / "trunk.onnx").write_bytes(weights)
+        monkeypatch.setattr("pcii.base.__file__", str(package / "base" / "__init__.py"))
+        found.append(provenance._own.__wrapped__())
+    assert differences(found[0], found[1]) == ""
+    assert differences(found[1], found[2]) == "the source of photon-integral-imaging has changed"
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_rows_of_other_software_are_measured_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
+) -> None:
+    package, out = tmp_path / "package", tmp_path / "out"
+    package.mkdir()
+    data = write_dataset(tmp_path / "data", 1, {OWN: 5})
+    methods = ["brightness", "learned", "depth:near"]
+
+    def again() -> list[dict[str, object]]:
+        return evaluate([data], out, methods=methods)["again"]
+
+    strange(package, monkeypatch)
+    assert again() == again() == []
+    before = (out / "rows.jsonl").read_bytes()
+    strange(package, monkeypatch, change)
+    (made,) = again()
+    assert made == made | {"rows": 2, "methods": ["depth:near", "learned"]}
+    assert re.fullmatch(CHANGES[change][2], str(made["why"]))
+    assert (out / "rows.jsonl").read_bytes().startswith(before)
+    with all_rows(out) as rows:
+        assert len(rows) == 3
+        assert {row["method"]: row["software"] for row in rows}["learned"] == software_of("learned")
+    assert again() == []
+
+
+def test_rows_of_which_the_software_is_not_known_are_measured_again(tmp_path: Path) -> None:
+    """As those of an earlier release."""
+    data, out = write_dataset(tmp_path / "data", 1, {OWN: 5}), tmp_path / "out"
+    evaluate([data], out, methods=["brightness"])
+    with all_rows(out) as rows:
+        (row,) = rows
+    claim_rows(tmp_path / "earlier")
+    append_row(tmp_path / "earlier", {name: row[name] for name in row if name != "software"})
+    (made,) = evaluate([data], tmp_path / "earlier", methods=["brightness"])["again"]
+    assert made["why"] == "what made them is not known"
+
+
+def test_results_of_other_software_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    package, out = tmp_path / "package", tmp_path / "out"
+    package.mkdir()
+    dataset = pcii.open_dataset(write_dataset(tmp_path / "data", 1, {OWN: 5}))
+
+    def quick(data: pcii.PhotonCounts, z_range_mm: tuple[float, float]) -> DepthMap:
+        return pcii.estimate_depth(data, z_range_mm, method="variance-sweep")
+
+    monkeypatch.setattr(pipeline, "estimate_depth", quick)
+
+    def kept() -> tuple[str, ...]:
+        return single_run.run(dataset, out, None, methods=["brightness", "learned"]).kept
+
+    own = (long_steps.removal_step("brightness"), long_steps.DEPTH_STEP)
+    strange(package, monkeypatch)
+    assert kept() == ()
+    assert set(kept()) == {*own, long_steps.removal_step("learned")}
+    strange(package, monkeypatch, "weights")
+    assert set(kept()) == set(own)
