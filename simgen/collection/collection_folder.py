@@ -28,7 +28,8 @@ Row = Mapping[str, Any]
 def begin(sweep: Sweep, out: Path) -> None:
     """Make the folder of a sweep's collection, or see that it is one of the same recipe.
 
-    Other values of the swept fields may be there already. `InputError` for a file, a dataset, the
+    Other values of the swept fields may be there already; a collection that ended without any dataset gives
+    way to another. `InputError` for a file, a dataset, the
     collection of another recipe or other software, or a folder that holds something else.
     """
     if out.exists() and not out.is_dir():
@@ -47,7 +48,7 @@ def begin(sweep: Sweep, out: Path) -> None:
     if others and not is_collection(out):
         raise InputError(f"{out}: holds something else; name a new or empty folder")
     with locked(out / COLLECTION, wait=True) as file:
-        if not file.read():
+        if not file.read() or _ended_empty(out):
             write_collection(out, document)
     known = read_collection(out)
     if any(known.get(name) != document[name] for name in ("fields", "recipe")):
@@ -60,6 +61,11 @@ def begin(sweep: Sweep, out: Path) -> None:
             f"{out}: holds the collection that was made with {differ}; name a new folder, or install those "
             "versions"
         )
+
+
+def _ended_empty(out: Path) -> bool:
+    """Whether work on a collection has ended, as its index tells, without a dataset, whole or begun."""
+    return (out / INDEX).is_file() and not any(entry.is_dir() for entry in os.scandir(out))
 
 
 def row_of(sweep: Sweep, number: int, out: Path, manifest: Mapping[str, Any]) -> Row:

@@ -300,4 +300,9 @@ def _override(values: dict[str, Any], text: str) -> None:
     try:
         target[last] = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
+        if value.startswith(("[", "{")):
+            raise InputError(
+                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, as "
+                'in \'scene=["two_objects", "overlap"]\''
+            ) from None
         target[last] = value

@@ -21,13 +21,15 @@ from pydantic import BaseModel
 from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
-from simgen.spec.scene import is_scene
+from simgen.spec.scene import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000
 SHORT_NAMES = {"scene_number": "draw"}
 """What folders call fields whose own names would mislead there."""
 _ORDER = {"scene": -2, "scene_number": -1, "seed": 1}
-PLAIN = r"[A-Za-z0-9][A-Za-z0-9.+-]{0,63}"
+PLAIN = r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}"
+LONGEST_STEM = 40
+"""So many letters of a value that is not plain are told beside its hash."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +41,13 @@ class Axis:
     label: str
 
     def name_of(self, value: Any) -> str:
-        """The value in the names of folders: as it is written if that is plain, else a hash of it."""
+        """The value in the names of folders: as it is written if that is plain, else its words and a hash."""
         parts = value if isinstance(value, list | tuple) else [value]
         text = "x".join(f"{part:.15g}" if type(part) is float else str(part) for part in parts)
         if not re.fullmatch(PLAIN, text):
-            text = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]
+            digest = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]
+            stem = "-".join(re.findall(r"\w+", text, re.ASCII))[-LONGEST_STEM:].strip("-_")
+            text = f"{stem}-{digest}" if stem else digest
         return f"{self.label}_{text}"
 
 
@@ -99,14 +103,17 @@ class Sweep:
         return resolved
 
     def check(self) -> None:
-        """Raise `InputError` if a value of a swept field makes no recipe beside the others' first values."""
+        """Raise `InputError` if a value of a swept field makes no recipe beside the others' first values.
+
+        A scene that is not there is named too, before there is any folder.
+        """
         first = self.values(0)
         self._recipe_with(first)
         for axis in self.axes:
             # Of a range the ends decide: what whole numbers may be is bounded from below and above.
             ends = isinstance(axis.values, range)
             for value in (axis.values[0], axis.values[-1]) if ends else axis.values:
-                self._recipe_with(first | {axis.field: value})
+                find_scene(self._recipe_with(first | {axis.field: value}).scene, self.near)
 
 
 def load_sweep(

@@ -35,6 +35,8 @@ def test_overrides_take_toml_values_and_bare_words() -> None:
     assert recipe.photons.budget == 300
     assert recipe.cfa == "RGGB"
     assert recipe.grid.pitch_mm == (2.0, 3.0)
+    with pytest.raises(InputError, match=r"scene=\[two_objects,overlap\].* words in it need quotation marks"):
+        load_recipe("paper", ["scene=[two_objects,overlap]"])
 
 
 @pytest.mark.parametrize(

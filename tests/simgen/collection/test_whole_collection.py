@@ -118,6 +118,16 @@ def test_a_dataset_that_cannot_be_made_holds_up_no_other(
     assert [row["seed"] for row in open_collection(out).rows] == [7, 9]
 
 
+def test_a_sweep_that_made_nothing_gives_way_to_the_one_that_was_meant(
+    recipe_file: Path, tmp_path: Path
+) -> None:
+    drawn = ["scene=drawn_crossing"]
+    assert len(generate_collection(load_sweep(str(recipe_file), drawn), tmp_path / "out")) == 2
+    meant = load_sweep(str(recipe_file), [*drawn, "scene_number=3"])
+    assert generate_collection(meant, tmp_path / "out") == []
+    assert [row["scene_number"] for row in open_collection(tmp_path / "out").rows] == [3, 3]
+
+
 def test_another_recipe_a_dataset_and_a_file_are_refused(
     recipe_file: Path, collection: Path, tmp_path: Path
 ) -> None:

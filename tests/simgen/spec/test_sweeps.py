@@ -6,7 +6,7 @@ import pytest
 
 from pcii.base.errors import InputError
 from simgen.spec.recipe import load_recipe
-from simgen.spec.sweeps import load_sweep
+from simgen.spec.sweeps import Axis, load_sweep
 
 TOML = """
 scene = "two_objects"
@@ -78,11 +78,21 @@ def test_a_folder_keeps_its_name_when_values_are_added(recipe_file: str) -> None
         names = own
 
 
-def test_values_that_make_no_plain_name_are_told_apart_by_a_hash(recipe_file: str) -> None:
-    sweep = load_sweep(recipe_file, ["photons.budget=1", "scene={each=['a/b', 'c d']}"])
-    names = [sweep.folder(number) for number in range(2)]
-    assert all(name.startswith("scene_") and len(name) == len("scene_") + 8 for name in names)
-    assert names[0] != names[1]
+def test_folders_are_named_by_the_scene_and_told_apart_by_a_hash_where_it_is_no_plain_name() -> None:
+    values = ["two_objects", "../mine/scene.toml", "../mine/scene toml", "/", "\n" + 70 * "x"]
+    names = [Axis("scene", values, "scene").name_of(value) for value in values]
+    assert names[0] == "scene_two_objects"
+    assert [name[:-8] for name in names[1:]] == [
+        *2 * ["scene_mine-scene-toml-"],
+        "scene_",
+        f"scene_{40 * 'x'}-",
+    ]
+    assert len(set(names)) == len(values)
+
+
+def test_a_scene_that_is_not_there_is_named_before_anything_is_made(recipe_file: str) -> None:
+    with pytest.raises(InputError, match="there is no scene 'overlapp'; did you mean 'overlap'"):
+        load_sweep(recipe_file, ['scene=["two_objects", "overlapp"]'])
 
 
 @pytest.mark.parametrize(
