@@ -302,7 +302,7 @@ def _override(values: dict[str, Any], text: str) -> None:
     except tomllib.TOMLDecodeError:
         if value.startswith(("[", "{")):
             raise InputError(
-                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, as "
-                'in \'scene=["two_objects", "overlap"]\''
+                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, "
+                'as in \'scene=["two_objects", "overlap"]\''
             ) from None
         target[last] = value
