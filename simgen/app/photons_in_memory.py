@@ -61,14 +61,15 @@ def draw_photons(
         "photons": {"budget": budget},
     }
     recipe = validate(Recipe, values, "draw_photons")
-    render_scene = Prepared(recipe, scene.scene, scene.folder, None).render_scene()
-    capture = capture_of(recipe)
+    prepared = Prepared(recipe, scene.scene, scene.folder, None)
+    render_scene = prepared.render_scene()
+    capture = capture_of(recipe, prepared.seed)
     made = plan(capture, render_scene, backend.choose().kind)
     check_resources(needs_of(recipe), made, Path())
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:
-        path_seed = random_streams.integer(recipe.seed, view=k * grid.cols + l, stage="radiance")
+        path_seed = random_streams.integer(capture.seed, view=k * grid.cols + l, stage="radiance")
         image = render_view(render_scene, capture.rig, k, l, samples_per_pixel=made.samples, seed=path_seed)
         return sense(image, recipe.cfa)
 
@@ -77,7 +78,7 @@ def draw_photons(
         arrivals, _ = thin(capture, setup, made, report=report)
     else:
         arrivals, _ = draw_from_views(capture, mosaic_of, made, report)
-    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, recipe.seed).by_pixel(grid)
+    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed).by_pixel(grid)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
     )

@@ -1,10 +1,12 @@
-"""Random streams, keyed by stage of the work: the same for any number of workers and any order.
+"""Random streams, keyed by what is drawn and by stage of the work: the same for any workers and any order.
 
 Each purpose has a stage of its own. The key is a `SeedSequence.spawn_key` of fixed length, since seeds given
 as lists of numbers collide when one list is another with zeros appended.
 """
 
-from typing import Literal, get_args
+import hashlib
+import json
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -28,11 +30,25 @@ Stage = Literal[
     "check probe",
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
+OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")
+"""What the same cameras have in whatever picture they take: it follows from the recipe's seed alone."""
+_SEED_BITS = 64
+
+
+def seed_of_draw(seed: int, drawn: Any) -> int:
+    """A seed of its own for each thing that is drawn with a recipe's seed: that seed, and a hash above it.
+
+    `drawn` are plain values that say what that is.
+    """
+    digest = hashlib.sha256(json.dumps(drawn, sort_keys=True).encode()).digest()
+    return int.from_bytes(digest[:16], "big") << _SEED_BITS | seed
 
 
 def _sequence(
     seed: int, stage: Stage, view: int, part: int, attempt: int, round_number: int
 ) -> np.random.SeedSequence:
+    if stage in OF_THE_CAMERAS:
+        seed %= 1 << _SEED_BITS
     key = (_STAGES.index(stage), view, part, attempt, round_number)
     return np.random.SeedSequence(seed, spawn_key=key)
 

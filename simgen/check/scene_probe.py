@@ -43,7 +43,7 @@ def probe_scene(target: Prepared) -> Facts:
     grid = recipe.grid.camera_grid()
     made = None
     if recipe.products.counts:
-        made = plan(capture_of(recipe), render_scene, kind, least_samples(recipe))
+        made = plan(capture_of(recipe, target.seed), render_scene, kind, least_samples(recipe))
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
     image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, small)

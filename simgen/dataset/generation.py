@@ -72,7 +72,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     recipe, identity = prepared.recipe, prepared.identity
     needs = needs_of(recipe)
     engine = backend.describe(spectral=recipe.is_spectral)
-    clock, made, capture = _Clock(), None, capture_of(recipe)
+    clock, made, capture = _Clock(), None, capture_of(recipe, prepared.seed)
     common = in_common(reuse, prepared, engine)
     with named_in_errors(out), claimed(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
@@ -136,7 +136,7 @@ def _work(
         recipe.exposure,
         products.radiance,
         made.samples if made is not None and renders else recipe.render.samples_per_pixel,
-        recipe.seed,
+        capture.seed,
         out,
     )
     if products.radiance != "none" or renders:

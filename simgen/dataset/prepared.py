@@ -11,6 +11,7 @@ import numpy as np
 
 from pcii.io.dataset_layout import FORMAT_VERSION
 from pcii.io.sealed_json import hash_file
+from simgen.base import random_streams as seeds
 from simgen.base.asset_names import asset
 from simgen.cameras.calibration import rig_of
 from simgen.dataset.resources import Needs
@@ -48,6 +49,19 @@ class Prepared:
             "assets": {name: hash_file(path) for name, path in sorted(assets.items())},
             "sensitivities": None if self.curves is None else self.curves.tolist(),
         }
+
+    @cached_property
+    def seed(self) -> int:
+        """The seed of this draw: no two scenes, cameras, sensors or amounts of light have one in common.
+
+        So one seed in a recipe gives unrelated photons in each dataset of a sweep. Products, smaller budgets
+        of the same photons and words about the scene make no other draw.
+        """
+        said = {"title", "description", "planes_mm"}
+        decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
+        del decisive["photons"]["nested"]
+        drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=said)}
+        return seeds.seed_of_draw(self.recipe.seed, [drawn, decisive, self.recipe.render.max_depth])
 
     @cached_property
     def recipe_of_data(self) -> dict[str, Any]:
@@ -89,13 +103,13 @@ def _analysis_of(analysis: Analysis, planes_mm: tuple[float, ...]) -> Analysis:
     return Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
 
 
-def capture_of(recipe: Recipe) -> Capture:
-    """What of a recipe decides which photons arrive where."""
+def capture_of(recipe: Recipe, seed: int) -> Capture:
+    """What of a recipe decides which photons arrive where; `seed` is that of the draw (`Prepared.seed`)."""
     gain = None
     if recipe.photons.scope == "exposure":
         assert recipe.exposure is not None
         gain = photons_per_radiance(recipe.exposure, recipe.grid.pixel_mm)
-    return Capture(rig_of(recipe.grid, recipe.seed), recipe.cfa, recipe.photons, gain, recipe.seed)
+    return Capture(rig_of(recipe.grid, seed), recipe.cfa, recipe.photons, gain, seed)
 
 
 def needs_of(recipe: Recipe) -> Needs:

@@ -191,7 +191,7 @@ class Recipe(Strict):
     scene_number: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] | None = None
     """Which draw of a scene that is a distribution; none for a scene that is not."""
     seed: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] = 0
-    """All that is random follows from it: the same seed, the same bytes."""
+    """All that is random follows from it and from what is drawn: the same recipe, the same bytes."""
     grid: Grid = Grid()
     sensor: Sensor = Sensor()
     photons: Photons = Photons()

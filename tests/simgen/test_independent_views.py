@@ -110,7 +110,7 @@ def test_all_pairs_of_a_hundred_views_have_noise_of_their_own(
     assert found.size == 4950
     assert found.max() <= MOST
     pixels[73] += pixels[41]  # the fault: one view has another's noise besides its own
-    assert (likeness(pixels) > MOST).sum() == 1
+    assert (likeness(pixels) > 0.5).sum() == 1  # 0.7: half of that view is the other
 
 
 @pytest.mark.parametrize("noisy", [rendered, detected])

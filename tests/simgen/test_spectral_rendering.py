@@ -127,7 +127,7 @@ def test_thinned_photons_of_the_chart_are_those_of_spectral_integration(lamp: st
     grid = made.grid.camera_grid()
     setup = Setup(built, grid, made.cfa, 2)
     photons, _ = thin_photons(
-        setup, made.photons, seed=2, photons_per_radiance=capture_of(made).photons_per_radiance
+        setup, made.photons, seed=2, photons_per_radiance=capture_of(made, made.seed).photons_per_radiance
     )
     counts = np.zeros((grid.height, grid.width))
     np.add.at(counts, (photons.i, photons.j), 1)
@@ -156,7 +156,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     built, made = chart("D65", camera)
     grid, exposure = made.grid.camera_grid(), made.exposure
     assert exposure is not None
-    gain = capture_of(made).photons_per_radiance
+    gain = capture_of(made, made.seed).photons_per_radiance
     assert gain is not None
     view = render_view(built, grid, 0, 0, samples_per_pixel=1024, seed=6).astype(np.float64)
     seen = by_patch(view)[21] * gain  # neutral 5

@@ -55,17 +55,17 @@ def mosaic_of(k: int, l: int) -> np.ndarray:
 
 
 def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
-    return module.plan(capture_of(made), render_scene, kind, least_samples(made))
+    return module.plan(capture_of(made, made.seed), render_scene, kind, least_samples(made))
 
 
 def thin(made: Recipe, render_scene: RenderScene) -> PhotonTable:
-    capture = capture_of(made)
+    capture = capture_of(made, made.seed)
     setup = Setup(render_scene, capture.rig, capture.cfa, made.render.max_depth)
     return photon_counting.thin(capture, setup, PLAN)[0]
 
 
 def dense(made: Recipe) -> PhotonTable:
-    return draw_from_views(capture_of(made), mosaic_of, PLAN, silent)[0]
+    return draw_from_views(capture_of(made, made.seed), mosaic_of, PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
@@ -206,20 +206,22 @@ def test_counts_at_low_light_keep_their_mean() -> None:
     # A thousandth of a photon per pixel in 2500 views of 80 pixels: 200 in all.
     made = recipe(50, 50, photons={"budget": 1e-3 * HEIGHT * WIDTH})
     flat = np.full((HEIGHT, WIDTH), 3.0)
-    counts = counted(draw_from_views(capture_of(made), lambda *_: flat, PLAN, silent)[0], made)
+    counts = counted(draw_from_views(capture_of(made, made.seed), lambda *_: flat, PLAN, silent)[0], made)
     assert abs(counts.mean() - 1e-3) < 4 * np.sqrt(1e-3 / counts.size)
     assert abs(2 * counts.mean() - 1e-3) > 4 * np.sqrt(1e-3 / counts.size)  # the fault: doubled
 
 
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
-    arrivals, log = draw_from_views(capture_of(made), lambda k, l: k * mosaic_of(k, l), PLAN, silent)
+    arrivals, log = draw_from_views(
+        capture_of(made, made.seed), lambda k, l: k * mosaic_of(k, l), PLAN, silent
+    )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
         assert by_scope(counted(subset(arrivals, made, budget), made), "view").tolist() == [0, 0] + 2 * [
             budget
         ]
-    black, log = draw_from_views(capture_of(made), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
+    black, log = draw_from_views(capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
     assert log["views_without_light"] == 4
     assert subset(black, made, 8).k.size == 0
 
@@ -253,7 +255,7 @@ FAULTY = {
 @pytest.mark.parametrize("sensor", [{}, {"counter_bits": 1}, FAULTY, FAULTY | {"counter_bits": 2}])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
-    told = write_counts(capture_of(made), made.sensor, dense(made), tmp_path, with_origins=True)
+    told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
     whole, middle, small = (stored(tmp_path, made, budget) for budget in (None, 40, 8))
     assert (small <= middle).all()
     assert (middle <= whole).all()
@@ -270,14 +272,14 @@ def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: P
 def test_without_faults_what_arrives_is_what_is_written(tmp_path: Path) -> None:
     made = recipe(photons={"budget": 500})
     arrivals = dense(made)
-    told = write_counts(capture_of(made), made.sensor, arrivals, tmp_path, with_origins=True)
+    told = write_counts(capture_of(made, made.seed), made.sensor, arrivals, tmp_path, with_origins=True)
     np.testing.assert_array_equal(stored(tmp_path, made), counted(arrivals, made))
     assert told["arrived"] == told["total"] == arrivals.n.sum()
 
 
 def test_dark_counts_are_in_every_budget(tmp_path: Path) -> None:
     lost = recipe(sensor={"quantum_efficiency": (1e-9,) * 3, "dark_counts": 0.5})
-    write_counts(capture_of(lost), lost.sensor, dense(lost), tmp_path, with_origins=True)
+    write_counts(capture_of(lost, lost.seed), lost.sensor, dense(lost), tmp_path, with_origins=True)
     whole, small = stored(tmp_path, lost), stored(tmp_path, lost, 8)
     np.testing.assert_array_equal(whole, small)
     assert abs(whole.sum() - 0.5 * whole.size) < 4 * np.sqrt(0.5 * whole.size)
@@ -297,7 +299,9 @@ def from_known_places(made: Recipe) -> PhotonTable:
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))
-    write_counts(capture_of(made), made.sensor, from_known_places(made), tmp_path, with_origins=True)
+    write_counts(
+        capture_of(made, made.seed), made.sensor, from_known_places(made), tmp_path, with_origins=True
+    )
     origins = zarr.open_group(tmp_path / nested_name(PHOTON_TRUTH, budget), mode="r")
     object_id, z_mm = np.asarray(origins["object_id"]), np.asarray(origins["z_mm"])
     counts = stored(tmp_path, made, budget).ravel()
@@ -313,8 +317,8 @@ def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: di
 
 def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
     made = recipe()
-    black = draw_from_views(capture_of(made), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
-    told = write_counts(capture_of(made), made.sensor, black, tmp_path, with_origins=True)
+    black = draw_from_views(capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
+    told = write_counts(capture_of(made, made.seed), made.sensor, black, tmp_path, with_origins=True)
     assert told["total"] == 0
     assert (stored(tmp_path, made, 8) == 0).all()
 

@@ -54,7 +54,7 @@ def planned(thins: bool) -> Plan:
 
 
 def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
-    capture = capture_of(made)
+    capture = capture_of(made, made.seed)
     setup = Setup(built, capture.rig, capture.cfa, made.render.max_depth)
     return thin(capture, setup, planned(True))[0]
 
@@ -66,7 +66,7 @@ def dense(made: Recipe, built: RenderScene) -> PhotonTable:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
         return sense(image, made.cfa)
 
-    return draw_from_views(capture_of(made), mosaic_of, planned(False), silent)[0]
+    return draw_from_views(capture_of(made, made.seed), mosaic_of, planned(False), silent)[0]
 
 
 def counted(arrivals: PhotonTable) -> np.ndarray:
@@ -139,12 +139,12 @@ def test_a_longer_exposure_gives_more_photons(lit_evenly: RenderScene, draw: Dra
 
 @pytest.mark.renders
 def test_the_plan_expects_the_photons_by_hand(lit_evenly: RenderScene) -> None:
-    made = plan(capture_of(recipe()), lit_evenly, "llvm")
+    made = plan(capture_of(recipe(), 1), lit_evenly, "llvm")
     assert made.photons_per_view == pytest.approx(64 * 80 * BY_HAND, rel=1e-3)
     assert made.noise == pytest.approx(0, abs=1e-6)  # single precision: an even light has no noise
     assert made.samples == 1
 
 
 def test_a_budget_knows_no_exposure() -> None:
-    assert capture_of(recipe(photons={"budget": 10.0})).photons_per_radiance is None
-    assert capture_of(recipe()).photons_per_radiance == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)
+    assert capture_of(recipe(photons={"budget": 10.0}), 1).photons_per_radiance is None
+    assert capture_of(recipe(), 1).photons_per_radiance == pytest.approx(BY_HAND / LUMINANCE_CD_M2, rel=1e-3)
