@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection
 from threading import Lock
 from typing import Any, TypeVar
 
-from pcii.app.results import Making, Results
+from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Making, Results, masks_name
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.section_stack import Sections
 from pcii.depth.methods import DEFAULT_METHOD
@@ -29,6 +29,9 @@ def removal_step(method: str) -> str:
 
 class Steps:
     """Does the long steps of an analysis: each call returns what `make` makes and how long it took, in s."""
+
+    def begin(self, methods: Collection[str]) -> None:
+        """What will be made is known, and about to be: masks by these methods, and all that follows."""
 
     def removal(
         self, method: str, sections: Sections, make: Callable[[], Segmented]
@@ -68,6 +71,11 @@ class KeptSteps(Steps):
         """Names of the steps that were done before."""
         return self._kept
 
+    def begin(self, methods: Collection[str]) -> None:
+        """Note in the folder what the run will make of it."""
+        with self._results.writing() as results:
+            results.begin([*map(masks_name, methods), DEPTH, SECTIONS, SCORE, REPORT])
+
     def removal(
         self, method: str, sections: Sections, make: Callable[[], Segmented]
     ) -> tuple[Segmented, float]:
@@ -76,6 +84,7 @@ class KeptSteps(Steps):
         key = self._key(method, {"step": step, "z_mm": sections.z_mm.tolist()})
         with self._folder:
             found = self._results.kept_masks(method, sections, key)
+            self._keep(masks_name(method), found)
         if found is not None:
             self._kept.append(step)
             return found
@@ -89,6 +98,7 @@ class KeptSteps(Steps):
         key = self._key(depth_name(DEFAULT_METHOD), {"step": DEPTH_STEP, "z_range_mm": list(z_range_mm)})
         with self._folder:
             found = self._results.kept_depth(key)
+            self._keep(DEPTH, found)
         if found is not None:
             self._kept.append(DEPTH_STEP)
             return found
@@ -96,6 +106,11 @@ class KeptSteps(Steps):
         with self._folder, self._results.writing() as results:
             results.save_depth(depth, Making(key, seconds))
         return depth, seconds
+
+    def _keep(self, name: str, found: object) -> None:
+        if found is not None:
+            with self._results.writing() as results:
+                results.keep(name)
 
     def _key(self, method: str, step: dict[str, Any]) -> str:
         """Hash of all that the result of a method's step follows from."""

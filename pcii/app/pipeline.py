@@ -79,6 +79,7 @@ def analyse(
     seen = dataset.views if counts is None else counts
     assert seen is not None
     focus: list[Segmented] = []
+    steps.begin(chosen)
     # Depth needs nothing of the other steps, and most of its time leaves the interpreter to them.
     with ThreadPoolExecutor(1) as beside:
         mapped = beside.submit(steps.depth, z_range, lambda: estimate_depth(seen, z_range))

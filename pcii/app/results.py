@@ -1,7 +1,8 @@
 """The folder of results that commands write and later commands read.
 
 results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum; of
-                         what `pcii run` made, by what (see `pcii.app.long_steps`) and how long it took
+                         what `pcii run` made, by what (see `pcii.app.long_steps`) and how long it took;
+                         what is due: parts that a run has yet to make, and those made from older parts
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
@@ -10,10 +11,11 @@ score.json               as in `Score.to_dict`
 
 A replacement is written completely under a temporary name. Then the old entry is removed from results.json,
 the replacement renamed, and its entry added: a kill at any time leaves the old results, none, or the new
-ones.
+ones. `due` tells of each part whether it belongs to the others: a run that ends before its last part leaves
+the rest due, and so does a command that replaces what the scores or the report were made from.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -36,7 +38,7 @@ from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.section_stack import Sections
 from pcii.io.dataset import Dataset
 from pcii.io.dataset_layout import lists_part
-from pcii.io.results_list import RESULTS, read_results, write_results
+from pcii.io.results_list import FINISH, RESULTS, read_results, write_results
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import read_array, write_arrays
 from pcii.sections.reconstruction import reconstruct
@@ -44,6 +46,9 @@ from pcii.sections.reconstruction import reconstruct
 REMEDY = "make it again"
 LOCK = ".results.lock"
 DEPTH = "depth.zarr"
+SECTIONS = "sections.zarr"
+SCORE = "score.json"
+REPORT = "report.html"
 
 
 def masks_name(method: str) -> str:
@@ -99,7 +104,7 @@ class Results:
                 self.check()
                 sweep_temporaries(self.path)
                 if not (self.path / RESULTS).exists():
-                    self._list({}, {})
+                    self._list({}, {}, ())
                 yield self
             finally:
                 (self.path / LOCK).unlink(missing_ok=True)
@@ -112,11 +117,14 @@ class Results:
             new = temporary / name
             yield new
             held = read_results(self.path)
-            files, made = held["files"], held.get("made", {})
+            files, made, due = held["files"], held.get("made", {}), set(held.get("due", ()))
             remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
             made = {part: how for part, how in made.items() if part != name}
+            listed = list_files(temporary, [name])
+            if remaining | listed != files:
+                due |= {part for part in _made_from(name) if part in files}
             if len(remaining) < len(files):
-                self._list(remaining, made)
+                self._list(remaining, made, due | {name})
             if new.is_dir():
                 replace_folder(new, target)
             else:
@@ -124,12 +132,22 @@ class Results:
                 sync_folder(self.path)
             if making is not None:
                 made[name] = asdict(making)
-            self._list(remaining | list_files(self.path, [name]), made)
+            self._list(remaining | listed, made, due - {name})
 
-    def _list(self, files: Mapping[str, Any], made: Mapping[str, Any]) -> None:
+    def begin(self, parts: Iterable[str]) -> None:
+        """Say that these parts are to be made, before the first of them is: until then they are due."""
+        held = read_results(self.path)
+        self._list(held["files"], held.get("made", {}), {*held.get("due", ()), *parts})
+
+    def keep(self, name: str) -> None:
+        """Say that the part that is there already is the one to be made."""
+        held = read_results(self.path)
+        self._list(held["files"], held.get("made", {}), {*held.get("due", ())} - {name})
+
+    def _list(self, files: Mapping[str, Any], made: Mapping[str, Any], due: Collection[str]) -> None:
         """Write results.json, the same whatever order the files were made in."""
         in_order = {"files": dict(sorted(files.items())), "made": dict(sorted(made.items()))}
-        write_results(self.path, self._origin | in_order)
+        write_results(self.path, self._origin | in_order | ({"due": sorted(due)} if due else {}))
 
     def save_sections(self, sections: Sections) -> Path:
         """Write the counts and the coverage, whose quotient is the estimate."""
@@ -138,7 +156,7 @@ class Results:
         labels = SECTIONS_LABELS
         if sections.counts.dtype.kind == "f":
             labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
-        return self._save("sections.zarr", arrays, labels, pattern)
+        return self._save(SECTIONS, arrays, labels, pattern)
 
     def save_segmented(self, focus: Segmented, making: Making | None = None) -> Path:
         """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
@@ -155,9 +173,9 @@ class Results:
 
     def save_score(self, result: Score) -> Path:
         """Write score.json."""
-        with self.replacing("score.json") as path:
+        with self.replacing(SCORE) as path:
             write_json_safely(path, result.to_dict())
-        return self.path / "score.json"
+        return self.path / SCORE
 
     def _save(
         self,
@@ -172,8 +190,11 @@ class Results:
         return self.path / name
 
     def load_segmented(self) -> list[Segmented]:
-        """The in-focus masks of every method in the folder; their sections are reconstructed again."""
-        files = read_results(self.path)["files"]
+        """The in-focus masks of every method in the folder; their sections are reconstructed again.
+
+        Raises `InputError` if those of a method are older than a run that was not finished.
+        """
+        files = self._current_files()
         groups = {name.split("/")[0] for name in files}
         segmented: list[Segmented] = []
         sections: dict[bytes, Sections] = {}
@@ -217,7 +238,7 @@ class Results:
         """The depth map and how long it took, if it was made by `key` and is undamaged."""
         seconds = self._made_by(DEPTH, key)
         try:
-            depth = None if seconds is None else self.load_depth()
+            depth = None if seconds is None else self._depth(read_results(self.path)["files"])
         except InputError:
             return None
         return None if depth is None or seconds is None else (depth, seconds)
@@ -230,8 +251,21 @@ class Results:
         return made["seconds"] if made is not None and made["key"] == key else None
 
     def load_depth(self) -> DepthMap | None:
-        """The depth map in the folder, or None."""
-        files = read_results(self.path)["files"]
+        """The depth map in the folder, or None; raises `InputError` as `load_segmented` does."""
+        return self._depth(self._current_files())
+
+    def _current_files(self) -> Mapping[str, Any]:
+        """Listed files; raises `InputError` if masks or a depth map are older than an unfinished run."""
+        held = read_results(self.path)
+        estimates = (part for part in held.get("due", ()) if SCORE in _made_from(part))
+        older = [part for part in estimates if lists_part(held["files"], part)]
+        if older:
+            raise InputError(
+                f"{self.path}: {', '.join(older)}: older than the last run, which was not finished; {FINISH}"
+            )
+        return held["files"]
+
+    def _depth(self, files: Mapping[str, Any]) -> DepthMap | None:
         if not lists_part(files, DEPTH):
             return None
         return DepthMap(**{n: self._read(f"{DEPTH}/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
@@ -240,6 +274,13 @@ class Results:
         grid = self.dataset.grid
         sizes = {"row": grid.height, "col": grid.width}
         return read_array(self.path, name, files, label, sizes, REMEDY)
+
+
+def _made_from(name: str) -> tuple[str, ...]:
+    """Parts that are made from `name`: of masks and depth the scores, of all these the report."""
+    if name == DEPTH or name.startswith("segmented_"):
+        return SCORE, REPORT
+    return (REPORT,) if name in (SECTIONS, SCORE) else ()
 
 
 def _segmented(arrays: Mapping[str, np.ndarray], method: str, sections: Sections) -> Segmented:

@@ -6,7 +6,7 @@ from pathlib import Path
 from pcii.app.long_steps import KeptSteps
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
-from pcii.app.results import Results
+from pcii.app.results import REPORT, Results
 from pcii.base.progress import Report, silent
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import planes_of
@@ -35,6 +35,6 @@ def run(
     with results.writing():
         results.save_sections(outcome.sections)
         results.save_score(outcome.score)
-        with results.replacing("report.html") as page:
+        with results.replacing(REPORT) as page:
             write_report(page, outcome, report)
     return outcome

@@ -168,6 +168,7 @@ class ResultsManifest(FileList):
     identity: str | None
     budget: Photons | None
     made: dict[FileName, Making] = {}
+    due: list[FileName] = []
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:

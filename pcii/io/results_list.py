@@ -10,10 +10,11 @@ from pcii.io.sealed_json import read_sealed, write_sealed
 RESULTS = "results.json"
 FORMAT = "photon-integral-imaging results"
 FORMAT_VERSION = 2
+FINISH = "`pcii run` with the same options makes them, and keeps what is done"
 
 
 def write_results(out: Path, content: Mapping[str, Any]) -> None:
-    """Write the list of a folder of results: `dataset`, `identity`, `budget` and `files`."""
+    """Write the list of a folder of results: `dataset`, `identity`, `budget`, `files`, `made` and `due`."""
     write_sealed(out / RESULTS, {"format": FORMAT, "format_version": FORMAT_VERSION, **content})
 
 

@@ -19,7 +19,7 @@ from pcii.io.collection_layout import (
 )
 from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, MARKER, read_manifest
 from pcii.io.evaluation_layout import EVALUATION, is_evaluation, read_evaluation
-from pcii.io.results_list import RESULTS, read_results
+from pcii.io.results_list import FINISH, RESULTS, read_results
 from pcii.io.sealed_json import check_file, read_sealed, strays
 
 Item = TypeVar("Item")
@@ -75,8 +75,10 @@ def _verify_collection(path: Path, report: Report) -> int:
 
 
 def _verify_folder(path: Path, report: Report) -> int:
+    due = list[str]()
     if (path / RESULTS).exists() and not (path / MANIFEST).exists():
-        name, remedy, files = RESULTS, "make them again", read_results(path)["files"]
+        name, remedy, held = RESULTS, "make them again", read_results(path)
+        files, due = held["files"], held.get("due", due)
     elif is_evaluation(path) and not (path / MANIFEST).exists():
         name, remedy, files = EVALUATION, evaluation_layout.REMEDY, read_evaluation(path)["files"]
     else:
@@ -89,6 +91,10 @@ def _verify_folder(path: Path, report: Report) -> int:
     number = _all_of(list(files.items()), check, "files", report)
     card = _verify_card(path, files)
     _refuse(path, strays(path, [name, *files, *card]), name)
+    if due:
+        raise InputError(
+            f"{path}: not finished: {_named(due)} are missing, or older than the other results here; {FINISH}"
+        )
     return number + len(card)
 
 

@@ -12,6 +12,7 @@ import pytest
 import pcii
 from pcii.app import long_steps, pipeline, results, single_run
 from pcii.app.results import masks_name
+from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.io.dataset import Dataset
 from pcii.io.results_list import read_results
@@ -56,16 +57,22 @@ def contents(out: Path) -> dict[str, bytes]:
     return {name: file.read_bytes() for name, file in files.items() if name not in VARIES}
 
 
-def interrupted(dataset: Dataset, out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that is stopped in its last long step."""
+def interrupted(
+    dataset: Dataset,
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    at: str = "estimate_depth",
+    **options: object,
+) -> None:
+    """A run that is stopped where it calls `at`; by default in its last long step."""
 
-    def stop(*_: object) -> DepthMap:
+    def stop(*_: object, **__: object) -> DepthMap:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, "estimate_depth", stop)
+        patch.setattr(pipeline, at, stop)
         with pytest.raises(KeyboardInterrupt):
-            run(dataset, out)
+            run(dataset, out, **options)
 
 
 def test_an_interrupted_run_goes_on_to_the_same_bytes(
@@ -74,12 +81,31 @@ def test_an_interrupted_run_goes_on_to_the_same_bytes(
     out = tmp_path / "out"
     interrupted(dataset, out, monkeypatch)
     assert not (out / "score.json").exists()
-    assert verify(out) > 0
+    with pytest.raises(InputError, match=r"finished: depth.zarr, report.html, score.json, sections.zarr "):
+        verify(out)
     assert run(dataset, out) == REMOVALS
+    assert verify(out) > 0
     assert contents(out) == contents(whole)
     assert list(read_results(out)["files"]) == list(read_results(whole)["files"])
     assert run(dataset, out) == ALL
     assert contents(out) == contents(whole)
+
+
+def test_results_of_two_runs_are_not_taken_for_those_of_one(
+    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, others = tmp_path / "out", {"z_mm": (500.0, 700.0)}
+    run(dataset, out)
+    interrupted(dataset, out, monkeypatch, at="find_method", **others)
+    with pytest.raises(InputError, match=r"segmented_brightness.zarr, segmented_variance.zarr: older than"):
+        single_run.Results(out, dataset).load_segmented()
+    interrupted(dataset, out, monkeypatch, at="score", **others)
+    assert len(single_run.Results(out, dataset).load_segmented()) == len(METHODS)
+    assert {"score.json", "report.html"} <= set(read_results(out)["files"])  # of the first run
+    with pytest.raises(InputError, match=r"not finished: report.html, score.json, sections.zarr are"):
+        verify(out)
+    assert run(dataset, out, **others) == ALL
+    assert verify(out) > 0
 
 
 def test_what_other_options_made_is_made_anew(dataset: Dataset, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from twins import unit_grid
 
 from pcii.app.results import LOCK, Results
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap, Segmented
+from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import Dataset
 from pcii.io.results_list import RESULTS, read_results
@@ -102,6 +102,21 @@ def test_what_is_written_anew_takes_the_place_of_the_old(saved: Results) -> None
     assert (saved.path / "note.txt").read_text() == "again"
     assert verify(saved.path) > 0
     assert not [path.name for path in saved.path.iterdir() if path.name.startswith(".")]
+
+
+def test_scores_and_report_of_an_older_depth_map_are_named(saved: Results) -> None:
+    with saved.writing():
+        saved.save_score(Score((), (), {}))
+        with saved.replacing("report.html") as path:
+            path.touch()
+        saved.save_depth(DepthMap(np.full((6, 7), 0.7), np.full((6, 7), 0.5)))  # the same again
+    assert verify(saved.path) > 0
+    with saved.writing():
+        saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.5)))
+    assert "report.html, score.json are" in one_sentence(lambda: verify(saved.path), saved.path)
+    with saved.writing():
+        saved.save_score(Score((), (), {}))
+    assert "finished: report.html are" in one_sentence(lambda: verify(saved.path), saved.path)
 
 
 def test_a_missing_chunk_is_no_empty_mask(saved: Results) -> None:
