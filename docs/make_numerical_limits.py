@@ -99,8 +99,8 @@ stress`.
 A refusal is a `pcii.InputError`, one sentence that names the argument or the file: NaN and infinity; light
 below 0 where photons are drawn from it; fractions of photons; depths not above 0, and those so near that
 views shift by more than 2^31 px; more than 10^12 photons expected of a view by `limit_photons`; radiance so
-large that a sum is no number of its type, and, for variances, its squares (10^19 in float32, 10^150 in
-float64).
+large that a sum is no number of its type, and, for variances, so large or so faint that squares of
+differences are none (above 10^19 or below 10^−19 in float32, 10^154 and 10^−154 in float64).
 
 ## What each function gives
 

@@ -1,6 +1,6 @@
 """Elemental images: the radiance of every view."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
@@ -109,6 +109,27 @@ class Views(Brief):
         if not np.all(np.isfinite(image)):
             raise InputError(f"radiance: view ({k}, {l}) holds NaN or infinity")
         return image
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """Radiance divided by `scale`, one view at a time."""
+
+    radiance: ArrayLike5D
+    scale: float
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return self.radiance.shape
+
+    def __getitem__(self, index: Any, /) -> np.ndarray:
+        return np.asarray(self.radiance[index], dtype=np.float64) / self.scale
+
+
+def in_binary_unit(views: Views) -> Views:
+    """The same views in the unit `binary_scale`, in double precision where that is not 1."""
+    scale = binary_scale(views)
+    return views if scale == 1 else replace(views, radiance=_Scaled(views.radiance, scale))
 
 
 def binary_scale(views: Views) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
+from pcii.core.images import Views, in_binary_unit
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.depth_planes import peak_depth_mm
@@ -44,6 +44,8 @@ def variance_sweep(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) 
     from scipy.ndimage import uniform_filter
 
     is_counted = isinstance(data, PhotonCounts)
+    if isinstance(data, Views):
+        data = in_binary_unit(data)
 
     def evenness(sections: Sections, plane: int) -> np.ndarray:
         assert sections.variance is not None

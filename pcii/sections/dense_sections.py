@@ -47,7 +47,7 @@ def sum_views(
     if not finite:
         _raise_not_finite(data)
     sums = _stacked([plane.sums for plane in planes])
-    return sums, _stacked([plane.variance for plane in planes]) if variance else None
+    return sums, _not_faint(data, _stacked([plane.variance for plane in planes])) if variance else None
 
 
 def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) -> np.ndarray:
@@ -86,7 +86,7 @@ def sum_fine(
         with np.errstate(over="ignore", invalid="ignore"):
             deviations = np.maximum(squares - total * (total / np.maximum(coverage, 1)), 0)
             sums = np.where(coverage > 0, total + first * coverage, 0)
-        sample_variance = deviations / np.maximum(coverage.astype(np.int64) - 1, 1)
+        sample_variance = _not_faint(data, deviations / np.maximum(coverage.astype(np.int64) - 1, 1))
     if not all(np.isfinite(part).all() for part in (sums, squares)):
         _raise_not_finite(data)
     return sums, sample_variance
@@ -187,6 +187,23 @@ def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         for number, view in enumerate(views.tolist()):
             images[number] = np.asarray(data.radiance[view // L, view % L]).reshape(H, -1)
         yield views, images[: views.size]
+
+
+def _not_faint(data: Views, variance: np.ndarray) -> np.ndarray:
+    """The variance; raises `InputError` if no difference in the data has a square that its type can hold."""
+    least = float(np.finfo(variance.dtype).tiny)
+    if variance.size and variance.max() >= least:
+        return variance
+    grid = data.grid
+    views = (data.view(k, l) for k, l in np.ndindex(grid.rows, grid.cols))
+    lowest, highest = np.array([(view.min(), view.max()) for view in views], dtype=np.float64).T
+    most = float(highest.max()) - float(lowest.min())
+    if 0 < most < np.sqrt(least):
+        raise InputError(
+            f"radiance: differences of at most {most:.2g} are too small for their variance to be a number of "
+            f"{variance.dtype}; multiply all values by a constant"
+        )
+    return variance
 
 
 def _raise_not_finite(data: Views) -> None:

@@ -52,7 +52,8 @@ def reconstruct(
     even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
 
     Raises `InputError` for a depth not above 0, a subpixel division below 1, options that do not go together,
-    radiance that is not finite or too large to be added up, and counts too large for their exact variance.
+    radiance that is not finite, too large to be added up or too faint for a variance, and counts too large
+    for their exact variance.
 
     Three cameras count a photon each of a point at 500 mm, where the disparity is 10 px:
 

@@ -102,6 +102,24 @@ def test_variances_that_no_number_holds_are_refused(value: float, dtype: type, s
         pcii.reconstruct(views, FAR_MM, subpixel=subpixel, variance=True)
 
 
+@pytest.mark.parametrize("subpixel", [1, 2])
+@pytest.mark.parametrize(("value", "dtype"), [(1e-23, np.float32), (1e-300, np.float64)])
+def test_variances_that_would_vanish_are_refused(value: float, dtype: type, subpixel: int) -> None:
+    """The samples differ, so that 0 would be wrong."""
+    if subpixel == 2 and dtype is np.float32:
+        pytest.skip("fine voxels are made in double precision")
+    grid = unit_grid(3, 3, 4, 4)
+    light = np.zeros((*grid.shape_KLHW, 1), dtype)
+    light[1] = value
+    for radiance in (light, Reader(light)):
+        if isinstance(radiance, Reader) and dtype is np.float32:
+            continue  # added in double precision, which holds the squares
+        with pytest.raises(
+            pcii.InputError, match=r"^radiance: differences of at most 1e-.* are too small for"
+        ):
+            pcii.reconstruct(pcii.Views(radiance, grid), FAR_MM, subpixel=subpixel, variance=True)
+
+
 def test_a_variance_just_below_the_largest_number_is_right() -> None:
     """100 samples of which half are 1e152: the square of their sum is infinite, the variance is not."""
     grid = unit_grid(10, 10, 1, 1)
@@ -221,7 +239,7 @@ def test_entropy_knows_no_unit(top: float) -> None:
 # Depth does not depend on the unit of radiance
 
 
-@pytest.mark.parametrize("method", ["posterior", "structure-tensor"])
+@pytest.mark.parametrize("method", ["posterior", "structure-tensor", "variance-sweep"])
 @pytest.mark.parametrize("exponent", [-1000, -120, -40, 40, 120, 960])
 def test_depth_does_not_depend_on_the_unit_of_radiance(method: str, exponent: int) -> None:
     grid = unit_grid(3, 3, 32, 32, (4.0, 4.0))
