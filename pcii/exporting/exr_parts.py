@@ -36,6 +36,10 @@ def write_exr_parts(dataset: Dataset, folder: Path) -> None:
         raise InputError(
             f"{dataset.path}: a pixel has more than the {MOST_PHOTONS} photons that EXR holds; export events"
         )
+    if dataset.truth is not None and not np.array_equal(dataset.truth.z_mm, np.float32(dataset.truth.z_mm)):
+        raise InputError(
+            f"{dataset.path}: its true depths have more digits than the float32 of EXR; export events"
+        )
     comments = _comments(dataset)
     parts = []
     rows, cols = number_width(grid.rows, 2), number_width(grid.cols, 2)

@@ -1,7 +1,7 @@
 """Sub-aperture images: a PNG for each view, named by row and column of its camera, and the cameras as JSON.
 
     counts/03_04.png    photons of each pixel: the number itself, 8 bits if that is enough, else 16
-    radiance/03_04.png  radiance, 16 bits: 65535 is `full_scale` of camera.json, 0 and below are 0
+    radiance/03_04.png  radiance, 16 bits: 65535 is `full_scale` of camera.json
     .../camera.json     the grid, and what the numbers of the images mean
 
 Images of a Bayer sensor stay mosaics, in grey.
@@ -35,7 +35,7 @@ def write_sub_aperture_images(dataset: Dataset, folder: Path) -> None:
         _write_counts(dataset.counts, dataset.path, folder / "counts")
     if dataset.views is not None:
         unit = str(dataset.manifest.get("radiance_unit", "1"))
-        _write_radiance(dataset.views, unit, folder / "radiance")
+        _write_radiance(dataset.views, unit, dataset.path, folder / "radiance")
 
 
 def _write_counts(counts: PhotonCounts, path: Path, folder: Path) -> None:
@@ -53,13 +53,18 @@ def _write_counts(counts: PhotonCounts, path: Path, folder: Path) -> None:
     _write_camera(counts.grid, counts.cfa, meaning, folder)
 
 
-def _write_radiance(views: Views, unit: str, folder: Path) -> None:
+def _write_radiance(views: Views, unit: str, path: Path, folder: Path) -> None:
     cameras = list(np.ndindex(views.grid.rows, views.grid.cols))
-    brightest = max(float(views.view(k, l).max()) for k, l in cameras)
+    ends = [(float(image.min()), float(image.max())) for image in (views.view(k, l) for k, l in cameras)]
+    darkest, brightest = min(low for low, _ in ends), max(high for _, high in ends)
+    if darkest < 0:
+        raise InputError(
+            f"{path}: radiance goes down to {darkest:.3g}, and PNG holds nothing below 0; export exr"
+        )
     full_scale = brightest if brightest > 0 else 1.0
     folder.mkdir()
     for k, l in cameras:
-        share = np.clip(views.view(k, l).astype(np.float64) / full_scale, 0, 1)
+        share = views.view(k, l).astype(np.float64) / full_scale
         image = np.round(MOST[16] * share).astype(np.uint16)
         write_png(folder / _name(views.grid, k, l), image[..., 0] if image.shape[2] == 1 else image)
     meaning = {"quantity": "radiance", "unit": unit, "full_scale": full_scale, "bits": 16}

@@ -28,7 +28,7 @@ def import_counts(
 ) -> PhotonCounts:
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
-    A file of a view is a TIFF of any number of pages, or a grey PNG of 1, 8 or 16 bits; for `pattern` and
+    A file of a view is a TIFF, each with as many pages, or a grey PNG of 1, 8 or 16 bits; for `pattern` and
     `grid` see `import_images`. An array, or a .npy or .npz file of one, is (K, L, H, W) or, with N frames,
     (K, L, N, H, W). Raises `InputError` for counts that are negative or fractional, in any frame.
     """

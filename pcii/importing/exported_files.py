@@ -129,7 +129,7 @@ def _parts(path: Path) -> Exported:
         if CENTRE in parts:
             z_mm, object_id = (parts[CENTRE][name] for name in ("Z", "objectId"))
             named = {int(key): str(name) for key, name in told.get("objects", {}).items()}
-            truth = Truth(z_mm, object_id.astype(np.int16), named)
+            truth = Truth(z_mm, object_id.astype(np.int32), named)
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
     if not images:

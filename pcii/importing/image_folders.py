@@ -31,7 +31,7 @@ def import_images(
     """Radiance of the pictures of a folder whose names fit a pattern such as "{col}_{row}.png".
 
     Names hold {row} and {col}, or {index}, which counts along the rows of a `grid` (K, L); without `grid` it
-    is square. Pictures are PNG, JPEG, TIFF or EXR, of 8 or 16 bits or of floats, grey or RGB, and all of one
+    is square. Pictures are PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one
     kind. Whole numbers are sRGB and floats are linear, unless `encoding` says otherwise. `cfa` declares that
     grey pictures are Bayer mosaics. Raises `InputError`, naming a file, for what does not fit.
     """
@@ -48,7 +48,7 @@ def import_images(
 
 
 def headers_of(files: np.ndarray, *, pages: bool = False) -> np.ndarray:
-    """Headers (K, L), object, of pictures that all have one size and type; `InputError` if one differs.
+    """Headers (K, L), object, of pictures of one size, type and number of pages; `InputError` if one differs.
 
     Pictures of several pages are refused unless `pages`.
     """
@@ -69,7 +69,7 @@ def radiance_of(picture: Picture, encoding: Encoding | None) -> np.ndarray:
     if picture.dtype == np.bool_:
         raise InputError(f"{picture.path}: has one bit per pixel, which is a photon count; use --counts")
     try:
-        return to_radiance(next(decode(picture)), encoding)
+        return to_radiance(next(decode(picture)), encoding, picture.most)
     except InputError as fault:
         prefix = "" if str(fault).startswith(str(picture.path)) else f"{picture.path}: "
         raise InputError(f"{prefix}{fault}") from None

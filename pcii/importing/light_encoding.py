@@ -22,12 +22,12 @@ def check_encoding(encoding: Any) -> None:
         raise InputError(f"encoding: expected srgb, linear, or a gamma from {ends}, got {encoding!r}")
 
 
-def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
-    """Linear radiance, float32, of whole numbers (of 1 at the largest of their type) or of floats.
+def to_radiance(numbers: np.ndarray, encoding: Encoding | None, most: int | None = None) -> np.ndarray:
+    """Linear radiance, float32, of whole numbers (of 1 at `most`) or of floats.
 
-    Without an encoding whole numbers are sRGB, as in nearly all picture files, and floats are linear.
-    Raises `InputError` for numbers that are NaN or infinite, for encoded ones below 0, and for light that is
-    too bright for float32.
+    `most` is by default the largest number of the type. Without an encoding whole numbers are sRGB, as in
+    nearly all picture files, and floats are linear. Raises `InputError` for numbers that are NaN or infinite,
+    for encoded ones below 0, and for light that is too bright for float32.
 
     >>> to_radiance(np.array([0, 128, 255], np.uint8), None).astype(float).round(3).tolist()
     [0.0, 0.216, 1.0]
@@ -39,10 +39,10 @@ def to_radiance(numbers: np.ndarray, encoding: Encoding | None) -> np.ndarray:
         raise InputError("holds NaN or infinity; radiance is finite")
     if encoding is None:
         encoding = "srgb" if whole else "linear"
+    full = most or (np.iinfo(numbers.dtype).max if whole else 1)
     if encoding == "srgb" and whole:  # few values are many pixels
-        table = srgb_to_linear(np.arange(np.iinfo(numbers.dtype).max + 1, dtype=numbers.dtype))
-        return table.astype(np.float32)[numbers]
-    share = numbers / np.float32(np.iinfo(numbers.dtype).max) if whole else numbers
+        return srgb_to_linear(np.arange(full + 1) / full).astype(np.float32)[numbers]
+    share = numbers / np.float32(full) if whole else numbers
     if encoding != "linear" and not whole and share.size and share.min() < 0:
         raise InputError("holds numbers below 0, which no encoded light has")
     with np.errstate(over="ignore"):

@@ -1,4 +1,4 @@
-"""Pages of TIFF files: grey or RGB, of 8 or 16 bits or of floats."""
+"""Pages of TIFF files: grey or RGB, of up to 16 bits or of floats."""
 
 import logging
 from collections.abc import Iterator
@@ -14,8 +14,8 @@ MOST_PAGES = 1 << 20
 TYPES = ("bool", "uint8", "uint16", "float16", "float32", "float64")
 
 
-def tiff_header(path: Path) -> tuple[tuple[int, int, int], Any, int]:
-    """Shape (H, W, C) and dtype of the first page, and the number of pages; `InputError` if unsupported."""
+def tiff_header(path: Path) -> dict[str, Any]:
+    """What `Picture` says of the first page, and the number of pages; `InputError` if unsupported."""
     from tifffile import PHOTOMETRIC, TiffFile
 
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # faults are raised, not logged
@@ -28,14 +28,18 @@ def tiff_header(path: Path) -> tuple[tuple[int, int, int], Any, int]:
         if page.photometric not in known:
             name = getattr(page.photometric, "name", page.photometric)
             raise InputError(f"a TIFF picture of the kind {name}; save it as RGB or grey")
-        if page.extrasamples:
-            raise InputError("has an alpha channel; save it without transparency")
-        height, width, channels = page.imagelength, page.imagewidth, page.samplesperpixel
-        if channels not in (1, 3):
-            raise InputError(f"has {channels} channels; expected 1 or 3")
         if str(page.dtype) not in TYPES:
             raise InputError(f"has pixels of the type {page.dtype}; save it in 8 or 16 bits, or as float32")
-        return (height, width, channels), np.dtype(page.dtype), count
+        dtype, alpha = np.dtype(page.dtype), len(page.extrasamples) == 1
+        fewer = dtype.kind == "u" and page.bitspersample < 8 * dtype.itemsize
+        return {
+            "shape": (page.imagelength, page.imagewidth, page.samplesperpixel - alpha),
+            "dtype": dtype,
+            "pages": count,
+            "bits": page.bitspersample if fewer else None,
+            "alpha": alpha,
+            "orientation": page.tags.valueof(274, default=1),
+        }
 
 
 def decode_tiff(path: Path) -> Iterator[np.ndarray]:

@@ -88,6 +88,13 @@ def test_more_photons_than_16_bits_hold_are_refused(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data"]
 
 
+def test_radiance_below_0_is_not_cut_off(tmp_path):
+    radiance = np.ones((*GRID.shape_KLHW, 3), np.float32)
+    radiance[1, 2, 3, 4, 0] = -0.25
+    data = pcii.save_dataset(tmp_path / "data", pcii.Views(radiance, GRID)).path
+    assert "down to -0.25" in one_sentence(lambda: export_dataset(data, "saii", tmp_path / "out"), data)
+
+
 @pytest.mark.parametrize("cfa", [None, "RGGB"])
 def test_radiance_comes_back_from_png_to_half_a_step(tmp_path, cfa):
     grid = unit_grid(2, 3, 6, 8, pitch_mm=(9.0, 5.0), shear_px=(1.5, -2.0))

@@ -10,7 +10,6 @@ import tifffile
 from PIL import Image
 
 from pcii.importing.camera_order import Optics
-from pcii.io.dataset_layout import write_exr_safely
 
 OPTICS = Optics(pitch_mm=(2.0, 2.0), focal_mm=35.0, sensor_mm=36.0)
 H, W = 6, 8
@@ -26,21 +25,32 @@ def numbers(k: int, l: int, dtype: Any = np.uint8, channels: int = 3) -> np.ndar
 def write(path: Path, image: np.ndarray, compression: str | None = None) -> None:
     """Write an image (H, W, C) in the format of the path's ending, in all of its bits."""
     if path.suffix == ".exr":
-        write_exr_safely(path, image)
+        write_exr(path, image)
     elif path.suffix == ".tif":
-        kind = "rgb" if image.shape[2] == 3 else "minisblack"
-        tifffile.imwrite(path, image.squeeze(), photometric=kind, compression=compression)
+        kind = "rgb" if image.shape[2] >= 3 else "minisblack"
+        more = {"extrasamples": ["unassalpha"], "planarconfig": "contig"} if image.shape[2] in (2, 4) else {}
+        tifffile.imwrite(path, image.squeeze(), photometric=kind, compression=compression, **more)
     elif path.suffix == ".png" and image.dtype == np.uint16:
         path.write_bytes(png16(image))
     else:
         Image.fromarray(image.squeeze()).save(path)
 
 
+def write_exr(path: Path, image: np.ndarray) -> None:
+    import OpenEXR
+
+    names = {1: "Y", 2: "YA", 3: "RGB", 4: "RGBA"}[image.shape[2]]
+    planes = {name: np.ascontiguousarray(image[..., c], np.float32) for c, name in enumerate(names)}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with OpenEXR.File(header, planes) as file:
+        file.write(str(path))
+
+
 def png16(image: np.ndarray) -> bytes:
     """A PNG file of 16 bits by the specification, without a library that might share a fault."""
     height, width, channels = image.shape
     rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in image)
-    header = struct.pack(">IIBBBBB", width, height, 16, 2 if channels == 3 else 0, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, 0)
     return (
         b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND")
     )

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stored_datasets import make_dataset, one_sentence
+from stored_datasets import DENSE, GRID, make_dataset, one_sentence
 
 import pcii
 from pcii.app.commands import app
@@ -61,6 +61,25 @@ def test_parts_of_an_exr_file_come_back(dataset: pcii.Dataset, tmp_path: Path) -
     truth, known = the_truth(found.truth), the_truth(dataset.truth)
     assert np.array_equal(truth.z_mm, known.z_mm)
     assert truth.names == known.names
+
+
+@pytest.mark.parametrize("format", ["events", "exr"])
+def test_objects_with_large_numbers_stay_apart(tmp_path: Path, format) -> None:
+    object_id = np.arange(20).reshape(4, 5) + 10**9 - 20
+    truth = Truth(np.full((4, 5), 540.0), object_id, {int(key): f"no. {key}" for key in object_id.flat})
+    counts = pcii.PhotonCounts.from_dense(DENSE, GRID)
+    made = pcii.save_dataset(tmp_path / "made", counts, truth)
+    again = the_truth(import_exported(pcii.export_dataset(made, format, tmp_path / "out")).truth)
+    assert np.array_equal(again.object_id, object_id)
+    assert again.names == truth.names
+
+
+def test_exr_refuses_depths_that_it_would_round(tmp_path: Path) -> None:
+    truth = Truth(np.full((4, 5), 540.1), np.zeros((4, 5), int), {})
+    path = pcii.save_dataset(tmp_path / "made", pcii.PhotonCounts.from_dense(DENSE, GRID), truth).path
+    assert "more digits" in one_sentence(lambda: pcii.export_dataset(path, "exr", tmp_path / "out"), path)
+    events = import_exported(pcii.export_dataset(path, "events", tmp_path / "events"))
+    assert np.array_equal(the_truth(events.truth).z_mm, truth.z_mm)
 
 
 @pytest.mark.parametrize("format", ["events", "exr"])

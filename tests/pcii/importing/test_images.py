@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image
 
@@ -43,6 +44,34 @@ def test_all_bits_of_every_format_arrive(tmp_path: Path, ending, dtype, channels
     for k, l in np.ndindex(2, 3):
         expected = numbers(k, l, dtype, channels).astype(np.float64) / most
         np.testing.assert_allclose(views.view(k, l), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("ending", "dtype"),
+    [("png", "uint8"), ("png", "uint16"), ("tif", "uint8"), ("tif", "uint16"), ("exr", "float32")],
+)
+def test_alpha_that_is_opaque_everywhere_is_left_out(tmp_path: Path, ending, dtype, channels) -> None:
+    image = numbers(0, 0, dtype, channels)
+    opaque = np.iinfo(dtype).max if dtype.startswith("u") else 1
+    write(tmp_path / f"0_0.{ending}", np.dstack([image, np.full((H, W), opaque, dtype)]))
+    write(tmp_path / f"1_0.{ending}", image)  # without alpha
+    views = import_images(tmp_path, PATTERN % ending, OPTICS, encoding="linear")
+    np.testing.assert_allclose(views.view(0, 0), image.astype(np.float64) / opaque, rtol=1e-6)
+    np.testing.assert_array_equal(views.view(0, 0), views.view(0, 1))
+
+
+@pytest.mark.parametrize("bits", [4, 10, 12, 14])
+def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: int) -> None:
+    share = np.linspace(0, 1, H * W).reshape(H, W)
+    stored = np.rint(share * (2**bits - 1)).astype(np.uint8 if bits < 8 else np.uint16)
+    tifffile.imwrite(tmp_path / "0_0.tif", stored, bitspersample=bits, photometric="minisblack")
+    half_a_step = 0.5 / (2**bits - 1)
+    linear = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear").view(0, 0)[..., 0]
+    np.testing.assert_allclose(linear, share, atol=1.01 * half_a_step)
+    decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
+    expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
+    np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])

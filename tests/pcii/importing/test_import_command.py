@@ -164,22 +164,42 @@ def cmyk(root: Path) -> None:
     (root / "0_0.png").write_bytes(buffer.getvalue())
 
 
-def turned(root: Path) -> None:
+def turned(kind: str) -> Make:
+    def make(root: Path) -> None:
+        exif = Image.Exif()
+        exif[0x0112] = 6
+        Image.new("RGB", (W, H)).save(root / "0_0.png", kind, exif=exif)
+
+    return make
+
+
+def turned_after_its_pixels(root: Path) -> None:
     exif = Image.Exif()
     exif[0x0112] = 6
-    buffer = io.BytesIO()
-    Image.new("RGB", (W, H)).save(buffer, "JPEG", exif=exif)
-    (root / "0_0.png").write_bytes(buffer.getvalue())
+    path = root / "0_0.png"
+    write(path, numbers(0, 0, np.uint16))
+    path.write_bytes(path.read_bytes()[:-12] + chunk(b"eXIf", exif.tobytes()[6:]) + chunk(b"IEND"))
 
 
 def exr_alpha(root: Path) -> None:
+    write(root / "0_0.exr", np.full((H, W, 4), 0.5))
+
+
+def exr_of_two_parts(root: Path) -> None:
     import OpenEXR
 
-    planes = {name: np.ones((H, W), np.float32) for name in "RGBA"}
-    with OpenEXR.File(
-        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, planes
-    ) as file:
+    parts = [
+        OpenEXR.Part({}, {"RGB": np.ones((H, W, 3), np.float32)}, name=name) for name in ("left", "right")
+    ]
+    with OpenEXR.File(parts) as file:
         file.write(str(root / "0_0.exr"))
+
+
+def frames(root: Path) -> Path:
+    """Of the first view 7 frames, of the second 5."""
+    for number, pages in enumerate((7, 5)):
+        tifffile.imwrite(root / f"{number}_0.tif", np.ones((pages, H, W), np.uint8), photometric="minisblack")
+    return root
 
 
 def exr_nan(root: Path) -> None:
@@ -290,11 +310,14 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("mixed bits", folder(lambda r: write(r / "1_1.png", numbers(0, 0, np.uint16))), NAMED, "of uint16, where .* of uint8"),
     ("mixed channels", folder(lambda r: write(r / "1_1.png", numbers(0, 0, channels=1))), NAMED, "1 channels .* 3 channels"),
     ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
-    ("grey alpha", folder(picture("LA")), NAMED, "0_0.png: has an alpha channel"),
+    ("grey alpha", folder(picture("LA"), channels=1), NAMED, "0_0.png: has an alpha channel"),
     ("palette", folder(picture("P")), NAMED, "0_0.png: has a palette"),
     ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
     ("cmyk", folder(cmyk), NAMED, "0_0.png: a CMYK picture"),
-    ("turned", folder(turned), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("turned JPEG", folder(turned("JPEG")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("turned TIFF", folder(turned("TIFF")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("turned PNG", folder(turned("PNG")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("turned after its pixels", folder(turned_after_its_pixels, dtype=np.uint16), NAMED, r"has to be turned \(EXIF orientation 6\)"),
     ("cut off", folder(cut("1_0.png")), NAMED, "1_0.png: damaged or cut off"),
     ("cut off, 16 bits", folder(cut("1_0.png"), dtype=np.uint16), NAMED, "1_0.png: damaged or cut off"),
     ("no picture", folder(content("0_0.png", b"GIF89a" + bytes(99))), NAMED, "0_0.png: not a PNG, JPEG, TIFF or EXR"),
@@ -306,6 +329,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("no pixels", folder(content("0_0.png", png_of(0, 5))), NAMED, "0 x 5 px"),
     ("4 bits", folder(content("0_0.png", png_of(W, H, bits=4, colour=0))), NAMED, "a PNG picture of 4 bits"),
     ("alpha in EXR", folder(exr_alpha, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "has an alpha channel"),
+    ("parts of EXR", folder(exr_of_two_parts, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: has 2 parts"),
     ("NaN in EXR", folder(exr_nan, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: holds NaN or infinity"),
     ("cut EXR", folder(cut("0_0.exr"), **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: "),
     ("cut TIFF", folder(cut("1_0.tif"), **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "1_0.tif: "),
@@ -325,6 +349,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("unknown array", npz, [*CAMERAS, "--array", "c"], "has no array 'c'"),
     ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),
     ("fractional counts", array(LIGHT / 2), [*CAMERAS, "--counts"], "must be whole numbers"),
+    ("other frames", frames, ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "1_0.tif: .* 5 pages, where .* 7 pages"),
     ("counts in colour", folder(), [*NAMED, "--counts"], "has 3 channels; photon counts have one"),
     ("counts and photons", folder(), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
     ("counts and curve", folder(), [*NAMED, "--counts", "--linear"], "--counts: photon counts are linear"),
