@@ -145,6 +145,7 @@ def evaluate(
     out: Out,
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
+    z_mm: Depths = (),
     crew: Annotated[Crew, Parameter(name="*")] = ALONE,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
@@ -168,11 +169,16 @@ def evaluate(
         one); may be repeated. Default: all that can take the data.
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
+    z_mm
+        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that each recipe
+        names.
     """
     from pcii.evaluation.comparison import evaluate as compare
 
     with Stages() as report:
-        evaluation = compare(datasets, out, methods=method, budgets=budget, crew=crew, report=report)
+        evaluation = compare(
+            datasets, out, methods=method, budgets=budget, z_mm=z_mm, crew=crew, report=report
+        )
     for again in evaluation["again"]:
         say(f"made again: {again['rows']} scores of {', '.join(again['methods'])}, since {again['why']}")
     say(f"report: {out / 'evaluation.html'}")

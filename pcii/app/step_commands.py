@@ -63,7 +63,9 @@ def reconstruct(
         say_next("pcii", "segment", dataset, *(f"--z-mm={z:g}" for z in z_mm), "-o", out, *_budget(data))
 
 
-def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget = None) -> None:
+def depth(
+    dataset: Path, *, out: Out, z_mm: Depths = (), method: str | None = None, budget: Budget = None
+) -> None:
     """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
     Example of use:
@@ -76,6 +78,9 @@ def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget 
         A dataset folder.
     out
         Folder for the results.
+    z_mm
+        Depths of things in mm, as in `pcii segment`: where the recipe names no range, depth is searched from
+        4/5 of the nearest to 5/4 of the farthest. Default: the depths that the recipe names.
     method
         posterior (default) or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
         structure-tensor; or one that a package registers.
@@ -85,7 +90,7 @@ def depth(dataset: Path, *, out: Out, method: str | None = None, budget: Budget 
     from pcii.io.suggested_depths import depth_range_of
 
     data = opened(dataset, budget)
-    z_range = depth_range_of(data)
+    z_range = depth_range_of(data, z_mm)
     depth_map = estimate_depth(data.counts_or_views, z_range, method=method)
     with Results(out, data).writing() as results:
         say(f"{results.save_depth(depth_map)}")

@@ -50,6 +50,7 @@ def evaluate(
     *,
     methods: Sequence[str] = (),
     budgets: Sequence[float | str] = (),
+    z_mm: Sequence[float] = (),
     crew: Crew = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
@@ -58,7 +59,8 @@ def evaluate(
     `datasets` are dataset folders, collections, or folders of dataset folders. `methods` are those of
     `pcii.removal_methods()`, and those of `pcii.depth_methods()` as "depth:NAME"; "depth" is the default one
     of depth. Without, all that can take the data. `budgets` default to all that each dataset has; among them
-    "full-light", its radiance, which some methods of depth take. `crew` does the work.
+    "full-light", its radiance, which some methods of depth take. `z_mm` are depths to look at instead of
+    those that recipes name. `crew` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
     unless other software made them (see `pcii.evaluation.provenance`): `again` in the result says how many
@@ -76,7 +78,7 @@ def evaluate(
     `evaluate(["out/twenty"], "out/compared")["groups"][0]["results"][0]["object"]["iou"]["mean"]`.
     """
     folder = Path(out)
-    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], methods, budgets)
+    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], methods, budgets, z_mm)
     claim_rows(folder)
     with all_rows(folder) as rows:
         made_by = {key_of(row): row.get("software") for row in rows}
@@ -179,9 +181,9 @@ class Measuring:
 
         def work() -> Any:
             if estimator is not None:
-                return estimate_depth(seen, depth_range_of(data), method=estimator)
+                return estimate_depth(seen, depth_range_of(data, task.z_mm), method=estimator)
             assert isinstance(seen, PhotonCounts)
-            return segment(seen, planes_of(data, ()), method=task.method)
+            return segment(seen, planes_of(data, task.z_mm), method=task.method)
 
         if (task.budget, task.method) not in self.warm:
             work()
@@ -190,7 +192,7 @@ class Measuring:
             self.software[task.method] = software_of(task.method)
         seconds, estimate = timed(work)
         photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
-        row = described(data) | {
+        row = described(data, task.z_mm) | {
             "budget": task.budget,
             "photons_per_view": photons,
             "method": task.method,
@@ -201,7 +203,7 @@ class Measuring:
         }
         if estimator is not None:
             depth = dict(score(None, estimate, data.truth, grid=data.grid).depth)
-            return row | {"depth": depth} | self._bounds(data, seen)
+            return row | {"depth": depth} | self._bounds(data, seen, task.z_mm)
         result = score(estimate, None, data.truth)
         planes = [
             {name: value for name, value in (bound | plane).items() if name != "method"}
@@ -209,13 +211,13 @@ class Measuring:
         ]
         return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 
-    def _bounds(self, data: Dataset, seen: PhotonCounts | Views) -> Row:
+    def _bounds(self, data: Dataset, seen: PhotonCounts | Views, z_mm: Sequence[float]) -> Row:
         """`bounds` of the depth of objects from these photons, if there is radiance to know textures from."""
         views, truth = data.views, data.truth
-        if not isinstance(seen, PhotonCounts) or views is None or not data.analysis.get("z_mm"):
+        if not isinstance(seen, PhotonCounts) or views is None or not (z_mm or data.analysis.get("z_mm")):
             return {}
         assert truth is not None
-        planes, identity = planes_of(data, ()), identity_of(data.manifest)
+        planes, identity = planes_of(data, z_mm), identity_of(data.manifest)
         if self.full_light is None or self.full_light[0] != identity:
             self.full_light = identity, reconstruct(views, planes)
         # By their origin where that is known, so no sections are needed to count photons.

@@ -8,7 +8,7 @@ line (see `pcii.io.sealed_json`).
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -24,7 +24,7 @@ FULL_LIGHT: Final = "full-light"
 Budget = float | Literal["full-light"] | None
 """Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
 Row = dict[str, Any]
-Key = tuple[str, Budget, str]
+Key = tuple[str, Budget, str, tuple[float, ...]]
 
 
 def budget_of(text: str) -> float | Literal["full-light"]:
@@ -69,19 +69,24 @@ def _hash(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def described(dataset: Dataset) -> Row:
-    """The fields of a row that describe its dataset."""
+def described(dataset: Dataset, z_mm: Sequence[float]) -> Row:
+    """The fields of a row that describe its dataset, seen at the depths `z_mm` or, of none, at its own."""
     manifest = dataset.manifest
     recipe = manifest.get("recipe", {})
-    return {
+    settings = dict(_settings({name: recipe[name] for name in recipe if name not in ("title", "seed")}))
+    row = {
         "dataset": dataset.name,
         "identity": identity_of(manifest),
         "recipe": recipe_of(manifest),
         "title": manifest.get("title") or dataset.name,
         "scene": recipe.get("scene"),
         "seed": recipe.get("seed"),
-        "settings": dict(_settings({name: recipe[name] for name in recipe if name not in ("title", "seed")})),
+        "settings": settings,
     }
+    if not z_mm:
+        return row
+    apart = {"settings": settings | {"analysis.z_mm": [*z_mm]}, "recipe": _hash([row["recipe"], *z_mm])[:16]}
+    return row | apart | {"z_mm": [*z_mm]}
 
 
 def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -94,8 +99,8 @@ def _settings(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
 
 
 def key_of(row: Mapping[str, Any]) -> Key:
-    """Identity of the dataset, photon budget and method of a row."""
-    return row["identity"], row["budget"], row["method"]
+    """Identity of the dataset, photon budget and method of a row, and depths where others were asked for."""
+    return row["identity"], row["budget"], row["method"], tuple(row.get("z_mm", ()))
 
 
 def claim_rows(out: Path) -> None:

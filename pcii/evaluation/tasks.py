@@ -14,16 +14,20 @@ from pcii.io.suggested_depths import depth_range_of, planes_of
 
 @dataclass(frozen=True)
 class Task:
-    """A dataset, photon budget or full light, and method (its full name) to score."""
+    """A dataset, photon budget or full light, and method (its full name) to score.
+
+    `z_mm` are depths to look at instead of those that the dataset's recipe names, if any.
+    """
 
     dataset: Dataset
     budget: Budget
     method: str
+    z_mm: tuple[float, ...]
 
     @property
     def key(self) -> Key:
         """Key of its row."""
-        return identity_of(self.dataset.manifest), self.budget, self.method
+        return identity_of(self.dataset.manifest), self.budget, self.method, self.z_mm
 
     @property
     def data(self) -> Dataset:
@@ -34,9 +38,12 @@ class Task:
 
 
 def tasks_of(
-    datasets: Sequence[Dataset], methods: Sequence[str], budgets: Sequence[float | str]
+    datasets: Sequence[Dataset],
+    methods: Sequence[str],
+    budgets: Sequence[float | str],
+    z_mm: Sequence[float] = (),
 ) -> list[Task]:
-    """The tasks, dataset by dataset, each dataset once.
+    """The tasks, dataset by dataset, each dataset once, at the depths `z_mm` or else those of its recipe.
 
     Without `methods` all that can take the data; without `budgets` all that a dataset has, and full light if
     it has radiance. Raises `InputError` for an unknown method, for a dataset without truth, two views, depths
@@ -53,19 +60,19 @@ def tasks_of(
         if dataset.grid.view_count < 2:
             raise InputError(f"{dataset.path}: one view has no depth; at least 2 cameras are needed")
         lights = _lights(dataset, budgets)
-        by_light = {light: _names(dataset, methods, light) for light in lights}
+        by_light = {light: _names(dataset, methods, light, z_mm) for light in lights}
         if methods:
             _check_use(dataset, methods, lights)
         names = [name for each in by_light.values() for name in each]
-        if any(estimator_of(name) is None for name in names):
-            planes_of(dataset, ())
+        if z_mm or any(estimator_of(name) is None for name in names):
+            planes_of(dataset, z_mm)
         if any(estimator_of(name) is not None for name in names):
-            z_range_mm = depth_range_of(dataset)
+            z_range_mm = depth_range_of(dataset, z_mm)
             try:
                 check_range_mm(dataset.grid, z_range_mm)
             except InputError as fault:
                 raise InputError(f"{dataset.path}: {fault}") from None
-        each = [Task(dataset, light, name) for light in lights for name in by_light[light]]
+        each = [Task(dataset, light, name, tuple(z_mm)) for light in lights for name in by_light[light]]
         tasks.setdefault(identity_of(dataset.manifest), each)
     return [task for each in tasks.values() for task in each]
 
@@ -88,14 +95,14 @@ def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
     return list(dict.fromkeys(chosen or own))
 
 
-def _names(dataset: Dataset, methods: Sequence[str], light: Budget) -> list[str]:
+def _names(dataset: Dataset, methods: Sequence[str], light: Budget, z_mm: Sequence[float]) -> list[str]:
     """Full names of the methods to apply at a light, each once."""
     full_light = light == FULL_LIGHT
     if methods:
         found = (full_name(method, full_light=full_light) for method in methods)
         return list(dict.fromkeys(name for name in found if name is not None))
-    # Removal is of sections at depths that the dataset names.
-    has_planes = bool(dataset.analysis.get("z_mm"))
+    # Removal is of sections at depths that are named.
+    has_planes = bool(z_mm or dataset.analysis.get("z_mm"))
     return [name for name in methods_for(full_light=full_light) if has_planes or estimator_of(name)]
 
 

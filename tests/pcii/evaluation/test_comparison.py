@@ -405,6 +405,31 @@ def test_what_cannot_be_evaluated_is_refused_before_any_work(
     assert not out.exists()
 
 
+def test_depths_are_given_where_the_recipe_names_none(
+    series: Path, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    for path in find_datasets([series]):
+        write_manifest(path, {**read_manifest(path), "analysis": {}})
+    command = ["evaluate", str(series), "-o", str(out), "--method", "by count"]
+    assert command_line.run(cli.app, command) == 2
+    assert "names no depths; give them with --z-mm" in capsys.readouterr().err
+    assert command_line.run(cli.app, [*command, "--z-mm", "1", "--z-mm", "2"]) == 0
+    assert {plane["z_mm"] for row in rows_of(out) for plane in row["planes"]} == {1, 2}
+    calls.clear()
+    evaluation = evaluate([series], out, methods=["by count"], z_mm=[1, 2])
+    assert calls == []  # nothing is measured twice
+    assert result_of(evaluation, OWN, "by count")["object"]["iou"]["mean"] == pytest.approx(0.85)
+    # Other depths are another group, with figures of their own.
+    evaluation = evaluate([series], out, methods=["by count"], z_mm=[1])
+    planes = {
+        group["label"]: [plane["z_mm"] for plane in group["results"][0]["planes"]]
+        for group in evaluation["groups"]
+    }
+    assert sorted(planes.values()) == [[1], [1, 2]]
+    assert any("analysis.z_mm=[1]" in label for label in planes)
+
+
 def test_the_command_and_its_page(
     series: Path, tmp_path: Path, calls: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
