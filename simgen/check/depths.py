@@ -151,9 +151,14 @@ def _range_findings(facts: Facts) -> list[Finding]:
     text = f"depth maps look from {limits[0]:g} to {limits[1]:g} mm"
     if not outside:
         return [Finding("ok", "focus", f"{text}, where all objects are")]
-    near = min(limits[0], *(thing.z_mm.min() for thing in facts.seen))
-    far = max(limits[1], *(thing.z_mm.max() for thing in facts.seen))
+    near = float(min(thing.z_mm.min() for thing in facts.seen))
+    far = float(max(thing.z_mm.max() for thing in facts.seen))
+    misses = not any(((t.z_mm >= limits[0]) & (t.z_mm <= limits[1])).any() for t in facts.seen)
+    if not misses:
+        near, far = min(limits[0], near), max(limits[1], far)
     remedy = f"analysis.z_range_mm = [{np.floor(near):.0f}, {np.ceil(far):.0f}]"
+    if misses:
+        return [Finding("bad", "focus", f"{text}, where no object is", remedy)]
     return [Finding("warn", "focus", f"{text}, and part of {listed(outside)} is outside", remedy)]
 
 

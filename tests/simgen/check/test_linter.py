@@ -174,6 +174,14 @@ def test_objects_outside_the_depth_range_are_named() -> None:
     assert found[-1].remedy == "analysis.z_range_mm = [450, 545]"
 
 
+@pytest.mark.parametrize("z_range_mm", [[0.45, 0.75], [541, 600]])
+def test_a_depth_range_without_any_object_is_bad(z_range_mm: list[float]) -> None:
+    recipe = {"analysis": {"z_mm": [540], "z_range_mm": z_range_mm}}
+    found = focus_findings(facts(thing("one", 500, 540), thing("two", 601), recipe=recipe))
+    assert found[-1].verdict == "bad"
+    assert found[-1].remedy == "analysis.z_range_mm = [500, 601]"
+
+
 def test_views_overlap_by_hand() -> None:
     grid, z = at_disparity(4.0, cols=3)  # column shifts -4, 0, 4; row shifts -6, -2, 2, 6
     assert [shift.tolist() for shift in shifts_px(grid, z)] == [[-6, -2, 2, 6], [-4, 0, 4]]
