@@ -2,23 +2,56 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from pcii.base.errors import InputError
+from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
+from pcii.core.geometry import disparity_px
 from pcii.io.dataset import Dataset
 
 
 def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
-    """Focal planes at `z_mm`, else at the depths of the recipe; raises `InputError` if there are none."""
+    """Focal planes at `z_mm`, else at the depths of the recipe.
+
+    Raises `InputError` if there are none, or if no views overlap at one.
+    """
     depths = z_mm or dataset.analysis.get("z_mm") or ()
     if not len(depths):
         raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
-    return FocalPlanes.at_depths(dataset.grid, depths)
+    planes = FocalPlanes.at_depths(dataset.grid, depths)
+    _check_overlap(dataset.grid, planes.z_mm, "z_mm")
+    return planes
+
+
+def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
+    """Raise `InputError` if no neighbouring views overlap at one of the depths, as where metres are given.
+
+    There every camera sees other points than the next, so that nothing can be in focus.
+    """
+    sides = ((grid.cols, grid.width), (grid.rows, grid.height))
+    if grid.view_count == 1:
+        return
+
+    def overlap(z_mm: np.ndarray) -> np.ndarray:
+        shifts = zip(disparity_px(grid, z_mm), sides, strict=True)
+        return np.any([np.abs(px) < side for px, (cameras, side) in shifts if cameras > 1], axis=0)
+
+    for z in depths_mm[~overlap(depths_mm)][:1]:
+        across, down = disparity_px(grid, z)
+        metres = f"; if metres are meant, it is {1000 * z:g}" if overlap(1000 * z) else ""
+        raise InputError(
+            f"{name}: {z:g} mm is so near that no views overlap, of {grid.width} x {grid.height} px each and "
+            f"{across:.0f} x {down:.0f} px apart; depths are in mm{metres}"
+        )
 
 
 def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
     """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths."""
     suggested = dataset.analysis.get("z_range_mm")
     if suggested:
-        return float(suggested[0]), float(suggested[1])
+        near, far = float(suggested[0]), float(suggested[1])
+        _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
+        return near, far
     z = planes_of(dataset, z_mm).z_mm
     return 0.8 * float(z.min()), 1.25 * float(z.max())
