@@ -1,9 +1,14 @@
-"""What other installed packages add: entry points of a group, by name."""
+"""What others add: entry points of installed packages, by name, and calls of functions of theirs."""
 
+import inspect
 import re
-from collections.abc import Callable, Collection, Mapping
+import zlib
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from pcii.base.errors import InputError
 
@@ -42,13 +47,62 @@ def load_function(point: "EntryPoint", label: str) -> Callable[..., Any]:
     """
     try:
         function = point.load()
-    except Exception as fault:  # importing another package's module may raise anything
+    except (Exception, SystemExit) as fault:  # importing another package's module may raise anything
         raise InputError(f"{label} cannot be loaded: {type(fault).__name__}: {fault}") from fault
     if not callable(function):
         raise InputError(f"{label} is {type(function).__name__}, which cannot be called")
     return function
 
 
+def called(function: Callable[..., Any], label: str, takes: str, *inputs: object) -> Any:
+    """What a function of somebody else returns for these inputs, which are described by `takes`.
+
+    Raises `InputError`, which begins with `label`, if it does not take so many, fails, ends the program or
+    writes into arrays of the inputs: they are views that cannot be written to, unless somebody insists.
+    """
+    try:
+        signature = inspect.signature(function)
+    except ValueError:  # some compiled functions do not tell
+        signature = inspect.signature(lambda *_: None)
+    try:
+        signature.bind(*inputs)
+    except TypeError:
+        raise InputError(f"{label} must take {takes}, not {signature}") from None
+    parts = [part for value in inputs for part in _parts(value, type(value).__name__)]
+    before = [(name, members, {*members}, _checksums(members)) for name, members in parts]
+    try:
+        result = function(*inputs)
+    except (InputError, MemoryError):
+        raise
+    except (Exception, SystemExit) as fault:
+        raise InputError(f"{label} failed: {type(fault).__name__}: {fault}") from fault
+    for name, members, known, checksums in before:
+        for later in members.keys() - known:  # what was computed meanwhile, from members that are checked
+            members.pop(later, None)
+        if _checksums(members) != checksums:
+            raise InputError(f"{label} must not write into its input, and has changed {name}: read that anew")
+    return result
+
+
+def name_of(function: Callable[..., Any]) -> str:
+    """Name of a function, or of the type of what can be called like one."""
+    return getattr(function, "__name__", type(function).__name__)
+
+
 def package_of(point: "EntryPoint") -> str:
     """What errors call the package of an entry point."""
     return f"the package {point.dist.name}" if point.dist else "a package"
+
+
+def _parts(value: object, name: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Members of a dataclass and of those within it, each with its name."""
+    if is_dataclass(value):
+        yield name, vars(value)
+        for part, inner in list(vars(value).items()):
+            yield from _parts(inner, f"{name}.{part}")
+
+
+def _checksums(members: Mapping[str, object]) -> dict[str, int]:
+    found = list(members.items())  # at once: other threads may compute further ones
+    arrays = {name: np.ascontiguousarray(value) for name, value in found if isinstance(value, np.ndarray)}
+    return {name: zlib.crc32(array.data) for name, array in arrays.items()}

@@ -39,16 +39,16 @@ class Segmented(Brief):
     photon_in_focus: np.ndarray | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sections, Sections):
+            raise InputError(f"sections: expected Sections, got {type(self.sections).__name__}")
         expected = self.sections.counts.shape[:3]
-        if self.in_focus.dtype != np.bool_ or self.in_focus.shape != expected:
-            raise InputError(
-                f"in_focus: expected bool {expected}, got {self.in_focus.dtype} {self.in_focus.shape}"
-            )
+        if not _is_bool(self.in_focus) or self.in_focus.shape != expected:
+            raise InputError(f"in_focus: expected bool {expected}, got {_described(self.in_focus)}")
         kept = self.photon_in_focus
         if kept is not None:
-            if kept.dtype != np.bool_ or kept.ndim != 2 or kept.shape[0] != expected[0]:
+            if not _is_bool(kept) or kept.ndim != 2 or kept.shape[0] != expected[0]:
                 raise InputError(
-                    f"photon_in_focus: expected bool ({expected[0]}, events), got {kept.dtype} {kept.shape}"
+                    f"photon_in_focus: expected bool ({expected[0]}, events), got {_described(kept)}"
                 )
             object.__setattr__(self, "photon_in_focus", read_only(kept))
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
@@ -97,13 +97,17 @@ class DepthMap(Brief):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
     `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
-    true one, as the method states it: 0 where no depth is given. Raises `InputError` if the shapes differ.
+    true one, as the method states it: 0 where no depth is given. Raises `InputError` if the shapes differ, or
+    for what is no array of real numbers.
     """
 
     z_mm: np.ndarray
     confidence: np.ndarray
 
     def __post_init__(self) -> None:
+        for name, values in (("z_mm", self.z_mm), ("confidence", self.confidence)):
+            if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+                raise InputError(f"{name}: expected real numbers (H, W), got {_described(values)}")
         if self.z_mm.ndim != 2 or self.confidence.shape != self.z_mm.shape:
             raise InputError("z_mm, confidence: expected two maps (H, W) of the same shape")
         object.__setattr__(self, "z_mm", read_only(self.z_mm))
@@ -275,6 +279,15 @@ class Score(Brief):
             "depth": dict(self.depth),
             "bounds": dict(self.bounds),
         }
+
+
+def _is_bool(values: object) -> bool:
+    return isinstance(values, np.ndarray) and values.dtype == np.bool_
+
+
+def _described(values: object) -> str:
+    """What was given instead of an array that was expected."""
+    return f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
 
 
 def _checked_pixel(pixel: tuple[int, int], film: tuple[int, int]) -> tuple[int, int]:

@@ -6,13 +6,15 @@ Another package registers one as an entry point of the group `pcii.depth_methods
     my-method = "my_package:depth"
 
 `depth` is called with the `PhotonCounts` or `Views` and the range (near, far) in mm, and returns a `DepthMap`
-of their height and width.
+of their height and width, with depths above 0 or NaN, and confidence from 0 to 1.
 """
 
 from collections.abc import Callable
 
+import numpy as np
+
 from pcii.base.errors import InputError
-from pcii.base.extensions import load_function, package_of, registered
+from pcii.base.extensions import called, load_function, name_of, package_of, registered
 from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.focal_planes import check_data
 from pcii.core.images import Views
@@ -55,8 +57,8 @@ def estimate_depth(
     "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
     methods to compare with, which answer wherever there are samples.
 
-    Raises `InputError` for a range that is not 0 < near < far, a single view, or a method that is not known
-    or cannot take the data.
+    Raises `InputError` for a range that is not 0 < near < far, a single view, a method that is not known or
+    cannot take the data, or one of others that fails, writes into the data, or returns no such `DepthMap`.
 
     >>> import numpy as np
     >>> import pcii
@@ -71,7 +73,10 @@ def estimate_depth(
     z_range_mm = _checked_range_mm(data, z_range_mm)
     if method is None:
         method = DEFAULT_METHOD
-    estimate = method if callable(method) else find_depth_method(method, data)
+    if callable(method):
+        estimate = _checked(method, f"method: {name_of(method)!r}")
+    else:
+        estimate = find_depth_method(method, data)
     return estimate(data, z_range_mm)
 
 
@@ -114,16 +119,25 @@ def find_depth_method(name: str, data: PhotonCounts | Views) -> Method:
         names = ", ".join(depth_methods(data))
         raise InputError(f"method: no estimator of depth from {kind} is named {name!r}; use {names}")
     label = f"method: {name!r} of {package_of(others[name])}"
-    estimate = load_function(others[name], label)
+    return _checked(load_function(others[name], label), label)
 
-    def checked(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
-        found = estimate(data, z_range_mm)
+
+def _checked(estimate: Callable[..., object], label: str) -> Method:
+    """The method of a function that may do anything: it raises `InputError`, which begins with `label`."""
+
+    def method(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
+        found = called(estimate, label, "the data and the range of depths", data, z_range_mm)
         film = data.grid.height, data.grid.width
         if not isinstance(found, DepthMap) or found.z_mm.shape != film:
             raise InputError(f"{label} must return a pcii.DepthMap of {film[0]} x {film[1]} pixels")
+        z_mm, confidence = found.z_mm, found.confidence
+        if not np.all(np.isnan(z_mm) | ((z_mm > 0) & (z_mm < np.inf))):
+            raise InputError(f"{label} must return depths above 0 mm, or NaN where it has no answer")
+        if not np.all((confidence >= 0) & (confidence <= 1)):
+            raise InputError(f"{label} must return a confidence from 0 to 1, also where it has no answer")
         return found
 
-    return checked
+    return method
 
 
 def _built_in(data: PhotonCounts | Views | None) -> dict[str, Method]:

@@ -1,5 +1,6 @@
 """Methods compared over many datasets: each dataset, budget and method is scored and timed once."""
 
+import pickle
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -17,7 +18,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
-from pcii.evaluation.method_names import estimator_of
+from pcii.evaluation.method_names import Function, Method, estimator_of, named_functions
 from pcii.evaluation.provenance import differences, machine, software_of
 from pcii.evaluation.rows import (
     FULL_LIGHT,
@@ -48,7 +49,7 @@ def evaluate(
     datasets: Sequence[str | Path],
     out: str | Path,
     *,
-    methods: Sequence[str] = (),
+    methods: Sequence[Method] = (),
     budgets: Sequence[float | str] = (),
     z_mm: Sequence[float] = (),
     crew: Crew = ALONE,
@@ -58,9 +59,10 @@ def evaluate(
 
     `datasets` are dataset folders, collections, or folders of dataset folders. `methods` are those of
     `pcii.removal_methods()`, and those of `pcii.depth_methods()` as "depth:NAME"; "depth" is the default one
-    of depth. Without, all that can take the data. `budgets` default to all that each dataset has; among them
-    "full-light", its radiance, which some methods of depth take. `z_mm` are depths to look at instead of
-    those that recipes name. `crew` does the work.
+    of depth; or functions of one's own: of removal, or of depth as pairs ("depth:NAME", function), which are
+    measured every time, since nobody knows what they follow from. Without, all that can take the data.
+    `budgets` default to all that each dataset has; among them "full-light", its radiance, which some methods
+    of depth take. `z_mm` are depths to look at instead of those that recipes name. `crew` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
     unless other software made them (see `pcii.evaluation.provenance`): `again` in the result says how many
@@ -78,12 +80,15 @@ def evaluate(
     `evaluate(["out/twenty"], "out/compared")["groups"][0]["results"][0]["object"]["iou"]["mean"]`.
     """
     folder = Path(out)
-    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], methods, budgets, z_mm)
+    named = named_functions(methods)
+    if crew != ALONE:
+        _check_sendable(named)
+    tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
     claim_rows(folder)
     with all_rows(folder) as rows:
         made_by = {key_of(row): row.get("software") for row in rows}
-    software = {method: software_of(method) for method in dict.fromkeys(task.method for task in tasks)}
-    remaining = [task for task in tasks if made_by.get(task.key) != software[task.method]]
+    software = {task.method: _software(task) for task in {task.method: task for task in tasks}.values()}
+    remaining = [task for task in tasks if task.function or made_by.get(task.key) != software[task.method]]
     if len(remaining) < len(tasks):
         kept = len(tasks) - len(remaining)
         report("scores of an earlier run", kept, kept)
@@ -101,10 +106,15 @@ def evaluate(
     return result
 
 
+def _software(task: Task) -> dict[str, str] | None:
+    """What the row of a task follows from; of a function nobody knows."""
+    return None if task.function else software_of(task.method)
+
+
 def _again(
     remaining: Sequence[Task],
     made_by: Mapping[Key, Mapping[str, str] | None],
-    software: Mapping[str, Mapping[str, str]],
+    software: Mapping[str, Mapping[str, str] | None],
 ) -> list[dict[str, Any]]:
     """Which of the remaining tasks have a row already, by why that does not count any more."""
     methods: dict[str, list[str]] = defaultdict(list)
@@ -112,6 +122,18 @@ def _again(
         if task.key in made_by:
             methods[differences(made_by[task.key], software[task.method])].append(task.method)
     return [{"why": why, "rows": len(names), "methods": sorted(set(names))} for why, names in methods.items()]
+
+
+def _check_sendable(methods: Mapping[str, Function | None]) -> None:
+    """Raise `InputError` for a function that other processes cannot be given."""
+    for name, function in methods.items():
+        try:
+            pickle.dumps(function)
+        except Exception as fault:  # of objects of others, whatever they raise
+            raise InputError(
+                f"methods: {name!r} cannot be sent to other processes; define it at the top of a module, or "
+                "work without workers or scheduler"
+            ) from fault
 
 
 def find_datasets(paths: Sequence[str | Path]) -> list[Path]:
@@ -153,7 +175,7 @@ class Measuring:
     def __init__(self, tasks: Sequence[Task], out: Path) -> None:
         self.tasks, self.out = tasks, out
         self.warm: set[tuple[Budget, str]] = set()
-        self.software: dict[str, dict[str, str]] = {}
+        self.software: dict[str, dict[str, str] | None] = {}
         self.full_light: tuple[str, Sections] | None = None
         """Identity of the last dataset with bounds, and the sections of its radiance."""
 
@@ -181,15 +203,16 @@ class Measuring:
 
         def work() -> Any:
             if estimator is not None:
-                return estimate_depth(seen, depth_range_of(data, task.z_mm), method=estimator)
+                z_range_mm = depth_range_of(data, task.z_mm)
+                return estimate_depth(seen, z_range_mm, method=task.function or estimator)
             assert isinstance(seen, PhotonCounts)
-            return segment(seen, planes_of(data, task.z_mm), method=task.method)
+            return segment(seen, planes_of(data, task.z_mm), method=task.function or task.method)
 
         if (task.budget, task.method) not in self.warm:
             work()
             self.warm.add((task.budget, task.method))
         if task.method not in self.software:  # that of this process, which may be on another machine
-            self.software[task.method] = software_of(task.method)
+            self.software[task.method] = _software(task)
         seconds, estimate = timed(work)
         photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
         row = described(data, task.z_mm) | {

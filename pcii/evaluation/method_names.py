@@ -1,12 +1,23 @@
-"""Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME."""
+"""Methods of an evaluation by name: removal by its own, estimators of depth as depth:NAME.
+
+A function, which nobody has registered, is one of removal, or of depth where it is given as a pair
+("depth:NAME", function).
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
 
 from pcii.base.errors import InputError
+from pcii.base.extensions import name_of
 from pcii.depth.methods import BUILT_IN, DEFAULT_METHOD, FOR_COUNTS, FOR_VIEWS, depth_methods
 from pcii.removal.methods import removal_methods
 
 DEPTH = "depth"
 """Asks for the default estimator of depth, which has its full name in rows."""
 _PREFIX = f"{DEPTH}:"
+Function = Callable[..., Any]
+Method = str | Function | tuple[str, Function]
+"""What may be given as a method: a name, a removal, or a name and a function."""
 
 
 def depth_name(estimator: str) -> str:
@@ -39,22 +50,53 @@ def methods_for(*, full_light: bool) -> tuple[str, ...]:
     return (*removal, *map(depth_name, estimators))
 
 
-def full_name(method: str, *, full_light: bool) -> str | None:
+def named_functions(methods: Sequence[Method]) -> dict[str, Function | None]:
+    """The methods by their names, with the function of those that are given as one.
+
+    Raises `InputError` for an unknown name, and for a function by a name that is taken.
+
+    >>> named_functions(["likelihood", ("all", lambda counts, sections: sections.counts > 0)]).keys()
+    dict_keys(['likelihood', 'all'])
+    """
+    found: dict[str, Function | None] = {}
+    for method in methods:
+        if isinstance(method, str):
+            check_method(method)
+            found.setdefault(method)
+            continue
+        name, function = method if isinstance(method, tuple) else (name_of(method), method)
+        if not isinstance(name, str) or not callable(function):
+            raise InputError(f"methods: expected names, functions, or pairs (name, function), got {method!r}")
+        if name in found or name in _all_names():
+            raise InputError(f"methods: the name {name!r} is taken; give a pair (another name, function)")
+        found[name] = function
+    return found
+
+
+def full_name(method: str, *, full_light: bool, functions: Collection[str] = ()) -> str | None:
     """Full name of a method that takes radiance (`full_light`) or photon counts; None if it does not.
+
+    `functions` are the names of methods that are given as a function. Those of depth take both.
 
     >>> full_name("depth", full_light=False), full_name("depth", full_light=True)
     ('depth:posterior', 'depth:posterior')
     >>> full_name("likelihood", full_light=True) is None
     True
     """
-    known = methods_for(full_light=full_light)
     if method == DEPTH:
         return depth_name(DEFAULT_METHOD)
-    return method if method in known else None
+    if method in functions:
+        return None if full_light and estimator_of(method) is None else method
+    return method if method in methods_for(full_light=full_light) else None
 
 
 def check_method(method: str) -> None:
     """Raise `InputError`, listing the known names, for a method that takes no data at all."""
-    known = dict.fromkeys(name for kind in (False, True) for name in methods_for(full_light=kind))
-    if method not in (*known, DEPTH):
-        raise InputError(f"method: there is no method named {method!r}; use {DEPTH}, {', '.join(known)}")
+    known = _all_names()
+    if method not in known:
+        raise InputError(f"method: there is no method named {method!r}; use {', '.join(known)}")
+
+
+def _all_names() -> list[str]:
+    names = dict.fromkeys(name for kind in (False, True) for name in methods_for(full_light=kind))
+    return [DEPTH, *names]

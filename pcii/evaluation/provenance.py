@@ -42,16 +42,16 @@ def software_of(method: str) -> dict[str, str]:
     return dict(_own()) if point is None else _own() | _of_plugin(point)
 
 
-def differences(before: Mapping[str, str] | None, now: Mapping[str, str]) -> str:
+def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:
     """How the software that made something differs from that of now, in words; empty if it does not.
 
     >>> differences({"numpy": "2.1", "source of mine": "a"}, {"numpy": "2.2", "source of mine": "b"})
     'numpy 2.1 is now 2.2, the source of mine has changed'
     >>> differences(None, {"numpy": "2.2"})
-    'what made them is not known'
+    'what makes them is not known'
     """
-    if before is None:
-        return "what made them is not known"
+    if before is None or now is None:
+        return "what makes them is not known"
     changes: list[str] = []
     for name in sorted({*before, *now}):
         old, new = before.get(name, "absent"), now.get(name, "absent")

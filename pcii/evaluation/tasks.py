@@ -1,11 +1,11 @@
 """What an evaluation measures: every dataset at every light by every method, checked before any work."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pcii.base.errors import InputError
 from pcii.depth.depth_planes import check_range_mm
-from pcii.evaluation.method_names import check_method, estimator_of, full_name, methods_for
+from pcii.evaluation.method_names import Function, estimator_of, full_name, methods_for
 from pcii.evaluation.rows import FULL_LIGHT, Budget, Key, budget_of, identity_of
 from pcii.io.dataset import Dataset
 from pcii.io.dataset_layout import RADIANCE, TRUTH
@@ -14,7 +14,7 @@ from pcii.io.suggested_depths import depth_range_of, planes_of
 
 @dataclass(frozen=True)
 class Task:
-    """A dataset, photon budget or full light, and method (its full name) to score.
+    """A dataset, photon budget or full light, and method to score: full name, and function if it has one.
 
     `z_mm` are depths to look at instead of those that the dataset's recipe names, if any.
     """
@@ -22,6 +22,7 @@ class Task:
     dataset: Dataset
     budget: Budget
     method: str
+    function: Function | None
     z_mm: tuple[float, ...]
 
     @property
@@ -39,18 +40,16 @@ class Task:
 
 def tasks_of(
     datasets: Sequence[Dataset],
-    methods: Sequence[str],
+    methods: Mapping[str, Function | None],
     budgets: Sequence[float | str],
     z_mm: Sequence[float] = (),
 ) -> list[Task]:
     """The tasks, dataset by dataset, each dataset once, at the depths `z_mm` or else those of its recipe.
 
     Without `methods` all that can take the data; without `budgets` all that a dataset has, and full light if
-    it has radiance. Raises `InputError` for an unknown method, for a dataset without truth, two views, depths
-    or a named budget, and for a named method that can take none of its data.
+    it has radiance. Raises `InputError` for a dataset without truth, two views, depths or a named budget, and
+    for a named method that can take none of its data.
     """
-    for method in methods:
-        check_method(method)
     tasks: dict[str, list[Task]] = {}
     for dataset in datasets:
         if not dataset.has(TRUTH):
@@ -72,7 +71,11 @@ def tasks_of(
                 check_range_mm(dataset.grid, z_range_mm)
             except InputError as fault:
                 raise InputError(f"{dataset.path}: {fault}") from None
-        each = [Task(dataset, light, name, tuple(z_mm)) for light in lights for name in by_light[light]]
+        each = [
+            Task(dataset, light, name, methods.get(name), tuple(z_mm))
+            for light in lights
+            for name in by_light[light]
+        ]
         tasks.setdefault(identity_of(dataset.manifest), each)
     return [task for each in tasks.values() for task in each]
 
@@ -95,22 +98,25 @@ def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
     return list(dict.fromkeys(chosen or own))
 
 
-def _names(dataset: Dataset, methods: Sequence[str], light: Budget, z_mm: Sequence[float]) -> list[str]:
+def _names(
+    dataset: Dataset, methods: Mapping[str, Function | None], light: Budget, z_mm: Sequence[float]
+) -> list[str]:
     """Full names of the methods to apply at a light, each once."""
     full_light = light == FULL_LIGHT
     if methods:
-        found = (full_name(method, full_light=full_light) for method in methods)
+        functions = [name for name, function in methods.items() if function is not None]
+        found = (full_name(method, full_light=full_light, functions=functions) for method in methods)
         return list(dict.fromkeys(name for name in found if name is not None))
     # Removal is of sections at depths that are named.
     has_planes = bool(z_mm or dataset.analysis.get("z_mm"))
     return [name for name in methods_for(full_light=full_light) if has_planes or estimator_of(name)]
 
 
-def _check_use(dataset: Dataset, methods: Sequence[str], lights: Sequence[Budget]) -> None:
+def _check_use(dataset: Dataset, methods: Mapping[str, Function | None], lights: Sequence[Budget]) -> None:
     """Raise `InputError` for a named method that takes neither kind of data that is scored."""
     kinds = {light == FULL_LIGHT for light in lights}
     for method in methods:
-        if not any(full_name(method, full_light=kind) for kind in kinds):
+        if not any(_names(dataset, {method: methods[method]}, light, ()) for light in lights):
             (full_light,) = kinds
             lacking = "photon counts" if full_light else "radiance"
             taken = "radiance" if full_light else "photon counts"

@@ -1,7 +1,7 @@
 """Removal methods by name: which points of each section are in focus."""
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import registered
+from pcii.base.extensions import name_of, registered
 from pcii.core.estimates import Segmented
 from pcii.core.focal_planes import check_depth_counts
 from pcii.core.photon_counts import PhotonCounts
@@ -22,7 +22,8 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
     objects, their colours or their depths.
     Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a
-    single view, or a registered method whose result is not a `Segmented` of these sections.
+    single view, or a method of others that fails, writes into what it is given, or whose result is not a
+    `Segmented` of these sections.
 
     A bright square at 500 mm, where views shift by 4 px from camera to camera:
 
@@ -40,7 +41,10 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     ((2, 64, 64), [True, False])
     """
     check_depth_counts(counts)
-    remove = method if callable(method) else find_method(method)
+    if callable(method):
+        remove = plugins.checked(method, f"method: {name_of(method)!r}")
+    else:
+        remove = find_method(method)
     return remove(counts, reconstruct(counts, z_mm))
 
 

@@ -1,4 +1,4 @@
-"""Removal methods registered by other packages: entry points of the group `pcii.methods`.
+"""Removal methods of others: functions, and entry points of the group `pcii.methods` of their packages.
 
 In the pyproject.toml of such a package:
 
@@ -10,11 +10,13 @@ In the pyproject.toml of such a package:
 Entry points are read, and the package imported, only when a method is requested that is not built in.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from pcii.base.errors import InputError
-from pcii.base.extensions import load_function, package_of
+from pcii.base.extensions import called, load_function, package_of
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -27,32 +29,45 @@ Method = Callable[[PhotonCounts, Sections], Segmented]
 
 
 def load(point: "EntryPoint") -> Method:
-    """The method of an entry point, with its result checked at every call.
-
-    Raises `InputError` if it cannot be imported or called, and the method if its result is not a `Segmented`
-    of the given sections.
-    """
+    """The method of an entry point, `checked`; raises `InputError` if it cannot be imported or called."""
     label = f"method: {point.name!r} of {package_of(point)}"
-    remove = load_function(point, label)
+    return checked(load_function(point, label), label, point.name)
 
-    def checked(counts: PhotonCounts, sections: Sections) -> Segmented:
-        result = remove(counts, sections)
+
+def checked(remove: Callable[..., object], label: str, name: str | None = None) -> Method:
+    """The method of a function that may do anything: it raises `InputError`, which begins with `label`.
+
+    It does so where `called` does, and if the result is not a `Segmented` of the given sections, whose method
+    is `name` if that is given.
+    """
+
+    def method(counts: PhotonCounts, sections: Sections) -> Segmented:
+        result = called(remove, label, "the counts and their sections", counts, sections)
         if not isinstance(result, Segmented):
             raise InputError(f"{label} must return a pcii.Segmented, not {type(result).__name__}")
-        requirement = _unmet_requirement(result, point.name, counts, sections)
+        requirement = _unmet_requirement(result, name, counts, sections)
         if requirement:
             raise InputError(f"{label} must return {requirement}")
         return result
 
-    return checked
+    return method
 
 
-def _unmet_requirement(result: Segmented, name: str, counts: PhotonCounts, sections: Sections) -> str | None:
+def _unmet_requirement(
+    result: Segmented, name: str | None, counts: PhotonCounts, sections: Sections
+) -> str | None:
     """The first requirement that the result of a method does not meet, in words; None if it meets all."""
     if result.sections is not sections:
         return "a Segmented of the sections that it was given"
-    if result.method != name:
+    if name is not None and result.method != name:
         return f"its own name as `method`, not {result.method!r}"
+    if not isinstance(result.method, str):
+        return f"a name as `method`, not {result.method!r}"
+    if not isinstance(result.steps, Mapping):
+        return "maps by their names in `steps`"
+    for step, array in result.steps.items():
+        if not isinstance(array, np.ndarray) or array.shape != result.in_focus.shape:
+            return f"maps {result.in_focus.shape} in `steps`, and {step!r} is none"
     kept, events = result.photon_in_focus, counts.events.n.size
     if kept is not None and kept.shape[1] != events:
         return f"photon_in_focus for the {events} events of the counts, not for {kept.shape[1]}"

@@ -43,7 +43,7 @@ def generated(name: str, number: int) -> tuple[dict[str, Any], Path]:
     label = f"scene: {name!r} of {package_of(point)}"
     try:
         values = point.load()(number)
-    except Exception as fault:  # another package's function may raise anything
+    except (Exception, SystemExit) as fault:  # another package's function may raise anything
         raise InputError(f"{label} cannot be drawn: {type(fault).__name__}: {fault}") from fault
     if not isinstance(values, dict):
         raise InputError(f"{label} must return the values of a scene as a dict, not {type(values).__name__}")

@@ -148,6 +148,28 @@ def test_another_package_brings_a_method(monkeypatch: pytest.MonkeyPatch) -> Non
         estimate_depth(counts, (0.5, 1.0), method="half_a_map")
 
 
+@pytest.mark.parametrize(
+    ("z_mm", "confidence", "sentence"),
+    [
+        (-0.5, 1.0, "^method: 'wrong' must return depths above 0 mm, or NaN where it has no answer$"),
+        (np.inf, 1.0, "^method: 'wrong' must return depths above 0 mm"),
+        (0.5, np.nan, "^method: 'wrong' must return a confidence from 0 to 1, also where"),
+        (0.5, 1.5, "^method: 'wrong' must return a confidence from 0 to 1"),
+        (0.5j, 1.0, "^z_mm: expected real numbers"),
+        (0.5, 1j, "^confidence: expected real numbers"),
+    ],
+)
+def test_a_map_that_cannot_be_is_refused(z_mm: complex, confidence: complex, sentence: str) -> None:
+    grid = unit_grid(2, 2, 8, 8)
+
+    def wrong(data: Any, z_range_mm: tuple[float, float]) -> pcii.DepthMap:
+        film = np.ones((8, 8))
+        return pcii.DepthMap(film * z_mm, film * confidence)
+
+    with pytest.raises(pcii.InputError, match=sentence):
+        estimate_depth(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid), (0.5, 1.0), method=wrong)
+
+
 @pytest.mark.parametrize("rate", [0.01, 1.0])
 @pytest.mark.parametrize("cfa", ["GRBG", None])
 def test_focus_gives_even_light_no_depth(rate: float, cfa: str | None) -> None:

@@ -267,6 +267,46 @@ def test_what_is_measured_is_not_measured_again(series: Path, tmp_path: Path, ca
     assert rows_of(tmp_path / "out")[:6] == first
 
 
+def near_plane(data: Any, z_range_mm: tuple[float, float]) -> DepthMap:
+    return DepthMap(np.ones((8, 12)), np.ones((8, 12)))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path: Path, workers: int) -> None:
+    methods = [by_count, ("rows", two_rows), ("depth:near", near_plane), "variance"]
+    evaluation = evaluate([series], tmp_path / "out", methods=methods, budgets=[OWN], crew=Crew(workers))
+    assert result_of(evaluation, OWN, "by_count")["object"]["iou"]["mean"] == pytest.approx(0.85)
+    assert result_of(evaluation, OWN, "rows")["object"]["iou"]["mean"] == pytest.approx(10 / 48)
+    assert result_of(evaluation, OWN, "depth:near")["depth"]["bad_1px"]["mean"] == 0.5
+    # Nobody knows what they follow from, so they are measured whenever they are named.
+    (again,) = evaluate([series], tmp_path / "out", methods=methods, budgets=[OWN])["again"]
+    why, names = "what makes them is not known", ["by_count", "depth:near", "rows"]
+    assert again == {"why": why, "rows": 9, "methods": names}
+    kept = evaluate([series], tmp_path / "out", methods=["variance"], budgets=[OWN])
+    assert kept["again"] == []
+    assert [row["method"] for row in kept["groups"][0]["results"]] == [*names, "variance"]
+
+
+@pytest.mark.parametrize(
+    ("methods", "sentence"),
+    [
+        ([by_count, by_count], "the name 'by_count' is taken"),
+        (
+            [("likelihood", by_count)],
+            r"the name 'likelihood' is taken; give a pair \(another name, function\)",
+        ),
+        ([("mine", 3)], r"expected names, functions, or pairs \(name, function\), got \('mine', 3\)"),
+        ([("mine", lambda counts, sections: None)], "'mine' cannot be sent to other processes; define it"),
+    ],
+)
+def test_functions_that_cannot_be_compared_are_refused(
+    series: Path, tmp_path: Path, methods: list[Any], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=f"^methods: {sentence}"):
+        evaluate([series], tmp_path / "out", methods=methods, crew=Crew(2))
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.parametrize("left", [1, 30, -1])
 def test_a_killed_evaluation_goes_on_where_it_was(
     series: Path, tmp_path: Path, calls: list[str], left: int

@@ -55,7 +55,8 @@ def named(out: Path) -> set[tuple[Any, str]]:
 
 
 def chosen(datasets: list[Dataset], *methods: str, budgets: Sequence[Any] = ()) -> list[tuple[str, Any, str]]:
-    return [(task.dataset.name, task.budget, task.method) for task in tasks_of(datasets, methods, budgets)]
+    tasks = tasks_of(datasets, dict.fromkeys(methods), budgets)
+    return [(task.dataset.name, task.budget, task.method) for task in tasks]
 
 
 def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Path) -> None:

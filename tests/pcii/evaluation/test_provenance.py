@@ -112,7 +112,7 @@ def test_rows_of_which_the_software_is_not_known_are_measured_again(tmp_path: Pa
     claim_rows(tmp_path / "earlier")
     append_row(tmp_path / "earlier", {name: row[name] for name in row if name != "software"})
     (made,) = evaluate([data], tmp_path / "earlier", methods=["brightness"])["again"]
-    assert made["why"] == "what made them is not known"
+    assert made["why"] == "what makes them is not known"
 
 
 def test_results_of_other_software_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,7 @@
 """Methods of other packages, as if installed: a module and its entry points in a folder of the path."""
 
+import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +15,9 @@ from pcii.removal.methods import METHODS, removal_methods, segment
 
 CODE = """
 from dataclasses import replace
+import sys
 import numpy as np
-from pcii import InputError, PhotonCounts, Sections, Segmented, reconstruct
+from pcii import DepthMap, InputError, PhotonCounts, Sections, Segmented, reconstruct
 
 def good(counts, sections):
     assert isinstance(counts, PhotonCounts) and isinstance(sections, Sections)
@@ -37,6 +40,42 @@ def photons(counts, sections):
 
 def renamed(counts, sections):
     return good(counts, sections)
+
+def nothing(counts, sections):
+    pass
+
+def bare(counts, sections):
+    return good(counts, sections).in_focus
+
+def lists(counts, sections):
+    return Segmented(good(counts, sections).in_focus.tolist(), "lists", sections)
+
+def unnamed(counts, sections):
+    return Segmented(good(counts, sections).in_focus, None, sections)
+
+def steps(counts, sections):
+    return Segmented(good(counts, sections).in_focus, "steps", sections, {"blur": np.ones(3)})
+
+def alone(counts):
+    return good(counts, None)
+
+def leaving(counts, sections):
+    sys.exit(0)
+
+def failing(counts, sections):
+    return counts.colour
+
+def writing(counts, sections):
+    sections.counts[0] = 0
+    return good(counts, sections)
+
+def insisting(counts, sections):
+    sections.counts.base[:] = 0
+    return Segmented(sections.counts[..., 0] > 0, "insisting", sections)
+
+def late(counts, sections):
+    counts.events.n.base[:] = 9
+    return Segmented(sections.counts[..., 0] > 0, "late", sections)
 
 number = 3
 """
@@ -100,6 +139,14 @@ def test_a_name_that_makes_no_file_name_is_refused(tmp_path, monkeypatch):
         ("renamed", r"must return its own name as `method`, not 'good'$"),
         ("photons", r"must return photon_in_focus for the \d+ events of the counts, not for \d+$"),
         ("number", r"is int, which cannot be called$"),
+        ("nothing", r"must return a pcii\.Segmented, not NoneType$"),
+        ("bare", r"must return a pcii\.Segmented, not ndarray$"),
+        ("steps", r"must return maps \(1, 5, 6\) in `steps`, and 'blur' is none$"),
+        ("alone", r"must take the counts and their sections, not \(counts\)$"),
+        ("leaving", r"failed: SystemExit: 0$"),
+        ("failing", r"failed: AttributeError: 'PhotonCounts' object has no attribute 'colour'$"),
+        ("writing", r"failed: ValueError: assignment destination is read-only$"),
+        ("insisting", r"must not write into its input, and has changed Sections: read that anew$"),
     ],
 )
 def test_nonsense_is_reported_in_one_sentence(tmp_path, monkeypatch, name, sentence):
@@ -107,3 +154,34 @@ def test_nonsense_is_reported_in_one_sentence(tmp_path, monkeypatch, name, sente
     method = name.replace("_", "-")
     with pytest.raises(InputError, match=rf"^method: '{method}' of the package strange {sentence}"):
         segment(counts(), 1.0, method=method)
+    if name not in ("number", "renamed"):  # a function may be given by another name than that of its result
+        function = getattr(sys.modules["strange_code"], name)
+        with pytest.raises(InputError, match=rf"^method: '{name}' {sentence}"):
+            segment(counts(), 1.0, method=function)
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("lists", r"^in_focus: expected bool \(1, 5, 6\), got list$"),
+        ("unnamed", r"must return a name as `method`, not None$"),
+    ],
+)
+def test_what_is_no_result_at_all_cannot_be_made(tmp_path, monkeypatch, name, sentence):
+    install(tmp_path, monkeypatch, good="strange_code:good")
+    with pytest.raises(InputError, match=sentence):
+        segment(counts(), 1.0, method=getattr(import_module("strange_code"), name))
+
+
+def test_what_a_method_computes_from_its_input_and_changes_is_computed_anew(tmp_path, monkeypatch):
+    install(tmp_path, monkeypatch, late="strange_code:late")
+    seen = counts()
+    segment(seen, 1.0, method="late")
+    assert seen.events.n.sum() == seen.dense.sum()
+
+
+def test_a_package_that_ends_the_program_when_it_is_imported_is_reported(tmp_path, monkeypatch):
+    points = {"pcii.methods": {"leaving": "strange:remove"}}
+    install_package(tmp_path, monkeypatch, points, {"strange.py": "raise SystemExit(0)"})
+    with pytest.raises(InputError, match=r"'leaving' of .* cannot be loaded: SystemExit: 0$"):
+        segment(counts(), 1.0, method="leaving")
