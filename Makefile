@@ -83,7 +83,9 @@ train: llvm
 
 docs: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	rm -rf docs/api
 	$(BIN)/python -m sphinx -q -E -W --keep-going -b html docs $(OUT)/docs
+	$(BIN)/python docs/check_links.py $(OUT)/docs
 	@echo "Open $(OUT)/docs/index.html in a browser."
 
 gallery: llvm
@@ -94,4 +96,4 @@ format: $(VENV)/.ready
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) $(OUT) build dist
+	rm -rf $(VENV) $(OUT) build dist docs/api

@@ -1,11 +1,13 @@
 """How Sphinx builds the pages of this folder: `make docs`."""
 
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
 from docutils import nodes
 
 import pcii
+import simgen
 
 project = "Photon-starved integral imaging"
 author = copyright = "The photon-integral-imaging authors"
@@ -14,7 +16,8 @@ version = release = pcii.__version__
 BENCHMARKS = "benchmarks"
 """The page that `make bench-publish` writes: it joins the others once it is there."""
 
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
+templates_path = ["_templates"]  # of the pages of the reference, a name each, which go to the folder api
 highlight_language = "none"  # of blocks that name no language
 exclude_patterns = ["gallery/*"]  # pictures
 
@@ -23,13 +26,22 @@ myst_fence_as_directive = ["math"]  # GitHub's way to write a displayed equation
 myst_heading_anchors = 4  # links to headings as GitHub makes them: page.md#some-heading
 
 default_role = "literal"  # docstrings write names in single backticks
+# Fields of dataclasses: the text of the class explains them, so that the table above it has the others alone.
+autosummary_context = {
+    "fields": {
+        name: [field.name for field in fields(kind)]
+        for module in (pcii, simgen)
+        for name, kind in ((name, getattr(module, name)) for name in module.__all__)
+        if is_dataclass(kind)
+    }
+}
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 
 html_theme = "furo"
-html_title = project
+html_title = f"{project} {version}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
 html_copy_source = False

@@ -18,7 +18,7 @@ class Crew:
     workers: int = 1
     """Processes of this machine that share the work. The results are the same for any number of them."""
     scheduler: str | None = None
-    """Address of a Dask scheduler whose cluster does the work, such as tcp://10.0.0.1:8786. All its workers
+    """Address of a Dask scheduler whose cluster does the work, such as `tcp://10.0.0.1:8786`. All its workers
     must reach all folders under the same paths."""
     resource: str | None = None
     """Of a cluster, use only workers that were started with this resource, such as GPU."""
