@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import CoercionError, Parameter
 
-from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset import Dataset, budget_of, open_dataset
 
 if TYPE_CHECKING:
     from cyclopts import Token
@@ -54,13 +54,22 @@ def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
     return tuple(depths)
 
 
-def opened(dataset: Path, budget: float | None) -> Dataset:
-    """The dataset with the photons of this budget, None: of its recipe's."""
+def opened(dataset: Path, budget: str | None) -> Dataset:
+    """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
     data = open_dataset(dataset)
-    return data if budget is None else data.at_budget(budget)
+    return data if budget is None else data.at_budget(budget_of(budget))
+
+
+def budget_words(dataset: Dataset) -> list[str]:
+    """The option that gives the budget at which a dataset is looked at."""
+    budget = dataset.budget
+    return [] if budget is None else ["--budget", budget if isinstance(budget, str) else f"{budget:g}"]
 
 
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm", converter=_all_depths_mm)]
-Budget = Annotated[float | None, Parameter(help="Use the photons of this smaller, nested budget.")]
+Budget = Annotated[
+    str | None,
+    Parameter(help="Use the photons of this smaller, nested budget, or full-light: the radiance alone."),
+]
 Json = Annotated[bool, Parameter(name="--json")]

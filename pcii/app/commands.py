@@ -13,6 +13,7 @@ from pcii.base import command_line
 from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
+from pcii.depth.methods import DEFAULT_METHOD
 
 app = command_line.command_app(
     "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."
@@ -45,7 +46,13 @@ def sample(*, out: Out) -> None:
 
 @app.command
 def run(
-    dataset: Path, *, out: Out, z_mm: Depths = (), method: tuple[str, ...] = (), budget: Budget = None
+    dataset: Path,
+    *,
+    out: Out,
+    z_mm: Depths = (),
+    method: tuple[str, ...] = (),
+    depth_method: str = DEFAULT_METHOD,
+    budget: Budget = None,
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
@@ -69,11 +76,13 @@ def run(
         names.
     method
         A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
+    depth_method
+        A method of depth, as in `pcii depth`.
     """
     from pcii.app.single_run import run as run_all
 
     with Stages() as report:
-        outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None)
+        outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None, depth_method)
     if outcome.kept:
         say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
     for row in outcome.score.planes:

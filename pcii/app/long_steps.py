@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Making, Results, masks_name
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.section_stack import Sections
-from pcii.depth.methods import DEFAULT_METHOD
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.provenance import software_of
 
@@ -39,8 +38,10 @@ class Steps:
         """Masks of the sections by a method."""
         return timed(make)
 
-    def depth(self, z_range_mm: tuple[float, float], make: Callable[[], DepthMap]) -> tuple[DepthMap, float]:
-        """A depth map within a range, by the default method."""
+    def depth(
+        self, method: str, z_range_mm: tuple[float, float], make: Callable[[], DepthMap]
+    ) -> tuple[DepthMap, float]:
+        """A depth map within a range by a method."""
         return timed(make)
 
     def kept(self) -> Collection[str]:
@@ -93,16 +94,19 @@ class KeptSteps(Steps):
             results.save_segmented(focus, Making(key, seconds))
         return focus, seconds
 
-    def depth(self, z_range_mm: tuple[float, float], make: Callable[[], DepthMap]) -> tuple[DepthMap, float]:
-        """A depth map within a range, from the folder if it has it."""
-        key = self._key(depth_name(DEFAULT_METHOD), {"step": DEPTH_STEP, "z_range_mm": list(z_range_mm)})
+    def depth(
+        self, method: str, z_range_mm: tuple[float, float], make: Callable[[], DepthMap]
+    ) -> tuple[DepthMap, float]:
+        """A depth map within a range by a method, from the folder if it has it."""
+        name = depth_name(method)
+        key = self._key(name, {"step": DEPTH_STEP, "method": name, "z_range_mm": list(z_range_mm)})
         with self._folder:
             found = self._results.kept_depth(key)
             self._keep(DEPTH, found)
         if found is not None:
             self._kept.append(DEPTH_STEP)
             return found
-        depth, seconds = super().depth(z_range_mm, make)
+        depth, seconds = super().depth(method, z_range_mm, make)
         with self._folder, self._results.writing() as results:
             results.save_depth(depth, Making(key, seconds))
         return depth, seconds

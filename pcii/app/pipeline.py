@@ -12,7 +12,7 @@ from pcii.core.estimates import DepthMap, Score, Segmented
 from pcii.core.focal_planes import FocalPlanes, check_depth_counts
 from pcii.core.images import ArrayLike5D, Views
 from pcii.core.section_stack import Sections
-from pcii.depth.methods import estimate_depth
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_depth_method
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.scoring import score
@@ -35,6 +35,7 @@ class Outcome:
     timings_s: dict[str, float] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
     """Steps whose results are those of an earlier run; `timings_s` is how long they took then."""
+    depth_method: str = DEFAULT_METHOD
 
 
 def analyse(
@@ -43,8 +44,9 @@ def analyse(
     report: Report = silent,
     methods: Sequence[str] | None = None,
     steps: Steps = ALL_STEPS,
+    depth_method: str = DEFAULT_METHOD,
 ) -> Outcome:
-    """Reconstruct sections, remove defocused points by each of `methods`, map depth, score.
+    """Reconstruct sections, remove defocused points by each of `methods`, map depth by `depth_method`, score.
 
     `z_mm` defaults to the depths in the dataset's recipe, `methods` to `DEFAULT_METHODS`. Of a dataset
     without photon counts sections and depth are those of its radiance, and nothing is removed. `steps` does
@@ -56,6 +58,8 @@ def analyse(
     has_counts = dataset.has_counts or dataset.views is None or bool(methods)
     chosen = tuple(dict.fromkeys(methods or (DEFAULT_METHODS if has_counts else ())))
     counts = dataset.counts if has_counts else None
+    seen = dataset.counts_or_views if counts is None else counts
+    find_depth_method(depth_method, seen)  # an unknown name is reported before any work
     if counts is not None:
         check_depth_counts(counts)
     total = 4 + len(chosen)
@@ -76,13 +80,12 @@ def analyse(
         sections = finished("sections", (full_light, 0.0))
     else:
         sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
-    seen = dataset.views if counts is None else counts
-    assert seen is not None
     focus: list[Segmented] = []
     steps.begin(chosen)
     # Depth needs nothing of the other steps, and most of its time leaves the interpreter to them.
     with ThreadPoolExecutor(1) as beside:
-        mapped = beside.submit(steps.depth, z_range, lambda: estimate_depth(seen, z_range))
+        map_depth = partial(estimate_depth, seen, z_range, method=depth_method)
+        mapped = beside.submit(steps.depth, depth_method, z_range, map_depth)
         for method in chosen:
             assert counts is not None
             remove = partial(find_method(method), counts, sections)
@@ -91,7 +94,7 @@ def analyse(
     scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
     result = finished("score", timed(lambda: scored(dataset=dataset.name)))
     kept = tuple(step for step in seconds if step in steps.kept())
-    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, kept)
+    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, kept, depth_method)
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = silent) -> Sections | None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
+from pcii.app.command_options import budget_words
 from pcii.app.pipeline import Outcome
 from pcii.depth.methods import DEFAULT_METHOD
 from pcii.evaluation.method_names import depth_name
@@ -66,7 +67,7 @@ def _has(part: Mapping[str, Any], *names: str) -> bool:
 
 def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
     """Rows (name, value) on the analysis that this report shows."""
-    methods = (*(focus.method for focus in outcome.focus), depth_name(DEFAULT_METHOD))
+    methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))
     versions = {name: text for method in methods for name, text in software_of(method).items()}
     now = datetime.now(UTC)
     beside = "; depth was mapped beside the removal" if outcome.focus else ""
@@ -86,9 +87,9 @@ def _command(outcome: Outcome) -> str:
         words += ["--z-mm", f"{z:.17g}" if float(f"{z:g}") != z else f"{z:g}"]
     for focus in outcome.focus:
         words += ["--method", focus.method]
-    if outcome.dataset.budget is not None:
-        words += ["--budget", f"{outcome.dataset.budget:g}"]
-    return shlex.join(words)
+    if outcome.depth_method != DEFAULT_METHOD:
+        words += ["--depth-method", outcome.depth_method]
+    return shlex.join([*words, *budget_words(outcome.dataset)])
 
 
 def _skipped(manifest: Mapping[str, Any]) -> Table:

@@ -8,6 +8,7 @@ from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.app.results import REPORT, Results
 from pcii.base.progress import Report, silent
+from pcii.depth.methods import DEFAULT_METHOD
 from pcii.io.dataset import Dataset
 from pcii.io.suggested_depths import planes_of
 from pcii.removal.methods import find_method
@@ -19,6 +20,7 @@ def run(
     z_mm: Sequence[float] | None,
     report: Report = silent,
     methods: Sequence[str] | None = None,
+    depth_method: str = DEFAULT_METHOD,
 ) -> Outcome:
     """Analyse `dataset` and write all results into `out`, each of the long steps as soon as it is done.
 
@@ -31,7 +33,7 @@ def run(
     planes_of(dataset, z_mm)
     results = Results(out, dataset)
     results.check()
-    outcome = analyse(dataset, z_mm, report, methods, KeptSteps(results))
+    outcome = analyse(dataset, z_mm, report, methods, KeptSteps(results), depth_method)
     with results.writing():
         results.save_sections(outcome.sections)
         results.save_score(outcome.score)

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from pcii.app.command_options import Budget, Depths, Out, opened
+from pcii.app.command_options import Budget, Depths, Out, budget_words, opened
 from pcii.app.results import Results
 from pcii.base.command_output import say, say_next
 from pcii.io.dataset import Dataset
@@ -60,7 +60,7 @@ def reconstruct(
                 write_png(path, picture)
             say(f"{out / path.name}")
     if data.has_counts:
-        say_next("pcii", "segment", dataset, *(f"--z-mm={z:g}" for z in z_mm), "-o", out, *_budget(data))
+        say_next("pcii", "segment", dataset, *(f"--z-mm={z:g}" for z in z_mm), "-o", out, *budget_words(data))
 
 
 def depth(
@@ -160,8 +160,4 @@ def segment(
 
 def _say_next_score(dataset: Dataset, out: Path) -> None:
     if dataset.has_truth_array("z_mm"):
-        say_next("pcii", "score", dataset.path, out, *_budget(dataset))
-
-
-def _budget(dataset: Dataset) -> list[str]:
-    return [] if dataset.budget is None else ["--budget", f"{dataset.budget:g}"]
+        say_next("pcii", "score", dataset.path, out, *budget_words(dataset))

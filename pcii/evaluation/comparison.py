@@ -21,7 +21,6 @@ from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import Function, Method, estimator_of, named_functions
 from pcii.evaluation.provenance import differences, machine, software_of
 from pcii.evaluation.rows import (
-    FULL_LIGHT,
     Budget,
     Key,
     Row,
@@ -198,8 +197,7 @@ class Measuring:
     def _measured(self, task: Task) -> Row:
         """The row of a task; the first call of a method at a budget is a warm-up, the second is timed."""
         data, estimator = task.data, estimator_of(task.method)
-        seen = data.views if task.budget == FULL_LIGHT else data.counts
-        assert seen is not None
+        seen = data.counts_or_views
 
         def work() -> Any:
             if estimator is not None:

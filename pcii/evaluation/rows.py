@@ -11,34 +11,16 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import locked, named_in_errors
-from pcii.io.dataset import Dataset
+from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
 from pcii.io.evaluation_layout import ROWS
 from pcii.io.sealed_json import check_seal, sealed
 
-FULL_LIGHT: Final = "full-light"
-"""Stands for the photon budget in rows of methods that were given the radiance."""
-Budget = float | Literal["full-light"] | None
-"""Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
 Row = dict[str, Any]
 Key = tuple[str, Budget, str, tuple[float, ...]]
-
-
-def budget_of(text: str) -> float | Literal["full-light"]:
-    """A budget as people write it; raises `InputError` for what is neither a number nor `FULL_LIGHT`.
-
-    >>> budget_of("300"), budget_of("full-light")
-    (300.0, 'full-light')
-    """
-    if text == FULL_LIGHT:
-        return FULL_LIGHT
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"budget: expected a number of photons or {FULL_LIGHT!r}, got {text!r}") from None
 
 
 def by_light(budget: Budget) -> tuple[int, float]:

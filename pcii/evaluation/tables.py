@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from pcii.base.plain_text import in_markdown
-from pcii.evaluation.rows import FULL_LIGHT, Budget, by_light
+from pcii.evaluation.rows import by_light
+from pcii.io.dataset import FULL_LIGHT, Budget
 
 COLUMNS = (
     ("IoU", "object", "iou"),

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pcii.base.errors import InputError
 from pcii.depth.depth_planes import check_range_mm
 from pcii.evaluation.method_names import Function, estimator_of, full_name, methods_for
-from pcii.evaluation.rows import FULL_LIGHT, Budget, Key, budget_of, identity_of
-from pcii.io.dataset import Dataset
+from pcii.evaluation.rows import Key, identity_of
+from pcii.io.dataset import FULL_LIGHT, Budget, Dataset, budget_of
 from pcii.io.dataset_layout import RADIANCE, TRUTH
 from pcii.io.suggested_depths import depth_range_of, planes_of
 
@@ -33,9 +33,7 @@ class Task:
     @property
     def data(self) -> Dataset:
         """The dataset with the photons of the budget, read anew, so that tasks keep nothing in memory."""
-        # Of full light the budget does not matter.
-        budget = self.dataset.budgets[-1] if isinstance(self.budget, str) else self.budget
-        return self.dataset.at_budget(budget)
+        return self.dataset.at_budget(self.budget)
 
 
 def tasks_of(
@@ -90,10 +88,7 @@ def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
     chosen: list[Budget] = []
     for budget in budgets:
         named = budget_of(budget) if isinstance(budget, str) else budget
-        if named != FULL_LIGHT:
-            dataset.at_budget(named)
-        elif FULL_LIGHT not in own:
-            raise InputError(f"{dataset.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
+        dataset.at_budget(named)
         chosen.append(named)
     return list(dict.fromkeys(chosen or own))
 

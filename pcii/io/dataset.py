@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -31,6 +31,25 @@ from pcii.io.sealed_json import check_file
 from pcii.io.stored_radiance import StoredRadiance
 from pcii.io.zarr_groups import read_array
 
+FULL_LIGHT: Final = "full-light"
+"""Stands for the photon budget where the radiance is looked at."""
+Budget = float | Literal["full-light"] | None
+"""Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
+
+
+def budget_of(text: str) -> float | Literal["full-light"]:
+    """A budget as people write it; raises `InputError` for what is neither a number nor `FULL_LIGHT`.
+
+    >>> budget_of("300"), budget_of("full-light")
+    (300.0, 'full-light')
+    """
+    if text == FULL_LIGHT:
+        return FULL_LIGHT
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"budget: expected a number of photons or {FULL_LIGHT!r}, got {text!r}") from None
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Dataset(Brief):
@@ -40,8 +59,8 @@ class Dataset(Brief):
     manifest: Mapping[str, Any]
     grid: CameraGrid
     cfa: str | None
-    budget: float | None = None
-    """Nested photon budget of `counts`; None for the budget of the recipe."""
+    budget: Budget = None
+    """Nested photon budget of `counts`; None for the budget of the recipe; `FULL_LIGHT` for no counts."""
 
     def _facts(self) -> dict[str, object]:
         parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
@@ -61,8 +80,15 @@ class Dataset(Brief):
         largest = None if photons.get("scope") == "exposure" else photons.get("budget")
         return (*sorted(photons.get("nested") or []), largest)
 
-    def at_budget(self, budget: float | None) -> "Dataset":
-        """The dataset with the photons of one of its `budgets`; raises `InputError` for another."""
+    def at_budget(self, budget: Budget) -> "Dataset":
+        """The dataset with the photons of one of its `budgets`, or with its radiance alone ("full-light").
+
+        Raises `InputError` for another budget, and for full light of a dataset without radiance.
+        """
+        if budget == FULL_LIGHT:
+            if not self.has(RADIANCE):
+                raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
+            return replace(self, budget=FULL_LIGHT)
         *nested, largest = self.budgets
         if budget == largest:
             return replace(self, budget=None)
@@ -83,18 +109,20 @@ class Dataset(Brief):
         return self.manifest.get("analysis") or {}
 
     @property
-    def _counts_name(self) -> str:
-        return nested_name(COUNTS, self.budget)
+    def _counts_name(self) -> str | None:
+        return None if self.budget == FULL_LIGHT else nested_name(COUNTS, self.budget)
 
     @property
     def has_counts(self) -> bool:
         """Whether the dataset has photon counts; without them it may have radiance."""
-        return self.has(self._counts_name)
+        return self._counts_name is not None and self.has(self._counts_name)
 
     @cached_property
     def counts(self) -> PhotonCounts:
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
+        if part is None:
+            raise InputError(f"budget: {FULL_LIGHT} is the radiance, and this needs photon counts")
         if not self.has_counts:
             raise InputError(
                 f"{self.path}: this dataset has no photon counts; import the images with --photons N, "
@@ -134,8 +162,8 @@ class Dataset(Brief):
         return self._arrays(TRUTH, TRUTH_LABELS, (name,))[name]
 
     def _photon_truth(self) -> PhotonTruth | None:
-        part = nested_name(PHOTON_TRUTH, self.budget)
-        if not self.has(part):
+        part = None if self.budget == FULL_LIGHT else nested_name(PHOTON_TRUTH, self.budget)
+        if part is None or not self.has(part):
             return None
         origins = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
         events = self.counts.events

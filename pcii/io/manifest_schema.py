@@ -166,7 +166,7 @@ class ResultsManifest(FileList):
 
     dataset: Text
     identity: str | None
-    budget: Photons | None
+    budget: Photons | Literal["full-light"] | None
     made: dict[FileName, Making] = {}
     due: list[FileName] = []
 

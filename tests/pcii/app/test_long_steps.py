@@ -1,9 +1,7 @@
 """An analysis that was interrupted goes on: what is finished and valid is kept, with the same bytes."""
 
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 from threading import Event
 
@@ -30,14 +28,6 @@ def dataset() -> Dataset:
     return pcii.sample()
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _quick_depth() -> Iterator[None]:
-    """The variance sweep in place of the default method, which is slower."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "estimate_depth", partial(pcii.estimate_depth, method="variance-sweep"))
-        yield
-
-
 @pytest.fixture(scope="module")
 def whole(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a run that nothing interrupted."""
@@ -48,7 +38,7 @@ def whole(dataset: Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def run(dataset: Dataset, out: Path, **options: object) -> tuple[str, ...]:
     """Names of the steps that the run kept."""
-    settings = {"z_mm": None, "methods": METHODS} | options
+    settings = {"z_mm": None, "methods": METHODS, "depth_method": "variance-sweep"} | options
     return single_run.run(dataset, out, **settings).kept  # type: ignore[arg-type]
 
 
@@ -117,6 +107,14 @@ def test_what_other_options_made_is_made_anew(dataset: Dataset, tmp_path: Path) 
     assert run(dataset, out, z_mm=(620.0,)) == ALL
 
 
+def test_a_depth_map_of_another_method_or_light_is_made_anew(dataset: Dataset, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(dataset, out)
+    assert run(dataset, out, depth_method="focus") == REMOVALS
+    with pytest.raises(InputError, match="of another dataset or photon budget"):
+        run(dataset.at_budget("full-light"), out, methods=None)
+
+
 def test_what_is_damaged_is_made_anew(dataset: Dataset, whole: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run(dataset, out)
@@ -158,7 +156,7 @@ def test_steps_that_end_together_do_not_take_each_other_for_strangers(
     monkeypatch.setattr(results, "write_results", slowly)
     steps = long_steps.KeptSteps(single_run.Results(tmp_path / "out", dataset))
     with ThreadPoolExecutor(1) as beside:
-        mapped = beside.submit(steps.depth, (450, 750), once_the_other_writes)
+        mapped = beside.submit(steps.depth, "variance-sweep", (450, 750), once_the_other_writes)
         steps.removal("brightness", focus.sections, lambda: focus)
         mapped.result()
     assert set(read_results(tmp_path / "out")["made"]) == {"depth.zarr", masks_name("brightness")}

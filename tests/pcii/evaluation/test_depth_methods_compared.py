@@ -10,6 +10,7 @@ import pytest
 from tiny_datasets import NESTED, OWN, write_dataset
 
 from pcii.app import commands as cli
+from pcii.app.results import Results
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
@@ -17,14 +18,14 @@ from pcii.core.estimates import DepthMap
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
-from pcii.depth.methods import FOR_COUNTS
+from pcii.depth.methods import FOR_COUNTS, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
-from pcii.evaluation.rows import FULL_LIGHT, all_rows, claim_rows
+from pcii.evaluation.rows import all_rows, claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import depth_overview, tables_of
 from pcii.evaluation.tasks import tasks_of
-from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset import FULL_LIGHT, Dataset, open_dataset
 from pcii.io.dataset_writer import save_dataset
 from pcii.metrics.bounds import object_bounds
 from pcii.removal.methods import removal_methods
@@ -103,6 +104,27 @@ def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFi
     assert page.count("data:image/png;base64,") == 2  # errors, and reliability
     assert command_line.run(cli.app, [*command, "--budget", "bright"]) == 2
     assert "budget: expected a number of photons or 'full-light', got 'bright'" in capsys.readouterr().err
+
+
+def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    both = saved(tmp_path / "both", (COUNTS, LIGHT))
+    at_light = [str(both.path), "--budget", FULL_LIGHT]
+    expected = estimate_depth(LIGHT, (450, 800), method="structure-tensor")
+    for number, (command, option) in enumerate([("depth", "--method"), ("run", "--depth-method")]):
+        out = tmp_path / str(number)
+        asked = [command, *at_light, option, "structure-tensor", "-o", str(out)]
+        assert command_line.run(cli.app, asked) == 0
+        depth = Results(out, both.at_budget(FULL_LIGHT)).load_depth()
+        assert depth is not None
+        np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
+    assert (
+        "--depth-method structure-tensor --budget full-light" in (tmp_path / "1" / "report.html").read_text()
+    )
+    capsys.readouterr()
+    assert command_line.run(cli.app, ["segment", *at_light, "-o", str(tmp_path / "no")]) == 2
+    assert "full-light is the radiance, and this needs photon counts" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
