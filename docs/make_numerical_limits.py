@@ -36,7 +36,7 @@ CONDITIONS = {
 NO_NUMBERS = {
     "Collection": "a table of datasets",
     "InputError": "the refusal itself",
-    "ViewOrder": "three switches",
+    "ViewOrder": "four switches",
     "depth_methods": "names",
     "removal_methods": "names",
     "open_collection": "opens a folder",

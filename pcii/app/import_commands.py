@@ -26,6 +26,7 @@ def import_dataset(
     sensor_mm: float | None = None,
     pixel_mm: float | None = None,
     shear_px: Pair = None,
+    serpentine: bool = False,
     swap_axes: bool = False,
     flip_rows: bool = False,
     flip_cols: bool = False,
@@ -64,15 +65,16 @@ def import_dataset(
     Parameters
     ----------
     source
-        A folder of pictures, a folder of the HCI 4D light field benchmark, a picture of a lens array, an
-        array in a .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W); or
-        events.npz or views.exr of `simgen export`, which need no options.
+        A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
+        benchmark, a picture of a lens array, an array in a .npy or .npz file: (K, L, H, W), (K, L, H, W, C),
+        or with --counts (K, L, N, H, W); or events.npz or views.exr of `simgen export`, which need no
+        options.
     out
         Folder for the dataset: new or empty.
     pattern
         Names of the files of a folder, with {row} and {col}, or with {index} that counts along the rows.
     grid
-        Rows and columns of cameras, for {index}. Default: square.
+        Rows and columns of cameras, for {index} and for pages. Default: square.
     pitch_mm
         Distance between neighbouring cameras, x and y. Of a lens array: its lens pitch in pixels, by default.
     focal_mm
@@ -83,8 +85,10 @@ def import_dataset(
         Side of a pixel, instead of --sensor-mm.
     shear_px
         Disparity, x and y, that was taken out of the pictures of a converging grid.
+    serpentine
+        Every other row is stored backwards, as a stage takes them that moves to and fro.
     swap_axes
-        Rows and columns are exchanged; {index} counts down the columns.
+        Rows and columns are exchanged; {index} and pages count down the columns.
     flip_rows
         Rows are counted from the bottom.
     flip_cols
@@ -100,7 +104,7 @@ def import_dataset(
     array
         Name of the array in an .npz file that has several.
     counts
-        The files hold photon counts; pages of a TIFF file are frames, which are added up.
+        The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
     srgb
         Numbers are sRGB: the default for whole numbers in pictures.
     linear
@@ -134,7 +138,7 @@ def import_dataset(
     asked = Request(
         source=source,
         optics=_optics(pitch_mm, focal_mm, sensor_mm, pixel_mm, shear_px, lens_pitch_px),
-        order=ViewOrder(swap_axes=swap_axes, flip_rows=flip_rows, flip_cols=flip_cols),
+        order=ViewOrder(serpentine=serpentine, swap_axes=swap_axes, flip_rows=flip_rows, flip_cols=flip_cols),
         pattern=pattern,
         grid=grid,
         array=array,

@@ -1,7 +1,7 @@
 """What `pcii import` was told to read, read, and how to mend it if the views do not fit together."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,14 @@ from pcii.importing.count_frames import import_counts
 from pcii.importing.exported_files import exported_file, import_exported
 from pcii.importing.grid_check import GridCheck, check_grid
 from pcii.importing.hci_scenes import PARAMETERS, import_hci
+from pcii.importing.image_decoding import is_picture
 from pcii.importing.image_folders import import_images
 from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.importing.light_encoding import Encoding
 
 FINEST_PIXEL_MM = 2e-4
 """No sensor has smaller pixels: a third of a wavelength of light."""
-FLAGS = {"swap_axes": "--swap-axes", "flip_rows": "--flip-rows", "flip_cols": "--flip-cols"}
+FLAGS = {order.name: f"--{order.name.replace('_', '-')}" for order in fields(ViewOrder)}
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def read(asked: Request, report: Report) -> Imported:
             source, asked.lenses, asked.optics, order=asked.order, encoding=asked.encoding
         )
         origin = f"{name}, a picture of {asked.lenses.rows} x {asked.lenses.cols} lenses, {kind}"
-    elif asked.pattern is not None:
+    elif asked.pattern is not None or is_picture(source):
         views = import_images(
             source,
             asked.pattern,
@@ -117,7 +118,8 @@ def read(asked: Request, report: Report) -> Imported:
             encoding=asked.encoding,
             report=report,
         )
-        origin = f"{views.grid.view_count} pictures of {name}, {asked.pattern}, {kind}"
+        what = f"pages of {name}" if asked.pattern is None else f"pictures of {name}, {asked.pattern}"
+        origin = f"{views.grid.view_count} {what}, {kind}"
     else:
         views = import_arrays(
             source, asked.optics, array=asked.array, order=asked.order, encoding=asked.encoding
@@ -172,8 +174,8 @@ def _with_pattern(imported: Imported, cfa: str | None) -> Imported:
 def checked(
     imported: Imported, asked: Request, z_range_mm: tuple[float, float] | None
 ) -> tuple[tuple[float, ...], str | None]:
-    """Depths at which things are sharpest, and a warning with the option that mends it, or None."""
-    counted = asked.pattern is not None and "{index" in asked.pattern
+    """Depths at which things are sharpest, and a warning with what mends it, or None."""
+    counted = is_picture(asked.source) if asked.pattern is None else "{index" in asked.pattern
     found = check_grid(
         imported.view_of(), imported.images.grid, z_range_mm, order=asked.order, counted=counted
     )
@@ -197,7 +199,13 @@ def _warning(
             f"--pitch-mm is wrong, and {across * factor:.2g} {down * factor:.2g} would bring it to "
             f"{end:g} mm (or --focal-mm or the size of pixels is wrong by this factor)"
         )
-    return _wrong_unit(found, imported.images.grid)
+    wrong_unit = _wrong_unit(found, imported.images.grid)
+    if wrong_unit is None and found.in_no_order and isinstance(imported.images, Views):
+        return (  # not of photons, which may be too few to say
+            "the views fit together no better than in a random order; unless they have no texture, correct "
+            "their order, --pitch-mm, --focal-mm or the size of pixels"
+        )
+    return wrong_unit
 
 
 def _wrong_unit(found: GridCheck, grid: CameraGrid) -> str | None:

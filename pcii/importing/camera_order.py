@@ -61,6 +61,8 @@ class ViewOrder:
     The changes are made in the order in which they stand here.
     """
 
+    serpentine: bool = False
+    """Every other row was stored backwards, as a stage takes them that does not go back between rows."""
     swap_axes: bool = False
     """Rows and columns are exchanged: what is counted first are columns."""
     flip_rows: bool = False
@@ -73,7 +75,12 @@ class ViewOrder:
 
         >>> ViewOrder(swap_axes=True, flip_rows=True).arranged(np.array([[1, 2, 3], [4, 5, 6]])).tolist()
         [[3, 6], [2, 5], [1, 4]]
+        >>> ViewOrder(serpentine=True).arranged(np.array([[1, 2, 3], [4, 5, 6]])).tolist()
+        [[1, 2, 3], [6, 5, 4]]
         """
+        if self.serpentine:
+            views = np.copy(views)
+            views[1::2] = views[1::2, ::-1]
         if self.swap_axes:
             views = views.swapaxes(0, 1)
         return views[:: -1 if self.flip_rows else 1, :: -1 if self.flip_cols else 1]

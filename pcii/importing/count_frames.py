@@ -1,6 +1,6 @@
 """Photon counts of real detectors: arrays, or stacks of frames, of one bit each or more, added up."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,8 @@ from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts, whole_counts
 from pcii.importing.array_files import opened_array
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
 from pcii.importing.file_patterns import files_by_camera
-from pcii.importing.image_decoding import decode
-from pcii.importing.image_folders import check_size, headers_of
+from pcii.importing.image_decoding import Picture, decode, is_picture
+from pcii.importing.image_folders import check_size, headers_of, pages_of
 
 
 def import_counts(
@@ -29,16 +29,21 @@ def import_counts(
     """Photon counts whose frames are added up, of a folder of files by `pattern`, or of an array.
 
     A file of a view is a TIFF, each with as many pages, or a grey PNG of 1, 8 or 16 bits; for `pattern` and
-    `grid` see `import_images`. An array, or a .npy or .npz file of one, is (K, L, H, W) or, with N frames,
-    (K, L, N, H, W). Raises `InputError` for counts that are negative or fractional, in any frame.
+    `grid`, and for one TIFF file whose pages are the views, see `import_images`. An array, or a .npy or .npz
+    file of one, is (K, L, H, W) or, with N frames, (K, L, N, H, W). Raises `InputError` for counts that are
+    negative or fractional, in any frame.
     """
-    if pattern is not None and not isinstance(source, np.ndarray):
+    if isinstance(source, np.ndarray):
+        views, shape = _of_array(source, array, order)
+    elif pattern is not None:
         views, shape = _of_files(order.arranged(files_by_camera(Path(source), pattern, grid)))
+    elif is_picture(Path(source)):
+        views, shape = _of_pages(Path(source), grid, order)
     else:
         views, shape = _of_array(source, array, order)
     counts = np.zeros(shape, np.int64)
     K, L = shape[:2]
-    for done, (camera, frames) in enumerate(zip(np.ndindex(K, L), views, strict=True), start=1):
+    for done, (camera, frames) in enumerate(views, start=1):
         for name, frame in frames:
             counts[camera] += whole_counts(name, frame).astype(np.int64, copy=False)
             if counts[camera].max(initial=0) > LARGEST_COUNT:
@@ -47,18 +52,33 @@ def import_counts(
     return PhotonCounts.from_dense(counts, optics.grid(shape), cfa=cfa)
 
 
-Frames = Iterator[Iterator[tuple[str, np.ndarray]]]
-"""For each view the name and the counts (H, W) of each of its frames."""
+Frames = Iterator[tuple[tuple[int, ...], Iterable[tuple[str, np.ndarray]]]]
+"""For each camera (k, l) the name and the counts (H, W) of each of its frames."""
 
 
 def _of_files(files: np.ndarray) -> tuple[Frames, tuple[int, ...]]:
     pictures = headers_of(files, pages=True)
-    first = pictures[0, 0]
-    if first.shape[2] != 1:
-        raise InputError(f"{first.path}: has {first.shape[2]} channels; photon counts have one")
-    check_size(first.path.parent, (2, *files.shape, *first.shape[:2]))
-    views = (((str(picture.path), page[..., 0]) for page in decode(picture)) for picture in pictures.flat)
-    return views, (*files.shape, *first.shape[:2])
+    shape = _checked_shape(pictures[0, 0], files.shape)
+    views = (
+        (camera, ((str(picture.path), page[..., 0]) for page in decode(picture)))
+        for camera, picture in np.ndenumerate(pictures)
+    )
+    return views, shape
+
+
+def _of_pages(path: Path, grid: tuple[int, int] | None, order: ViewOrder) -> tuple[Frames, tuple[int, ...]]:
+    picture, size, pages = pages_of(path, grid, order)
+    shape = _checked_shape(picture, size)
+    return ((camera, [(str(path), pixels[..., 0])]) for camera, pixels in pages), shape
+
+
+def _checked_shape(first: Picture, size: tuple[int, ...]) -> tuple[int, ...]:
+    """Shape (K, L, H, W) of counts of which `first` is one of `size` views; `InputError` for colours."""
+    height, width, channels = first.shape
+    if channels != 1:
+        raise InputError(f"{first.path}: has {channels} channels; photon counts have one")
+    check_size(first.path.parent, (2, *size, height, width))
+    return (*size, height, width)
 
 
 def _of_array(
@@ -72,4 +92,5 @@ def _of_array(
     numbers = order.arranged(numbers)
     K, L, _, H, W = numbers.shape
     check_size(Path(name), (2, K, L, H, W))
-    return (((name, frame) for frame in numbers[camera]) for camera in np.ndindex(K, L)), (K, L, H, W)
+    views = ((camera, ((name, frame) for frame in numbers[camera])) for camera in np.ndindex(K, L))
+    return views, (K, L, H, W)

@@ -98,17 +98,22 @@ def _by_index(folder: Path, pattern: str, found: Found, shape: tuple[int, int] |
     numbers = {camera[0] for camera in found}
     first, count = min(numbers), _span(numbers)
     if shape is None:
-        side = math.isqrt(count)
-        if side * side != count:
-            raise InputError(
-                f"{folder}: {count} views are no square grid; say how many rows and columns with --grid"
-            )
-        shape = side, side
+        shape = square_of(folder, count)
     elif shape[0] * shape[1] < count:
         raise InputError(f"{folder}: {count} files fit the pattern, more than in {shape[0]} x {shape[1]}")
     _check_number(folder, shape)
     cameras = [(first + number,) for number in range(shape[0] * shape[1])]
     return _table(folder, pattern, found, cameras, shape)
+
+
+def square_of(source: Path, count: int) -> tuple[int, int]:
+    """Rows and columns of a square grid of `count` views; `InputError` if there is none."""
+    side = math.isqrt(count)
+    if side * side != count:
+        raise InputError(
+            f"{source}: {count} views are no square grid; say how many rows and columns with --grid"
+        )
+    return side, side
 
 
 def _span(numbers: set[int]) -> int:

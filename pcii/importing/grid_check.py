@@ -1,8 +1,8 @@
 """Whether views fit the cameras that were told: where they are sharp, and which mistake explains them better.
 
-Each of the possible mistakes (rows or columns counted the other way, exchanged, exchanged pitches, another
-range of depths) is a camera grid of its own. The one that the views agree with best over a sweep of planes
-is compared with what was told.
+Each of the possible mistakes (rows or columns counted the other way, exchanged, taken to and fro, exchanged
+pitches, another range of depths) is a camera grid of its own. The one that the views agree with best over a
+sweep of planes is compared with what was told.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,11 +35,14 @@ PEAK_SHARE, MOST_PEAKS = 0.08, 4
 SAME_PITCH = 0.01
 NEAR_LEAST = 0.3
 """Planes count whose variance is above the least by less than this share of the rise to its mean."""
+RANDOM_ORDERS = 3
+"""Random orders with which the one that was told is compared, if no other explains the views."""
 BEYOND = 4.0
 """How much nearer and farther than the range is looked, as a factor of disparity."""
 ViewOf = Callable[[int, int], np.ndarray]
 ORDERS = tuple(
-    ViewOrder(swap_axes=swap, flip_rows=rows, flip_cols=cols)
+    ViewOrder(serpentine=serpentine, swap_axes=swap, flip_rows=rows, flip_cols=cols)
+    for serpentine in (False, True)
     for swap in (False, True)
     for rows in (False, True)
     for cols in (False, True)
@@ -58,6 +61,8 @@ class GridCheck:
     """Whether they are explained clearly better with the two pitches exchanged."""
     outside_mm: float | None = None
     """A depth outside the range, if most of what is sharp is sharp outside."""
+    in_no_order: bool = False
+    """Whether the views fit together no better than in a random order, which those without texture do."""
 
 
 def check_grid(
@@ -94,16 +99,35 @@ def check_grid(
             best, least = mistake, remaining
     if best != GridCheck():
         return best
+    z_wide, wide = z_mm, told
     if z_range_mm is not None:
         near, far = z_range_mm
         z_wide = _planes(grid, (near / BEYOND, far * BEYOND), small)
-        outside = _outside(sweep(small, grid, z_wide), z_wide, z_range_mm)
+        wide = sweep(small, grid, z_wide)
+    if _remaining(wide) > CLEARLY * _remaining_in_random_orders(view, grid, z_wide):
+        return GridCheck(in_no_order=True)
+    if z_range_mm is not None:
+        outside = _outside(wide, z_wide, z_range_mm)
         if outside is not None:
             return GridCheck(outside_mm=outside)
     fine = small_views(view, grid, FINE_PX)
     z_close, close = _closer(fine, grid, z_mm, told)
     found = {_refined(fine, grid, z_close, close, peak) for peak in _peaks(close)}
     return GridCheck(tuple(sorted(found)))
+
+
+def _remaining_in_random_orders(view: ViewOf, grid: CameraGrid, z_mm: np.ndarray) -> float:
+    """What remains of the variance at planes if the views are shuffled, on average."""
+    rng, right = np.random.default_rng(0), np.arange(grid.view_count)
+    remaining: list[float] = []
+    while len(remaining) < RANDOM_ORDERS:
+        numbers = rng.permutation(grid.view_count)
+        if (numbers == right).all():
+            continue
+        table = numbers.reshape(grid.rows, grid.cols)
+        images = small_views(lambda k, l, n=table: view(*divmod(int(n[k, l]), grid.cols)), grid, COARSE_PX)
+        remaining.append(_remaining(sweep(images, grid, z_mm)))
+    return float(np.mean(remaining))
 
 
 def _mistakes(

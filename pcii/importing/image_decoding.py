@@ -31,6 +31,7 @@ KINDS = {
     b"MM\0+": "TIFF",
     b"\x76\x2f\x31\x01": "EXR",
 }
+LONGEST_START = max(map(len, KINDS))
 ALPHA = "has an alpha channel that is not opaque everywhere; save it without transparency"
 UPRIGHT = 1
 """The value of an orientation tag (TIFF 6.0, tag 274; EXIF) for pictures that are not to be turned."""
@@ -68,14 +69,21 @@ class Picture:
         return np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
 
 
+def is_picture(path: Path) -> bool:
+    """Whether this is a file that begins like a picture."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return _kind(file.read(LONGEST_START)) is not None
+
+
 def picture_of(path: Path) -> Picture:
     """The header of a picture file; raises `InputError`, naming it, for one that cannot be imported."""
     try:
         with path.open("rb") as file:
-            head = file.read(64)
+            kind = _kind(file.read(LONGEST_START))
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror})") from None
-    kind = next((name for start, name in KINDS.items() if head.startswith(start)), None)
     if kind is None:
         raise InputError(f"{path}: not a PNG, JPEG, TIFF or EXR picture")
     try:
@@ -132,6 +140,10 @@ def check_unpacked(path: Path, unpacked: int, packed: int, instead: str) -> None
             f"{path}: {packed / 2**20:.1f} MiB that unpack to {unpacked / 2**20:.0f} MiB of memory, and at "
             f"most {most / 2**20:.0f} are allowed; {instead}"
         )
+
+
+def _kind(head: bytes) -> str | None:
+    return next((name for start, name in KINDS.items() if head.startswith(start)), None)
 
 
 def _png_header(path: Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
-"""Elemental images from a folder of pictures, one file a view."""
+"""Elemental images from pictures: a folder with one file a view, or a TIFF file with one page a view."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
-from pcii.importing.file_patterns import files_by_camera
+from pcii.importing.file_patterns import files_by_camera, square_of
 from pcii.importing.image_decoding import Picture, decode, picture_of
 from pcii.importing.light_encoding import Encoding, check_encoding, to_radiance
 
@@ -18,8 +19,8 @@ LARGEST_BYTES = 1 << 33
 
 
 def import_images(
-    folder: str | Path,
-    pattern: str,
+    source: str | Path,
+    pattern: str | None,
     optics: Optics,
     *,
     grid: tuple[int, int] | None = None,
@@ -31,20 +32,49 @@ def import_images(
     """Radiance of the pictures of a folder whose names fit a pattern such as "{col}_{row}.png".
 
     Names hold {row} and {col}, or {index}, which counts along the rows of a `grid` (K, L); without `grid` it
-    is square. Pictures are PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one
-    kind. Whole numbers are sRGB and floats are linear, unless `encoding` says otherwise. `cfa` declares that
-    grey pictures are Bayer mosaics. Raises `InputError`, naming a file, for what does not fit.
+    is square. Without a pattern `source` is a TIFF file, whose pages are counted like {index}. Pictures are
+    PNG, JPEG, TIFF or EXR, of up to 16 bits or of floats, grey or RGB, and all of one kind. Whole numbers are
+    sRGB and floats are linear, unless `encoding` says otherwise. `cfa` declares that grey pictures are Bayer
+    mosaics. Raises `InputError`, naming a file, for what does not fit.
     """
     check_encoding(encoding)
-    files = order.arranged(files_by_camera(Path(folder), pattern, grid))
-    pictures = headers_of(files)
-    first: Picture = pictures[0, 0]
-    check_size(Path(folder), (*files.shape, *first.shape))
-    radiance = np.empty((*files.shape, *first.shape), np.float32)
-    for done, (camera, picture) in enumerate(np.ndenumerate(pictures), start=1):
-        radiance[camera] = radiance_of(picture, encoding)
-        report("pictures", done, files.size)
+    path = Path(source)
+    if pattern is None:
+        first, shape, pages = pages_of(path, grid, order)
+        views = ((camera, first, pixels) for camera, pixels in pages)
+    else:
+        pictures = headers_of(order.arranged(files_by_camera(path, pattern, grid)))
+        first, shape = pictures[0, 0], pictures.shape
+        views = ((camera, picture, next(decode(picture))) for camera, picture in np.ndenumerate(pictures))
+    check_size(path, (*shape, *first.shape))
+    radiance = np.empty((*shape, *first.shape), np.float32)
+    for done, (camera, picture, pixels) in enumerate(views, start=1):
+        radiance[camera] = radiance_of(picture, pixels, encoding)
+        report("pictures", done, math.prod(shape))
     return Views(radiance, optics.grid(radiance.shape), cfa)
+
+
+def pages_of(
+    path: Path, grid: tuple[int, int] | None, order: ViewOrder
+) -> tuple[Picture, tuple[int, int], Iterator[tuple[tuple[int, int], np.ndarray]]]:
+    """Header of a file that has a page for each view, its grid (K, L), and pixels (H, W, C) by camera (k, l).
+
+    Pages are counted along the rows of `grid`, by default a square one. Raises `InputError` for another
+    number of pages.
+    """
+    picture = picture_of(path)
+    if picture.pages == 1:
+        raise InputError(
+            f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
+            "folder and --pattern"
+        )
+    rows, cols = grid or square_of(path, picture.pages)
+    if rows * cols != picture.pages:
+        raise InputError(f"{path}: has {picture.pages} pages, where --grid is of {rows} x {cols} views")
+    numbers = order.arranged(np.arange(picture.pages).reshape(rows, cols))
+    K, L = numbers.shape
+    cameras = (divmod(int(number), L) for number in np.argsort(numbers, axis=None))
+    return picture, (K, L), zip(cameras, decode(picture), strict=True)
 
 
 def headers_of(files: np.ndarray, *, pages: bool = False) -> np.ndarray:
@@ -64,15 +94,14 @@ def headers_of(files: np.ndarray, *, pages: bool = False) -> np.ndarray:
     return pictures
 
 
-def radiance_of(picture: Picture, encoding: Encoding | None) -> np.ndarray:
-    """Linear radiance (H, W, C), float32, of a picture."""
+def radiance_of(picture: Picture, pixels: np.ndarray, encoding: Encoding | None) -> np.ndarray:
+    """Linear radiance (H, W, C), float32, of a picture's pixels."""
     if picture.dtype == np.bool_:
         raise InputError(f"{picture.path}: has one bit per pixel, which is a photon count; use --counts")
     try:
-        return to_radiance(next(decode(picture)), encoding, picture.most)
+        return to_radiance(pixels, encoding, picture.most)
     except InputError as fault:
-        prefix = "" if str(fault).startswith(str(picture.path)) else f"{picture.path}: "
-        raise InputError(f"{prefix}{fault}") from None
+        raise InputError(f"{picture.path}: {fault}") from None
 
 
 def check_size(path: Path, shape: Sequence[int]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
-from pcii.importing.image_decoding import picture_of
+from pcii.importing.image_decoding import decode, picture_of
 from pcii.importing.image_folders import check_size, radiance_of
 from pcii.importing.light_encoding import Encoding, check_encoding
 
@@ -65,7 +65,7 @@ def import_lens_array(
     down = _starts(lenses.rows, lenses.pitch_px[1], lenses.offset_px[1], height, "high", path)
     size = math.floor(lenses.pitch_px[1]), math.floor(lenses.pitch_px[0])
     check_size(Path(path), (lenses.rows, lenses.cols, *size, channels))
-    whole = radiance_of(picture, encoding)
+    whole = radiance_of(picture, next(decode(picture)), encoding)
     views = _cut(_cut(whole, down, size[0], 0), across, size[1], 2).swapaxes(1, 2)  # (K, h, L, w, C) before
     if lenses.inverted:
         views = views[:, :, ::-1, ::-1]

@@ -3,10 +3,11 @@
 
 import io
 import re
+import shutil
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,51 @@ def test_the_option_that_mends_is_told(photos: Path, tmp_path: Path, capsys, pat
     told = ["--pattern", pattern, *CAMERAS, *options]
     assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
     assert f"warning: the views fit together far better {mend};" in capsys.readouterr().out
+
+
+def pages(folder: Path, out: Path, places: Iterable[tuple[int, int]]) -> list[Any]:
+    """What to type for a file whose pages are the views of these places (k, l)."""
+    stack = np.stack([np.asarray(Image.open(folder / f"{l}_{k}.png")) for k, l in places])
+    tifffile.imwrite(out.with_suffix(".tif"), stack, photometric="rgb")
+    return ["import", out.with_suffix(".tif"), "-o", out, *CAMERAS]
+
+
+def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) -> None:
+    assert run("import", photos, "-o", tmp_path / "files", *NAMED) == 0
+    assert run(*pages(photos, tmp_path / "pages", np.ndindex(3, 3))) == 0
+    down = [(k, l) for l in range(3) for k in range(3)]
+    assert run(*pages(photos, tmp_path / "down", down), "--swap-axes", "--grid", 3, 3) == 0
+    assert "warning" not in capsys.readouterr().out
+    files, *others = (open_dataset(tmp_path / name).views for name in ("files", "pages", "down"))
+    for other in others:
+        assert files is not None
+        assert other is not None
+        np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
+
+
+def test_pages_of_photon_counts_are_views(tmp_path: Path) -> None:
+    counts = np.random.default_rng(1).poisson(2, (2, 3, H, W)).astype(np.uint16)
+    tifffile.imwrite(tmp_path / "in.tif", counts.reshape(6, H, W), photometric="minisblack")
+    told = ["--counts", "--grid", 2, 3, *CAMERAS]
+    assert run("import", tmp_path / "in.tif", "-o", tmp_path / "out", *told) == 0
+    seen = open_dataset(tmp_path / "out").counts
+    np.testing.assert_array_equal([[seen.view(k, l) for l in range(3)] for k in range(2)], counts)
+
+
+def test_a_stage_that_moves_to_and_fro_is_noticed(photos: Path, tmp_path: Path, capsys) -> None:
+    to_and_fro = [(k, 2 - l if k % 2 else l) for k, l in np.ndindex(3, 3)]
+    told = pages(photos, tmp_path / "mine", to_and_fro)
+    assert run(*told) == 0
+    assert "warning: the views fit together far better with --serpentine;" in capsys.readouterr().out
+    shutil.rmtree(tmp_path / "mine")
+    assert run(*told, "--serpentine") == 0
+    assert "warning" not in capsys.readouterr().out
+
+
+def test_shuffled_views_are_warned_about(photos: Path, tmp_path: Path, capsys) -> None:
+    shuffled = [divmod(n, 3) for n in (3, 7, 2, 0, 6, 8, 5, 1, 4)]
+    assert run(*pages(photos, tmp_path / "mine", shuffled)) == 0
+    assert "warning: the views fit together no better than in a random order" in capsys.readouterr().out
 
 
 def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
@@ -261,6 +307,14 @@ def stack(root: Path) -> None:
     tifffile.imwrite(root / "0_0.tif", np.zeros((3, H, W), np.uint8), photometric="minisblack")
 
 
+def tiff_of(number: int) -> Make:
+    def make(root: Path) -> Path:
+        tifffile.imwrite(root / "in.tif", np.zeros((number, H, W), np.uint8), photometric="minisblack")
+        return root / "in.tif"
+
+    return make
+
+
 def huge_header(root: Path) -> Path:
     with (root / "in.npy").open("wb") as opened:
         np.lib.format.write_array_header_1_0(opened, described((100, 100, 10_000, 10_000), "<f8"))
@@ -334,6 +388,9 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("cut EXR", folder(cut("0_0.exr"), **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: "),
     ("cut TIFF", folder(cut("1_0.tif"), **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "1_0.tif: "),
     ("pages", folder(stack, channels=1, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "has 3 pages"),
+    ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),
+    ("pages of another grid", tiff_of(7), [*CAMERAS, "--grid", 2, 3], "has 7 pages, where --grid is of 2 x 3 views"),
+    ("one page", tiff_of(1), CAMERAS, "in.tif: is one picture; of a lens array it needs --lens-array"),
     ("negative light", array(-LIGHT), [*CAMERAS, "--photons", 9], "holds light below 0"),
     ("light below 0 encoded", array(-LIGHT), [*CAMERAS, "--srgb"], r"view \(0, 0\) holds numbers below 0"),
     ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
