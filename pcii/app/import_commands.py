@@ -176,7 +176,7 @@ def import_dataset(
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
-    say(f"{out}: {K} x {L} views of {W} x {H} px, {dataset.cfa or 'no'} Bayer pattern; {origin}")
+    say(f"{out}: {K} x {L} views of {H} x {W} px, {dataset.cfa or 'no'} Bayer pattern; {origin}")
     for note in imported.notes:
         say(note)
     if sharp:

@@ -91,8 +91,8 @@ def import_hci(folder: str | Path, *, encoding: Encoding | None = None, report: 
     )
     if views.grid.shape_KLHW[2:] != (known.height, known.width):
         raise InputError(
-            f"{root / PARAMETERS}: image_resolution is {known.width} x {known.height} px, and the views are "
-            f"{views.grid.width} x {views.grid.height}"
+            f"{root / PARAMETERS}: image_resolution is {known.height} x {known.width} px, and the views are "
+            f"{views.grid.height} x {views.grid.width}, rows x columns"
         )
     z_range = None
     if known.disparities_px is not None:

@@ -59,7 +59,7 @@ class Picture:
         height, width, channels = self.shape
         kind = self.dtype if self.bits is None else f"{self.bits} bits"
         pages = f", {self.pages} pages" if self.pages > 1 else ""
-        return f"{width} x {height} px, {channels} channels of {kind}{pages}"
+        return f"{height} x {width} px, {channels} channels of {kind}{pages}"
 
     @property
     def most(self) -> int:
@@ -91,7 +91,7 @@ def picture_of(path: Path) -> Picture:
         picture = Picture(path, kind, **header(path))
         height, width, channels = picture.shape
         if min(picture.shape) < 1 or height * width > MOST_PIXELS:
-            raise InputError(f"{width} x {height} px, and at most {MOST_PIXELS} pixels are decoded")
+            raise InputError(f"{height} x {width} px, and at most {MOST_PIXELS} pixels are decoded")
         if channels not in (1, 3):
             raise InputError(f"has {channels} channels; expected 1 or 3")
         _check_upright(picture.orientation)

@@ -32,13 +32,13 @@ def read_pfm(path: Path, shape: tuple[int, int]) -> np.ndarray:
                 raise InputError(f"{path}: its header has {fields!r} for width, height and scale") from None
             if (height, width) != shape:
                 raise InputError(
-                    f"{path}: is {width} x {height} px, where the views are {shape[1]} x {shape[0]}"
+                    f"{path}: is {height} x {width} px, where the views are {shape[0]} x {shape[1]}"
                 )
             if not np.isfinite(scale) or scale == 0:
                 raise InputError(f"{path}: its scale is {scale:g}; expected a number other than 0")
             if size - start != 4 * width * height:
                 raise InputError(
-                    f"{path}: has {size - start} bytes after its header, where {width} x {height} numbers "
+                    f"{path}: has {size - start} bytes after its header, where {height} x {width} numbers "
                     f"have {4 * width * height}"
                 )
             file.seek(start)

@@ -41,8 +41,8 @@ def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
         across, down = disparity_px(grid, z)
         metres = f"; if metres are meant, it is {1000 * z:g}" if overlap(1000 * z) else ""
         raise InputError(
-            f"{name}: {z:g} mm is so near that no views overlap, of {grid.width} x {grid.height} px each and "
-            f"{across:.0f} x {down:.0f} px apart; depths are in mm{metres}"
+            f"{name}: {z:g} mm is so near that no views overlap, of {grid.height} x {grid.width} px each and "
+            f"{down:.0f} x {across:.0f} px apart, rows x columns; depths are in mm{metres}"
         )
 
 

@@ -61,12 +61,12 @@ def read_environment(path: Path) -> np.ndarray:
         raise ValueError("has channels of different sizes")
     if min(width, height) < 1 or width * height * len(channels) * 4 > LARGEST_ENVIRONMENT_BYTES:
         raise ValueError(
-            f"is {width} x {height} pixels of {len(channels)} channels, "
+            f"is {height} x {width} pixels of {len(channels)} channels, "
             f"more than {LARGEST_ENVIRONMENT_BYTES} bytes"
         )
     if width != 2 * height:
         raise ValueError(
-            f"is {width} x {height} pixels; what shines from all around is twice as wide as high"
+            f"is {height} x {width} pixels; what shines from all around is twice as wide as high"
         )
     with OpenEXR.File(str(path), separate_channels=True) as file:
         planes = file.channels()
@@ -94,7 +94,7 @@ def _opened(data: bytes, kind: str) -> Any:
     image = plugin(io.BytesIO(data))
     if image.width * image.height > LARGEST_TEXTURE_PIXELS:
         raise ValueError(
-            f"is {image.width} x {image.height} pixels, more than a texture may have "
+            f"is {image.height} x {image.width} pixels, more than a texture may have "
             f"({LARGEST_TEXTURE_PIXELS})"
         )
     frames = getattr(image, "n_frames", 1)

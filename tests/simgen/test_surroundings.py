@@ -165,7 +165,7 @@ def test_uniform_light_is_not_aimed_at(tmp_path: Path) -> None:
     [
         ((16, 32, 1), "this file has the channels Y; R, G and B are needed"),
         ((16, 16, 3), "this file is 16 x 16 pixels; what shines from all around is twice as wide as high"),
-        ((32, 16, 3), "this file is 16 x 32 pixels; what shines from all around is twice as wide as high"),
+        ((32, 16, 3), "this file is 32 x 16 pixels; what shines from all around is twice as wide as high"),
     ],
 )
 def test_images_of_another_kind_are_refused(
