@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
+from hostile_names import NAMES
 from test_console import all_said, at_a_terminal
 
 from pcii.app import commands as pcii_cli
 from pcii.app.command_options import depths_mm
 from pcii.base import command_line
 from pcii.base.command_line import command_app
-from pcii.base.command_output import answer, say, say_next
+from pcii.base.command_output import answer, answer_json, say, say_next
+from pcii.base.plain_text import UNSEEN
 from pcii.base.progress import Stages, is_quiet
 from pcii.io.sample_dataset import SAMPLE
 from simgen.app import commands as simgen_cli
@@ -209,3 +211,21 @@ def test_completion_is_installed_where_the_shell_looks(name: str, shell: str, tm
     assert done.returncode == 0, done.stderr
     written = [file.read_text() for file in tmp_path.rglob("*") if file.is_file()]
     assert any("verify" in text and name in text for text in written)
+
+
+def test_words_of_strangers_do_not_command_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    app = command_app("works", "Works.")
+
+    @app.command
+    def fail(name: str) -> None:
+        answer_json({name: 1})
+        answer(f"object {name}")
+        with Stages() as report:
+            report(name, 1, 1)
+        raise RuntimeError(name)
+
+    for name in NAMES:
+        assert command_line.run(app, ["fail", "--", name]) == 1
+        told = capsys.readouterr()
+        assert not UNSEEN.search((told.out + told.err).replace("\n", ""))
+        assert json.JSONDecoder().raw_decode(told.out)[0] == {name: 1}

@@ -20,7 +20,8 @@ from pcii.exporting.card_files import write_card
 from pcii.exporting.publication_terms import Terms
 from pcii.figures.pictures import write_png
 from pcii.io.sample_dataset import copy_sample
-from simgen.spec.recipe import Recipe, override
+from simgen.base.overrides import override
+from simgen.spec.recipe import Recipe
 
 DOCS = ROOT / "docs"
 SLOW = {"first_hour.md", "your_own_images.md"}

@@ -13,6 +13,7 @@ from importlib.metadata import version
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
+from pcii.base.command_output import complain
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages, quiet, shown_by
 
@@ -159,7 +160,7 @@ def _leave(code: int, sentence: str) -> int:
     """Print the sentence on standard error and return the code; for PCII_TRACEBACK raise the exception."""
     if os.environ.get("PCII_TRACEBACK"):
         raise
-    print(sentence, file=sys.stderr, flush=True)
+    complain(sentence)
     return code
 
 

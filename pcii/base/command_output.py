@@ -1,12 +1,12 @@
 """What a command prints: what it did, what was asked for, and the next command to type."""
 
-import json
 import shlex
 import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
+from pcii.base.plain_text import in_json, in_terminal
 from pcii.base.progress import is_quiet
 
 
@@ -18,19 +18,24 @@ def say(text: str) -> None:
 
 def answer(text: str) -> None:
     """Print what a command was asked for on standard output, with --quiet too."""
-    print(text, flush=True)
+    print(in_terminal(text), flush=True)
 
 
 def answer_json(value: Any) -> None:
     """Print a result for scripts: indented JSON on standard output, without NaN and infinities."""
-    answer(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
+    answer(in_json(value, indent=2))
+
+
+def complain(text: str) -> None:
+    """Print what went wrong on standard error, with --quiet too."""
+    print(in_terminal(text), file=sys.stderr, flush=True)
 
 
 def say_next(*words: object) -> None:
     """Print the command to type next, for whoever sits at a terminal: not in a pipe or with --quiet."""
     if not is_quiet() and sys.stdout.isatty():
         program, *arguments = map(str, words)
-        print(f"next:  {shlex.join([_typed(program), *arguments])}", flush=True)
+        answer(f"next:  {shlex.join([_typed(program), *arguments])}")
 
 
 def say_next_page(path: Path) -> None:

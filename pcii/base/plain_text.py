@@ -1,12 +1,19 @@
 """Display of text from untrusted files: markup is escaped, invisible characters are made visible."""
 
+import json
 import re
 from html import escape
+from typing import Any
+from urllib.parse import quote
 
-UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
-"""Control characters, ends of lines, marks of writing direction, and surrogates."""
+UNSEEN = re.compile(
+    "[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
+"""Control characters, ends of lines, marks of writing direction, surrogates, and what is no character."""
 MARKDOWN = re.compile(r"[\\`*\[\]|~$#]|(?<![^\W_])_|_(?![^\W_])")
 """Characters with a meaning in Markdown; an underscore has one only at the ends of words."""
+OF_ADDRESSES = "%/:?#[]@!$&'()*+,;=~"
+"""What addresses of the web hold beside letters, digits and - . _ as it is."""
 
 
 def visible(text: str) -> str:
@@ -16,6 +23,26 @@ def visible(text: str) -> str:
     'two\\\\nlines'
     """
     return UNSEEN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def in_terminal(text: str) -> str:
+    """The lines of a text, with what a terminal would obey and not show as escape sequences.
+
+    >>> print(in_terminal("two" + chr(10) + "lines" + chr(27) + "[2J"))
+    two
+    lines\\x1b[2J
+    """
+    return "\n".join(map(visible, text.split("\n")))
+
+
+def in_json(value: Any, indent: int | None = None) -> str:
+    """JSON of a value, of characters that terminals show and YAML takes; `ValueError` for NaN and infinities.
+
+    >>> print(in_json("caf\u00e9" + chr(0x9b)))
+    "caf\u00e9\\u009b"
+    """
+    text = json.dumps(value, indent=indent, ensure_ascii=False, allow_nan=False)
+    return "\n".join(UNSEEN.sub(lambda found: f"\\u{ord(found[0]):04x}", line) for line in text.split("\n"))
 
 
 def in_html(value: object) -> str:
@@ -34,3 +61,14 @@ def in_markdown(text: str) -> str:
     a\\|b, snake_case, \\*c\\*
     """
     return MARKDOWN.sub(r"\\\g<0>", escape(visible(text), quote=False))
+
+
+def web_address(text: str) -> str:
+    """An address of the web as a link takes it, other characters percent-encoded; "" for any other text.
+
+    >>> web_address("https://example.org/a b"), web_address("javascript://x")
+    ('https://example.org/a%20b', '')
+    """
+    if not re.match("https?://", text, re.IGNORECASE):
+        return ""
+    return quote(text, safe=OF_ADDRESSES, errors="backslashreplace")

@@ -8,6 +8,8 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from pcii.base.plain_text import visible
+
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
@@ -44,7 +46,7 @@ class Stages(AbstractContextManager["Stages"]):
             )
 
             self._rich = Progress(
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 MofNCompleteColumn(),
                 TimeElapsedColumn(),
@@ -68,6 +70,7 @@ class Stages(AbstractContextManager["Stages"]):
     def __call__(self, stage: str, done: int, total: int) -> None:
         if is_quiet():
             return
+        stage = visible(stage)
         if self._rich is not None:
             if stage not in self._tasks:
                 self._tasks[stage] = self._rich.add_task(stage, total=total)

@@ -1,10 +1,9 @@
 """The card of a dataset or collection: README.md for people, in Markdown."""
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from pcii.base.plain_text import in_markdown
+from pcii.base.plain_text import in_json, in_markdown, web_address
 from pcii.core.array_labels import Label
 from pcii.exporting.publication_terms import PROJECT, Terms
 
@@ -73,9 +72,7 @@ def card_of_collection(
 ) -> str:
     """README.md of a collection with these rows in its index."""
     fields = list(document["fields"])
-    values = {
-        field: list(dict.fromkeys(json.dumps(row["values"][field]) for row in rows)) for field in fields
-    }
+    values = {field: list(dict.fromkeys(in_json(row["values"][field]) for row in rows)) for field in fields}
     swept = [f"| `{field}` | {len(values[field])} | {_few(values[field])} |" for field in fields]
     splits = {name: sum(row.get("split") == name for row in rows) for name in ("train", "validation", "test")}
     said = ", ".join(f"{count} {name}" for name, count in splits.items() if count)
@@ -104,10 +101,10 @@ def _few(values: Sequence[str]) -> str:
 
 
 def _head(title: str, sentence: str, terms: Terms) -> list[str]:
-    licence = ["license: other", f"license_link: {json.dumps(terms.licence)}"]
+    licence = ["license: other", f"license_link: {in_json(terms.licence)}"]
     if "://" not in terms.licence:
-        licence = [f"license: {json.dumps(terms.licence.lower())}"]
-    front = ["---", *licence, f"pretty_name: {json.dumps(title)}", f"tags: {json.dumps(list(TAGS))}", "---"]
+        licence = [f"license: {in_json(terms.licence.lower())}"]
+    front = ["---", *licence, f"pretty_name: {in_json(title)}", f"tags: {in_json(TAGS)}", "---"]
     return ["\n".join(front), f"# {in_markdown(title)}", in_markdown(sentence)]
 
 
@@ -139,10 +136,12 @@ def _without_none(value: Any) -> Any:
 
 
 def _terms(terms: Terms) -> list[str]:
-    where = [f"Where: <{terms.url}>"] if terms.url else []
+    licence, link = in_markdown(terms.licence), web_address(terms.licence_url)
+    address = web_address(terms.url)
+    where = [f"Where: {f'<{address}>' if address else in_markdown(terms.url)}"] if terms.url else []
     return [
         "## Licence and citation",
-        f"Licence: [{in_markdown(terms.licence)}](<{terms.licence_url}>). "
+        f"Licence: {f'[{licence}](<{link}>)' if link else licence}. "
         f"By {', '.join(in_markdown(name) for name in terms.creators)}. Please cite:",
         f"> {in_markdown(terms.citation)}",
         *where,

@@ -1,14 +1,13 @@
 """The `simgen` command."""
 
 import math
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from pcii.base import command_line
-from pcii.base.command_output import answer, answer_json, results_folder, say, say_next
+from pcii.base.command_output import answer, answer_json, complain, results_folder, say, say_next
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, new_recipe, new_scene
@@ -123,9 +122,9 @@ def generate(
         write_card(out, terms)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
     for fault in faults[:MOST_TOLD]:
-        print(f"not made: {fault}", file=sys.stderr)
+        complain(f"not made: {fault}")
     if len(faults) > MOST_TOLD:
-        print(f"and {len(faults) - MOST_TOLD} more were not made", file=sys.stderr)
+        complain(f"and {len(faults) - MOST_TOLD} more were not made")
     if not faults:
         say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
     return 1 if faults else 0

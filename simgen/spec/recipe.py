@@ -1,6 +1,5 @@
 """Recipes: one TOML file a dataset, resolved and validated before anything is rendered."""
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
@@ -10,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS
 from simgen.base.locations import find, recipe_roots
+from simgen.base.overrides import override
 from simgen.base.strict_models import (
     Count,
     NonNegative,
@@ -279,30 +279,3 @@ def recipe_file(name_or_path: str) -> Path | None:
         return path
     shipped = find(recipe_roots, f"{name_or_path.removesuffix('.toml')}.toml")
     return shipped if path.parent == Path() else None
-
-
-def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
-    """Put values given as `key=value` into what a recipe says; raises `InputError` for any other text."""
-    for text in overrides:
-        _override(values, text)
-
-
-def _override(values: dict[str, Any], text: str) -> None:
-    key, equals, value = text.partition("=")
-    if not equals or not all(key.split(".")):
-        raise InputError(f"--set: expected key=value such as photons.budget=300, got {text!r}")
-    *tables, last = key.split(".")
-    target = values
-    for table in tables:
-        target = target.setdefault(table, {})
-        if not isinstance(target, dict):
-            raise InputError(f"--set: {table!r} in {key!r} is a value, not a table")
-    try:
-        target[last] = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        if value.startswith(("[", "{")):
-            raise InputError(
-                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, "
-                'as in \'scene=["two_objects", "overlap"]\''
-            ) from None
-        target[last] = value

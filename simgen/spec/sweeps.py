@@ -19,8 +19,9 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
+from simgen.base.overrides import override
 from simgen.base.strict_models import validate
-from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
+from simgen.spec.recipe import Recipe, read_recipe, recipe_file
 from simgen.spec.scene import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000

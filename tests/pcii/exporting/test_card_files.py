@@ -3,10 +3,14 @@
 import hashlib
 import json
 import re
+from html.parser import HTMLParser
 from pathlib import Path
 
 import mlcroissant
 import pytest
+import yaml
+from hostile_names import NAMES
+from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, one_sentence
 
 import pcii
@@ -17,6 +21,7 @@ from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, read_manifest
 from pcii.io.sealed_json import write_sealed
 from pcii.io.verification import verify
 
+TABLE = ("table", "thead", "tbody", "tr", "th", "td")
 ROOT = Path(__file__).resolve().parents[3]
 TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "https://example.org/photons")
 
@@ -147,17 +152,31 @@ def test_a_card_of_other_data_or_of_nobody_is_an_error(tmp_path):
     assert "damaged" in one_sentence(lambda: verify(root), root / CROISSANT)
 
 
-def test_titles_from_strangers_are_text(tmp_path):
-    title = 'photons"\nlicense: mine <script>alert(1)</script> [x](http://x) | `'
-    root = make_dataset(tmp_path / "data", title=title)
-    write_card(root, TERMS)
-    front, body = (root / CARD).read_text().removeprefix("---\n").split("\n---\n", 1)
-    values = dict(line.split(": ", 1) for line in front.splitlines())
-    assert json.loads(values["license"]) == "cc-by-4.0"
-    assert json.loads(values["pretty_name"]) == title
-    assert "<script" not in body
-    assert "[x](http" not in body
-    read_croissant(root)
+class Shown(HTMLParser):
+    """Elements of a page, and where its links lead."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags, self.links = set[str](), list[str]()
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.links += [value for _, value in attrs]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_words_of_strangers_are_text_in_markdown_and_in_yaml(tmp_path, name):
+    root = make_dataset(tmp_path / "data", title=name, objects={"1": name})
+    for address in (name, f"https://example.org/{name}", f"javascript://{name}"):
+        write_card(root, Terms(address, (name,), name, address))
+        front, body = (root / CARD).read_text().removeprefix("---\n").split("\n---\n", 1)
+        values = yaml.safe_load(front)
+        assert values["pretty_name"].encode(errors="replace") == name.encode(errors="replace")
+        assert (values.get("license_link") or values["license"]).lower().startswith(address[:1].lower())
+        page = Shown(MarkdownIt("gfm-like", {"html": True, "linkify": False}).render(body))
+        assert page.tags <= {"h1", "h2", "p", "code", "pre", "a", "blockquote", *TABLE}
+        assert all(str(link).startswith(("https://", "language-")) for link in page.links)
 
 
 def test_the_default_terms_are_those_of_the_project():
