@@ -53,6 +53,14 @@ def checked(remove: Callable[..., object], label: str, name: str | None = None) 
     return method
 
 
+def _is_map(array: object, shape: tuple[int, ...]) -> bool:
+    """Whether this is an array (Z, H M, W M) for the shape (Z, H, W) and a whole number M."""
+    if not isinstance(array, np.ndarray) or array.ndim != 3:
+        return False
+    (Z, H, W), finer = shape, array.shape[1] // shape[1]
+    return finer >= 1 and array.shape == (Z, H * finer, W * finer)
+
+
 def _unmet_requirement(
     result: Segmented, name: str | None, counts: PhotonCounts, sections: Sections
 ) -> str | None:
@@ -66,7 +74,7 @@ def _unmet_requirement(
     if not isinstance(result.steps, Mapping):
         return "maps by their names in `steps`"
     for step, array in result.steps.items():
-        if not isinstance(array, np.ndarray) or array.shape != result.in_focus.shape:
+        if not _is_map(array, result.in_focus.shape):
             return f"maps {result.in_focus.shape} in `steps`, and {step!r} is none"
     kept, events = result.photon_in_focus, counts.events.n.size
     if kept is not None and kept.shape[1] != events:
