@@ -8,7 +8,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import FocusEvidence, best_labels, focus_evidence, windowed
-from pcii.evidence.half_agreement import halves_of, least_agreement
+from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.sections.photon_statistics import cells_to_pixels
 
@@ -51,8 +51,7 @@ def focus_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthM
     photons = _photons_nearby(evidence, best)
     abstains = (best_gain < SIGNIFICANT_NATS) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
-    halves = halves_of(counts, planes)
-    abstains |= halves.agreement(best, ~abstains) < least_agreement(halves.planes)
+    abstains |= ~halves_of(counts, planes).agree(best, ~abstains)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))

@@ -19,7 +19,7 @@ from pcii.depth.network_inputs import NetworkInputs, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
-from pcii.evidence.half_agreement import halves_of, least_agreement
+from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.sections.photon_statistics import cells_to_pixels
@@ -41,11 +41,12 @@ class PosteriorDepth:
     """Standard deviation of the window in which there are to be photons."""
     least_photons: float = 10.0
     """Their least number, in a Gaussian of weight 1 at its centre."""
-    region_px: float = 64.0
-    """Standard deviation of the window that is seen as a whole if the halves of the cameras agree on much of
-    it: so large that a chance agreement, which reaches as far as the windows of its test, is little of it."""
-    least_share: float = 0.25
-    """How much, for what is more probably a surface than not."""
+    reach_px: float = 64.0
+    """A surface without texture is seen if the halves of the cameras agree around it, so near,"""
+    least_directions: int = 5
+    """in so many of eight directions, which is more than what lies outside a convex outline can meet,"""
+    near_px: float = 4.0
+    """at a depth of which its own differs so little, in total disparity."""
     most_empty: float = 0.9
     """No surface is seen where the probability of none is higher."""
 
@@ -98,21 +99,28 @@ class PosteriorDepth:
         """Where a surface is detected (h, w) bool, `plane` (h, w) the most probable one."""
         detected = self._has_photons(photons, plane, posterior.block_px)
         detected &= posterior.no_surface <= self.most_empty
-        if isinstance(data, PhotonCounts):
-            agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
-            detected &= agree | self._in_agreeing_region(agree, posterior)
-        return detected
+        agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
+        surrounded = self._directions(agree & detected, plane, posterior) >= self.least_directions
+        return detected & (agree | surrounded & (posterior.no_surface < 0.5))
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
         return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
 
-    def _in_agreeing_region(self, agree: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
-        """Surfaces (h, w) bool around which the halves `agree` (h, w) in a share of the blocks."""
-        from scipy.ndimage import gaussian_filter
-
-        share = gaussian_filter(agree.astype(np.float32), self.region_px / posterior.block_px, mode="nearest")
-        return (share >= self.least_share) & (posterior.no_surface < 0.5)
+    def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
+        """In how many of eight directions a block (h, w) meets one where the halves `agree`, at its depth."""
+        near = self.near_px / self.step_px
+        met = np.zeros(agree.shape, np.int8)
+        for direction in ((-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)):
+            found = np.zeros(agree.shape, bool)
+            for steps in range(1, int(self.reach_px / posterior.block_px) + 1):
+                to, of = zip(
+                    *(_moved(steps * d, size) for d, size in zip(direction, agree.shape, strict=True)),
+                    strict=True,
+                )
+                found[to] |= agree[of] & (np.abs(plane[of] - plane[to]) <= near)
+            met += found
+        return met
 
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""
@@ -128,7 +136,14 @@ def _without_faults(data: PhotonCounts | Views) -> PhotonCounts | Views:
     return without_hot_pixels(data) if isinstance(data, PhotonCounts) else data
 
 
-def _halves_agree(counts: PhotonCounts, planes: FocalPlanes, best: np.ndarray, block_px: int) -> np.ndarray:
+def _moved(by: int, size: int) -> tuple[slice, slice]:
+    """The blocks of an axis that have another one `by` blocks further on, and those others."""
+    return slice(max(-by, 0), max(size - max(by, 0), 0)), slice(max(by, 0), max(size + min(by, 0), 0))
+
+
+def _halves_agree(
+    data: PhotonCounts | Views, planes: FocalPlanes, best: np.ndarray, block_px: int
+) -> np.ndarray:
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
     Structure is there at neighbouring planes as well, so that every other one is enough.
@@ -136,9 +151,9 @@ def _halves_agree(counts: PhotonCounts, planes: FocalPlanes, best: np.ndarray, b
     every_other = planes.take(slice(None, None, 2))
     i, j = (
         np.minimum(np.arange(-(-size // CELL_PX)) * CELL_PX // block_px, blocks - 1)
-        for size, blocks in zip((counts.grid.height, counts.grid.width), best.shape, strict=True)
+        for size, blocks in zip((data.grid.height, data.grid.width), best.shape, strict=True)
     )
     plane = best[np.ix_(i, j)] // 2
-    t = halves_of(counts, every_other).agreement(plane, np.ones(plane.shape, bool))
-    agree = cells_to_pixels(t >= least_agreement(len(every_other)), CELL_PX, counts.grid)
+    agree = halves_of(data, every_other).agree(plane, np.ones(plane.shape, bool))
+    agree = cells_to_pixels(agree, CELL_PX, data.grid)
     return agree[::block_px, ::block_px]

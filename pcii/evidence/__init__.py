@@ -1,12 +1,13 @@
 """Evidence of depth in photon counts: how well a section predicts the photons, and whether cameras agree.
 
+camera_sums         Sums over cameras in the blocks of a section, with a weight for each camera.
 cells               The coarse grid on which evidence of focus is kept.
 focus_kernels       Compiled loops over photons and planes: the gain of a plane over its blur, and planes
                     compared.
 focus_likelihood    Evidence of focus from the Poisson likelihood: how well does the section at a depth
                     predict the photons?
-half_agreement      Whether both halves of the cameras show the same structure: evidence of depth needs
-                    several cameras.
+half_agreement      Whether both halves of the cameras show the same structure, and in focus: one camera
+                    shows no depth.
 hot_pixels          Hot pixels at the same place of all cameras, which belong to the sensor and not to the
                     scene.
 label_kernels       Compiled loops over cells: evidence summed between edges, and labels by belief

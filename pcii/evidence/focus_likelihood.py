@@ -108,7 +108,7 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
 
     def evaluate(z: int) -> None:
         cell_of = np.empty(N, np.int32)
-        cells_of_events(*place, rows[z], cols[z], film, cell_of)
+        cells_of_events(*place, rows[z], cols[z], film, CELL_PX, cell_of)
         placed = PlacedEvents(*place, counts.event_colours, n, full_weight, cell_of)
         section = PlaneView(rows[z], cols[z], *film, sites, all_views, 0.0)
         predicted = Predicted(*np.empty((2, N)), *np.empty((3, h, w)))

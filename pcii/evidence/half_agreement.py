@@ -1,27 +1,35 @@
-"""Whether both halves of the cameras show the same structure: evidence of depth needs several cameras.
+"""Whether both halves of the cameras show the same structure, and in focus: one camera shows no depth.
 
-A structure of a single camera, such as a hot pixel, predicts itself at any depth. So the cameras are divided
-like the squares of a chessboard, and a section is made of each half. In each half the photons of a block are
-compared with those of the blocks around it. Where both halves show the same structure the differences have
-the same sign, and their products p are positive on average. Blurred structures agree as well: this tests
-that there is structure, not at what depth it is. For noise, and for structure in one half only, both signs
-of a product are equally likely, so that for any weights w
+A structure of a single camera predicts itself at any depth, and light that varies slowly, in the scene or by
+vignetting, is as likely at one depth as at another. So the cameras are divided like the squares of a
+chessboard, and sections are made of each half. In each half the photons of a block are compared with those of
+the blocks around it. Where both halves show the same structure the differences have the same sign, and their
+products p are positive on average. Of a texture in focus they are larger than at planes so far away that it
+is blurred over several blocks. For noise, and for structure in one half only, both signs of a product and of
+a difference e of products are equally likely, so that for any weights w
 
-    t = sum w p / sqrt(sum w^2 p^2),    P(t > T) <= exp(-T^2 / 2)
+    t = sum w e / sqrt(sum w^2 e^2),    P(t > T) <= exp(-T^2 / 2)
 
 (Efron 1969, "Student's t-test under symmetry conditions"). One product, however large, gives t = 1. Where
 photons are few, differences are not symmetric: most blocks are a little darker than their neighbours. So the
-sum of squares is taken as at least its expectation for Poisson noise.
+sum of squares is taken as at least its expectation for noise, and no product counts for more than a few
+standard deviations, lest bright structures decide on what is far from them.
+
+What lies outside the searched range is better in focus there, and what belongs to the films, as vignetting
+and hot pixels do, at infinity. So planes outside the range are asked as well, and the smallest blocks that
+show structure at any of them decide.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.evidence.camera_sums import camera_sums, whole_shifts_px
 from pcii.evidence.cells import CELL_PX
 from pcii.imaging.bright_regions import box_around
 
@@ -29,64 +37,140 @@ FALSE_RATE = 1e-3
 """Largest share of pure noise in which the halves may seem to agree."""
 BLOCKS_CELLS = (1, 2, 4, 8)
 """Sides of the blocks that are compared, in cells: 4 to 32 px."""
+OUT_OF_FOCUS_BLOCKS = 3
+"""Change of total disparity, in blocks, to a plane out of focus: a block's difference from its neighbours is
+averaged away by a blur as wide as all of them."""
+OUTSIDE_STEP_PX = 8.0
+"""Total disparity between planes outside the range, the first of which is half as far from its end: of
+anything outside the smallest blocks, of half a step, are in focus at one plane at least."""
 WINDOWS_BLOCKS = (4.0, 8.0)
 """Gaussian windows over which products are summed, in blocks: t of N products is at most sqrt(N)."""
 WINDOW_SIGMAS = 4.0
 """Half-width of the truncated windows, in standard deviations."""
-ROUNDING = 1e-9
-"""Differences below this share of the expected photons are rounding errors."""
+PRESENT_BLOCKS, PRESENT_SIGMAS = 1.0, 3.0
+"""The windows are wide, and show what is far from their middle as well. So products are to be large in a
+narrower one, too, in standard deviations of their noise."""
+LEAST_CONTRAST = 0.01
+"""Smaller relative differences are not of texture: of noise-free images every difference would be."""
+MOST_SIGMAS = 3.0
+"""How many standard deviations of its noise a product counts for at most."""
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products p of the halves' differences (Z, h, w) float32 in blocks of one size, and their noise.
+
+    `noise` is the expectation of p^2 for noise alone; `compared` bool is where both halves reach a block and
+    blocks around it. Elsewhere the others are 0.
+    """
+
+    p: np.ndarray
+    noise: np.ndarray
+    compared: np.ndarray
+
+    def less(self, other: "Products") -> "Products":
+        """The difference of products, where there are both."""
+        compared = self.compared & other.compared
+        return Products(
+            np.where(compared, self.p - other.p, 0), np.where(compared, self.noise + other.noise, 0), compared
+        )
+
+    def at(self, index: Any) -> "Products":
+        """The products of some planes, or of some blocks of each plane."""
+        return Products(self.p[index], self.noise[index], self.compared[index])
+
+    def limited(self) -> np.ndarray:
+        """p, of which none counts for more than `MOST_SIGMAS` of its noise."""
+        most = MOST_SIGMAS * np.sqrt(self.noise)
+        return np.clip(self.p, -most, most)
 
 
 @dataclass(frozen=True)
 class Halves:
-    """Products of the halves' differences for blocks of s x s cells, (Z, h / s, w / s) float64 for each s.
+    """How well the halves agree at Z planes, at planes out of focus and at Y planes outside the range.
 
-    `products` are p, `noise` the expectation of p^2 under Poisson noise alone.
+    Each has one entry for each size of blocks: `inside` (Z, ...) products at the planes, `nearer` and
+    `farther` (Z, ...) those out of focus, `outside` (Y, ...) those outside the range.
     """
 
-    products: Sequence[np.ndarray]
-    noise: Sequence[np.ndarray]
+    inside: Sequence[Products]
+    nearer: Sequence[Products]
+    farther: Sequence[Products]
+    outside: Sequence[Products]
 
     @property
     def planes(self) -> int:
         """Number of planes."""
-        return len(self.products[0])
+        return len(self.inside[0].p)
 
-    def agreement(self, label: np.ndarray, where: np.ndarray) -> np.ndarray:
-        """t (h, w) of the windows around each cell at the plane `label` (h, w), the largest of all windows.
+    def agree(self, label: np.ndarray, where: np.ndarray) -> np.ndarray:
+        """Where (h, w) bool the halves agree, around each cell, that there is a surface at the plane `label`.
 
-        Computed for cells that are `where` (h, w) bool; 0 elsewhere.
+        `label` (h, w) are indices of planes, `where` (h, w) bool the cells that are asked about. The smallest
+        blocks and windows decide in which the halves agree at that plane or at one outside the range.
         """
-        result = np.zeros(label.shape)
-        for z in np.unique(label[where]):
-            at_plane = where & (label == z)
-            for side, products, noise in zip(BLOCKS_CELLS, self.products, self.noise, strict=True):
-                for sigma in WINDOWS_BLOCKS:
-                    reach = int(WINDOW_SIGMAS * sigma)
-                    box = box_around(_block_sums(at_plane, side) > 0, (reach, reach))
-                    t = _windowed_t(products[z][box], noise[z][box], sigma)
-                    t = t.repeat(side, axis=0).repeat(side, axis=1)
-                    cells = tuple(slice(axis.start * side, axis.stop * side) for axis in box)
-                    selected, largest = at_plane[cells], result[cells]
-                    t = t[: largest.shape[0], : largest.shape[1]]
-                    largest[selected] = np.maximum(largest, t)[selected]
-        return result
+        agreed, undecided = np.zeros(label.shape, bool), where.copy()
+        for size in range(len(BLOCKS_CELLS)):
+            for sigma in WINDOWS_BLOCKS:
+                here, own = self._at_labels(size, sigma, label, undecided)
+                elsewhere, best = self._outside_range(size, sigma, label.shape)
+                nearer_here = own >= best
+                agreed |= undecided & here & nearer_here
+                undecided &= ~here & (nearer_here | ~elsewhere)
+        return agreed
 
     def agreement_over(self, rows: slice, cols: slice, where: np.ndarray) -> float:
         """t over the cells `where` (bool) of the box `rows`, `cols`, the largest of all planes and sizes.
 
         All planes, since the halves may agree best at the plane of a surface in front of a region.
         """
-        cells = np.zeros(self.products[0].shape[1:])
+        cells = np.zeros(self.inside[0].p.shape[1:])
         cells[rows, cols] = where
         largest = 0.0
-        for side, products, noise in zip(BLOCKS_CELLS, self.products, self.noise, strict=True):
+        for side, inside, nearer, farther in zip(
+            BLOCKS_CELLS, self.inside, self.nearer, self.farther, strict=True
+        ):
             weight = _block_sums(cells, side)
-            inside = weight > 0
-            weight, p, v = weight[inside], products[:, inside], noise[:, inside]
-            squares = np.maximum(p**2 @ weight**2, v @ weight**2)
-            largest = max(largest, float(_t(p @ weight, squares).max()))
+            blocks = np.nonzero(weight)
+            weight, own = weight[blocks], inside.at((slice(None), *blocks))
+            t = [
+                _t(e.p @ weight, np.maximum(e.p**2 @ weight**2, e.noise @ weight**2))
+                for out in (nearer, farther)
+                for e in [own.less(out.at((slice(None), *blocks)))]
+            ]
+            largest = max(largest, float(np.minimum(*t).max()))
         return largest
+
+    def _at_labels(
+        self, size: int, sigma: float, label: np.ndarray, where: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the halves agree around each cell at its own plane (h, w), and the sums of products."""
+        side, reach = BLOCKS_CELLS[size], int(WINDOW_SIGMAS * sigma)
+        agreed, total = np.zeros(label.shape, bool), np.zeros(label.shape)
+        for z in np.unique(label[where]):
+            at_plane = where & (label == z)
+            rows, cols = box_around(_block_sums(at_plane, side) > 0, (reach, reach))
+            own, nearer, farther = (
+                each[size].at((z, rows, cols)) for each in (self.inside, self.nearer, self.farther)
+            )
+            excess = own.less(nearer), own.less(farther)
+            agree = np.minimum(*(_agreement(e, sigma) for e in excess)) >= least_agreement(self.planes)
+            cells = tuple(slice(axis.start * side, axis.stop * side) for axis in (rows, cols))
+            selected = at_plane[cells]
+            for result, values in ((agreed, agree), (total, _windowed(own.p, sigma))):
+                result[cells][selected] = _in_cells(values, side, selected.shape)[selected]
+        return agreed, total
+
+    def _outside_range(
+        self, size: int, sigma: float, shape: tuple[int, ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Whether the halves agree around each cell on anything outside (h, w), and the largest sums."""
+        outside = self.outside[size]
+        agreed, largest = np.zeros(outside.p.shape[1:], bool), np.full(outside.p.shape[1:], -np.inf)
+        for z in range(len(outside.p)):
+            agreed |= _agreement(outside.at(z), sigma) >= least_agreement(len(outside.p))
+            np.maximum(largest, _windowed(outside.p[z], sigma), out=largest)
+        return _in_cells(agreed, BLOCKS_CELLS[size], shape), _in_cells(largest, BLOCKS_CELLS[size], shape)
 
 
 def least_agreement(planes: int) -> float:
@@ -101,67 +185,65 @@ def least_agreement(planes: int) -> float:
     return float(np.sqrt(2 * np.log(planes / FALSE_RATE)))
 
 
-def halves_of(counts: PhotonCounts, planes: FocalPlanes) -> Halves:
-    """Products of the halves' differences in the sections at these planes."""
-    from pcii.base.compiled_loops import threads
-
-    grid, events = counts.grid, counts.events
-    rows, cols = planes.whole_shifts_px
-    h, w = -(-grid.height // CELL_PX), -(-grid.width // CELL_PX)
-    half_of = (events.k + events.l) % 2
-    place = events.k, events.l, events.i, events.j
-    n = events.n.astype(np.float64)
-
-    def compare(z: int) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        from pcii.evidence.projection_kernels import cells_of_events, views_of_blocks
-
-        cell = np.empty(n.size, np.int32)
-        cells_of_events(*place, rows[z], cols[z], (grid.height, grid.width), cell)
-        halves = []
-        for half in (0, 1):
-            in_half = (cell >= 0) & (half_of == half)
-            photons = np.bincount(cell[in_half], n[in_half], h * w).reshape(h, w)
-            samples = np.zeros((h, w))
-            for parity in (0, 1):
-                half_shifts = rows[z][parity::2], cols[z][(parity + half) % 2 :: 2]
-                by_row, by_col = (
-                    views_of_blocks(shifts, size, 2 * cells).reshape(cells, 2).sum(axis=1)
-                    for shifts, size, cells in zip(
-                        half_shifts, (grid.height, grid.width), (h, w), strict=True
-                    )
-                )
-                samples += np.outer(by_row, by_col)
-            halves.append((photons, samples))
-        products, noise = zip(*(_products(halves, side) for side in BLOCKS_CELLS), strict=True)
-        return list(products), list(noise)
-
-    with ThreadPoolExecutor(threads()) as pool:
-        by_plane = list(pool.map(compare, range(len(rows))))
-    products, noise = (
-        [np.stack(sizes) for sizes in zip(*quantity, strict=True)] for quantity in zip(*by_plane, strict=True)
-    )
-    return Halves(products, noise)
+def halves_of(data: PhotonCounts | Views, planes: FocalPlanes) -> Halves:
+    """How well the halves of the cameras agree at these planes, out of focus, and outside their range."""
+    own_px = planes.total_disparity_px
+    nearest, farthest = own_px.max(), own_px.min()
+    # From infinity, where the films' own structure is, to as far in front of the range.
+    away_px = OUTSIDE_STEP_PX * (np.arange(np.ceil(nearest / OUTSIDE_STEP_PX)) + 0.5)
+    behind_px = farthest - away_px
+    outside_px = np.concatenate([np.maximum(behind_px[behind_px > -OUTSIDE_STEP_PX], 0), nearest + away_px])
+    # Planes out of focus need not be exact: of all planes they share as many as they can.
+    out_px = [
+        step * np.round((own_px + np.array([[1], [-1]]) * OUT_OF_FOCUS_BLOCKS * side * CELL_PX) / step)
+        for side in BLOCKS_CELLS
+        for step in [side * CELL_PX / 2]
+    ]
+    total_px = np.unique(np.concatenate([own_px, outside_px, *(each.ravel() for each in out_px)]))
+    half = np.add.outer(np.arange(data.grid.rows), np.arange(data.grid.cols)) % 2
+    weights = np.stack([half == 0, half == 1]).astype(np.float64)
+    sums, samples = camera_sums(data, whole_shifts_px(data.grid, total_px), weights, CELL_PX)
+    own, outside = (np.searchsorted(total_px, each) for each in (own_px, outside_px))
+    halves: list[tuple[Products, ...]] = []
+    for side, (nearer_px, farther_px) in zip(BLOCKS_CELLS, out_px, strict=True):
+        groups = own, np.searchsorted(total_px, nearer_px), np.searchsorted(total_px, farther_px), outside
+        used, places = np.unique(np.concatenate(groups), return_inverse=True)
+        products = _products(sums, samples, used, side, is_counted=isinstance(data, PhotonCounts))
+        halves.append(
+            tuple(products.at(part) for part in np.split(places, np.cumsum([len(g) for g in groups])[:-1]))
+        )
+    return Halves(*zip(*halves, strict=True))
 
 
-def _products(halves: Sequence[tuple[np.ndarray, np.ndarray]], side: int) -> tuple[np.ndarray, np.ndarray]:
-    """Products, over the halves, of each block's relative difference from its neighbours, and their noise.
+def _products(
+    sums: np.ndarray, samples: np.ndarray, used: np.ndarray, side: int, *, is_counted: bool
+) -> Products:
+    """Products, over the halves, of each block's relative difference from its neighbours, at planes `used`.
 
-    `halves` has the photons and samples (h, w) of each half.
+    `sums` and `samples` (Z, 2, h, w) are those of the halves in cells.
     """
-    shape = _block_sums(halves[0][0], side).shape
-    products, noise = np.ones(shape), np.ones(shape)
-    for photons, samples in halves:
-        block_photons, block_samples = _block_sums(photons, side), _block_sums(samples, side)
-        near_photons, near_samples = _neighbour_sums(block_photons), _neighbour_sums(block_samples)
+    planes = [_products_of_plane(sums[z], samples[z], side, is_counted=is_counted) for z in used]
+    return Products(*(np.stack(part) for part in zip(*planes, strict=True)))
+
+
+def _products_of_plane(
+    sums: np.ndarray, samples: np.ndarray, side: int, *, is_counted: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    shape = _block_sums(sums[0], side).shape
+    products, noise, compared = np.ones(shape), np.ones(shape), np.ones(shape, bool)
+    for half_sums, half_samples in zip(sums, samples, strict=True):
+        block_sums, block_samples = _block_sums(half_sums, side), _block_sums(half_samples, side)
+        near_sums, near_samples = _neighbour_sums(block_sums), _neighbour_sums(block_samples)
         covered = (block_samples > 0) & (near_samples > 0)
-        expected = np.divide(block_samples * near_photons, near_samples, out=np.zeros(shape), where=covered)
-        difference = np.where(covered, block_photons - expected, 0.0)
-        difference[np.abs(difference) < ROUNDING * expected] = 0
+        expected = np.divide(block_samples * near_sums, near_samples, out=np.zeros(shape), where=covered)
         # Blocks darker than average have no more weight than average ones.
-        scale = expected + expected.mean() + (expected.mean() == 0)
-        products *= difference / scale
-        noise *= expected / scale**2
-    return products, noise
+        scale = np.abs(expected) + np.abs(expected).mean()
+        scale += scale == 0
+        products *= (block_sums - expected) / scale
+        noise *= LEAST_CONTRAST**2 + (np.maximum(expected, 0) / scale**2 if is_counted else 0.0)
+        compared &= covered
+    products, noise = (np.where(compared, part, 0).astype(np.float32) for part in (products, noise))
+    return products, noise, compared
 
 
 def _neighbour_sums(blocks: np.ndarray) -> np.ndarray:
@@ -178,18 +260,31 @@ def _block_sums(cells: np.ndarray, side: int) -> np.ndarray:
     return padded.reshape(padded.shape[0] // side, side, -1, side).sum(axis=(1, 3))
 
 
-def _windowed_t(products: np.ndarray, noise: np.ndarray, sigma: float) -> np.ndarray:
-    """t of Gaussian windows around each block, from the products and their noise."""
+def _in_cells(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
+    """The values of blocks at each of their cells, of which there are `shape`."""
+    return blocks.repeat(side, axis=0).repeat(side, axis=1)[: shape[0], : shape[1]]
+
+
+def _windowed(values: np.ndarray, sigma: float) -> np.ndarray:
+    """Sums of values in Gaussian windows around each block, of weight 1 at their centres."""
     from scipy.ndimage import gaussian_filter
 
-    truncated = {"mode": "constant", "radius": int(WINDOW_SIGMAS * sigma)}
-    total = 2 * np.pi * sigma**2 * gaussian_filter(products, sigma, **truncated)
-    # The square of a Gaussian is a Gaussian of 1 / sqrt(2) the width, truncated at the same radius.
-    squares, expected = (
-        np.pi * sigma**2 * gaussian_filter(values, sigma / np.sqrt(2), **truncated)
-        for values in (products**2, noise)
-    )
-    return _t(total, np.maximum(squares, expected))
+    window = {"mode": "constant", "radius": int(np.ceil(WINDOW_SIGMAS * sigma))}
+    return 2 * np.pi * sigma**2 * gaussian_filter(values, sigma, **window)
+
+
+def _agreement(products: Products, sigma: float) -> np.ndarray:
+    """t of Gaussian windows around each block; if a few blocks far from its middle alone show it, 0."""
+    t, limited = _windowed_t(products.p, products.noise, sigma), products.limited()
+    narrow = _t(_windowed(limited, PRESENT_BLOCKS), _windowed(products.noise, PRESENT_BLOCKS / np.sqrt(2)))
+    return np.where(narrow >= PRESENT_SIGMAS, t, np.minimum(t, _windowed_t(limited, products.noise, sigma)))
+
+
+def _windowed_t(p: np.ndarray, noise: np.ndarray, sigma: float) -> np.ndarray:
+    """t of Gaussian windows around each block, from products and their noise."""
+    # The square of a Gaussian is a Gaussian of 1 / sqrt(2) the width.
+    squares, expected = (_windowed(values, sigma / np.sqrt(2)) for values in (p**2, noise))
+    return _t(_windowed(p, sigma), np.maximum(squares, expected))
 
 
 def _t(total: np.ndarray, squares: np.ndarray) -> np.ndarray:

@@ -6,8 +6,9 @@ Axes: C colours, (H, W) cells of 4 x 4 pixels unless said otherwise, N events.
 import numpy as np
 
 from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.evidence.cells import BLOCK_PX
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted, Scales
-from pcii.evidence.projection_kernels import BLOCK_PX, views_of_blocks
+from pcii.evidence.projection_kernels import views_of_blocks
 from pcii.evidence.smoothing_kernels import CENTRE, enclosing_centres, halved, linear_at, smoothed
 
 SCALES = 5

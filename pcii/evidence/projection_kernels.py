@@ -3,14 +3,7 @@
 import numpy as np
 
 from pcii.base.compiled_loops import compiled, helper
-from pcii.evidence.cells import CELL_PX
-
-BLOCK_PX = 2
-"""Voxels of 2 x 2 pixels, each of which every Bayer colour covers equally for any shifts.
-
-Single pixels are not covered equally: at depths where all shifts are even a colour falls on every fourth
-voxel only, each of which holds four times as many photons, and textured regions would be assigned such
-depths. """
+from pcii.evidence.cells import BLOCK_PX
 
 
 @helper
@@ -43,18 +36,19 @@ def cells_of_events(
     rows: np.ndarray,
     cols: np.ndarray,
     size: tuple[int, int],
+    cell_px: int,
     cell: np.ndarray,
 ) -> None:
     """Writes to `cell` (N,) the flat index of the cell of each event, -1 outside its view's blocks.
 
     Events at pixels (`i`, `j`) of cameras (`k`, `l`); whole shifts `rows` (K,) and `cols` (L,) in px; `size`
-    of the film in px.
+    of the film, and `cell_px` of cells, in px.
     """
     H, W = size
-    across = -(-W // CELL_PX)
+    across = -(-W // cell_px)
     for e in range(k.size):
         row, col = i[e] + rows[k[e]], j[e] + cols[l[e]]
         top, bottom = _whole_blocks(int(rows[k[e]]), H)
         left, right = _whole_blocks(int(cols[l[e]]), W)
         inside = top <= row < bottom and left <= col < right
-        cell[e] = (row // CELL_PX) * across + col // CELL_PX if inside else -1
+        cell[e] = (row // cell_px) * across + col // cell_px if inside else -1

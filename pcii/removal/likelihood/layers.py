@@ -113,7 +113,9 @@ class Layers:
         # What the search for outlines goes on from: relaxed mask, a step ahead, flows across and down.
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
-            cells_of_events(*self.place, self.rows[layer], self.cols[layer], self.film, self.cells[layer])
+            cells_of_events(
+                *self.place, self.rows[layer], self.cols[layer], self.film, CELL_PX, self.cells[layer]
+            )
         self.home = self._home(D // 2)
 
     def put(self, masks: np.ndarray) -> None:

@@ -6,14 +6,18 @@ from pcii.core.bayer import colour_cells
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
-from pcii.evidence.half_agreement import Halves, halves_of, least_agreement
+from pcii.evidence.half_agreement import Halves, Products, halves_of, least_agreement
 
 DISPARITIES_PX = (1, 2, 3, 4, 5, 6)
 SIDES_CELLS = (1, 2, 4, 8)  # blocks of 4, 8, 16 and 32 px, cells being of 4 px
 
 
 def at(halves: Halves, plane: int, shape: tuple[int, int]) -> np.ndarray:
-    return halves.agreement(np.full(shape, plane), np.ones(shape, dtype=bool))
+    return halves.agree(np.full(shape, plane), np.ones(shape, dtype=bool))
+
+
+def products(p: np.ndarray) -> Products:
+    return Products(p, np.zeros(p.shape), np.ones(p.shape, bool))
 
 
 def planes_of(grid: CameraGrid) -> FocalPlanes:
@@ -27,7 +31,7 @@ def test_a_surface_is_agreed_on_where_it_is():
     halves = halves_of(counts, planes_of(grid))
     least = least_agreement(halves.planes)
     own = at(halves, DISPARITIES_PX.index(3), (32, 40))
-    assert own[10:22, 14:26].min() > least
+    assert own[10:22, 14:26].mean() > 0.95
     assert halves.agreement_over(slice(8, 24), slice(12, 28), np.ones((16, 16), dtype=bool)) > least
 
 
@@ -38,7 +42,7 @@ def test_what_one_camera_alone_shows_is_not_agreed_on():
     film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
     halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
     least = least_agreement(len(DISPARITIES_PX))
-    assert max(at(halves, plane, (24, 24)).max() for plane in range(6)) < least
+    assert not any(at(halves, plane, (24, 24)).any() for plane in range(6))
     assert halves.agreement_over(slice(0, 24), slice(0, 24), np.ones((24, 24), dtype=bool)) < least
 
 
@@ -49,8 +53,7 @@ def test_noise_agrees_as_seldom_as_is_said(rate, views):
     above = []
     for seed in range(20):
         halves = halves_of(even_light(grid, rate, seed), planes_of(grid))
-        largest = np.max([at(halves, plane, (16, 20)) for plane in range(6)], axis=0)
-        above.append((largest > least_agreement(6)).mean())
+        above.append(np.any([at(halves, plane, (16, 20)) for plane in range(6)], axis=0).mean())
     assert np.mean(above) <= 1 / 1000  # of places, as is said
 
 
@@ -60,7 +63,7 @@ def test_halves_that_are_the_same_agree_on_noise():
     film = np.repeat(np.random.default_rng(0).poisson(1.0, (1, 1, 64, 80)), 2, axis=0)
     film[1, 0, :-1] = film[1, 0, 1:]  # at the disparity 1
     halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
-    assert (at(halves, 0, (16, 20)) > least_agreement(6)).mean() > 0.9
+    assert at(halves, 0, (16, 20)).mean() > 0.9
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
@@ -71,7 +74,7 @@ def test_products_are_those_of_the_formula(cfa):
         PhotonCounts.from_dense(film, grid, cfa=cfa), FocalPlanes.at_total_disparity(grid, 4.0)
     )
     h, w = 6, 10
-    for side, products in zip(SIDES_CELLS, halves.products, strict=True):
+    for side, products in zip(SIDES_CELLS, halves.inside, strict=True):
         expected = np.ones((-(-h // side), -(-w // side)))
         for half in (0, 1):
             photons, samples = np.zeros((2, *expected.shape))
@@ -93,13 +96,17 @@ def test_products_are_those_of_the_formula(cfa):
                 photons[a, b] = photons[a, b] if views * samples[a, b] > 0 else 0.0
             scale = smooth + smooth.mean() + (smooth.mean() == 0)
             expected *= (photons - smooth) / scale
-        np.testing.assert_allclose(products[0], expected, rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(products.p[0], expected, rtol=1e-5, atol=1e-7)
 
 
 def test_agreement_over_a_box_is_that_of_the_formula():
     p = np.random.default_rng(3).normal(size=(2, 8, 8))
-    nothing = [np.zeros((2, 8 // side, 8 // side)) for side in SIDES_CELLS]
-    halves = Halves([p, *nothing[1:]], [0 * p, *nothing[1:]])
+    p[:, 4] = 0  # where there is nothing to compare with
+    nothing = [products(np.zeros((2, 8 // side, 8 // side))) for side in SIDES_CELLS]
+    compared = np.ones(p.shape, bool)
+    compared[:, 4] = False
+    own = [Products(p, 0 * p, compared), *nothing[1:]]
+    halves = Halves(own, nothing, nothing, nothing)
     where = np.array([[True, False], [True, True]])
     own = p[:, 2:4, 3:5][:, where]
     t = max((one.sum() / np.sqrt((one**2).sum()) for one in own), default=0.0)
@@ -121,4 +128,4 @@ def test_bayer_colours_do_not_pass_for_light():
     rates = np.array([0.2, 5.0, 40.0])[colours] * np.ones(grid.shape_KLHW)
     film = np.random.default_rng(4).poisson(rates)
     halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), planes_of(grid))
-    assert max(at(halves, plane, (16, 16)).max() for plane in range(6)) < least_agreement(6)
+    assert not any(at(halves, plane, (16, 16)).any() for plane in range(6))

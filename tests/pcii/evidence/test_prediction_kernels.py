@@ -5,6 +5,7 @@ from twins import even_light, unit_grid
 
 from pcii.base.compiled_loops import threads, use_threads
 from pcii.core.bayer import sites_of_colours
+from pcii.evidence.cells import CELL_PX
 from pcii.evidence.prediction_kernels import predict, predict_shared
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 from pcii.evidence.projection_kernels import cells_of_events
@@ -25,7 +26,7 @@ def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():
     where = events.k, events.l, events.i, events.j, counts.event_colours, events.n.astype(np.float32)
     weight = (~hidden).astype(np.float32)
     sites = np.array([4.0])
-    cells_of_events(*where[:4], none, none, (64, 64), cell)
+    cells_of_events(*where[:4], none, none, (64, 64), CELL_PX, cell)
     section = PlaneView(none, none, 64, 64, sites, view_share, 1.0)
     predict(PlacedEvents(*where, weight, cell), section, Predicted(rates, base, samples, mean, blurred))
     for part in (np.s_[:, :8], np.s_[:, 8:]):
@@ -43,7 +44,7 @@ def test_events_are_predicted_the_same_by_any_number_of_threads_and_only_if_sele
     rows, cols = 19 * np.arange(K, dtype=np.int32) - 30, 2 * np.arange(L, dtype=np.int32) - 5
     where = events.k, events.l, events.i, events.j
     cell = np.zeros(N, np.int32)
-    cells_of_events(*where, rows, cols, (H, W), cell)
+    cells_of_events(*where, rows, cols, (H, W), CELL_PX, cell)
     assert (cell < 0).any()
     weight, view_share = rng.random(N).astype(np.float32), rng.random((h, w)).astype(np.float32)
     colours, sites, n = counts.event_colours, sites_of_colours(counts.cfa), events.n.astype(np.float32)

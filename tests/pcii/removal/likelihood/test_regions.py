@@ -4,7 +4,7 @@ from twins import even_light, paper_grid, unit_grid
 
 from pcii.core.focal_planes import FocalPlanes
 from pcii.evidence.focus_likelihood import FocusEvidence, focus_evidence
-from pcii.evidence.half_agreement import Halves, halves_of
+from pcii.evidence.half_agreement import Halves, Products, halves_of
 from pcii.removal.likelihood.regions import (
     Planes,
     bright_cells,
@@ -29,9 +29,17 @@ PLANES = Planes(
 FIRST, BETWEEN, SECOND = 1, 2, 3
 
 BLOCKS = [(SPREAD_PX.size, -(-SHAPE[0] // side), -(-SHAPE[1] // side)) for side in (1, 2, 4, 8)]
-AGREED, UNSURE = (
-    Halves([np.full(shape, p) for shape in BLOCKS], [np.zeros(shape) for shape in BLOCKS]) for p in (1.0, 0.0)
-)
+
+
+def halves_with(p: list[np.ndarray]) -> Halves:
+    """Halves with these products at each plane, and none elsewhere."""
+    own, nothing = (
+        [Products(part * is_own, 0 * part, np.ones(part.shape, bool)) for part in p] for is_own in (1, 0)
+    )
+    return Halves(own, nothing, nothing, nothing)
+
+
+AGREED, UNSURE = (halves_with([np.full(shape, p) for shape in BLOCKS]) for p in (1.0, 0.0))
 """What is seen by both halves of the cameras everywhere, and nowhere."""
 
 
@@ -199,7 +207,7 @@ def test_the_halves_need_not_agree_on_each_part_of_a_piece():
     part, rest = box(10, 10, 6, 6), box(10, 16, 6, 20)
     there = [np.zeros(shape) for shape in BLOCKS]
     there[0][:, rest] = 1.0
-    halves = Halves(there, [np.zeros(shape) for shape in BLOCKS])
+    halves = halves_with(there)
     focus = focus_with((FIRST, part, 40.0), (SECOND, rest, 40.0))
     _, regions = regions_of(np.where(rest, 1, 0), part | rest, focus, PLANES, halves)
     assert [region.is_there for region in regions] == [True, True]
