@@ -188,6 +188,9 @@ def evaluate(
         evaluation = compare(
             datasets, out, methods=method, budgets=budget, z_mm=z_mm, crew=crew, report=report
         )
+    if evaluation["made"]["differing"]:
+        differing = ", ".join(evaluation["made"]["differing"])
+        say(f"warning: not all rows are of the same software ({differing}); name all datasets and methods")
     for again in evaluation["again"]:
         say(f"made again: {again['rows']} scores of {', '.join(again['methods'])}, since {again['why']}")
     say(f"report: {out / 'evaluation.html'}")

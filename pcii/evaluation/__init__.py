@@ -11,6 +11,7 @@ paired_tests      Means over seeds with confidence intervals, and paired tests o
                   datasets.
 plots             Plots of an evaluation: accuracy against photons per view and run time, and reliability
                   of confidence.
+pooling           Methods pooled over scenes and ranked, on the datasets that all of them were scored on.
 provenance        What made a figure: the source and the weights of what computes, versions, and the
                   machine.
 rows              rows.jsonl: one JSON object per measured score, written safely by several processes at

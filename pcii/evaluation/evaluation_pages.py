@@ -8,8 +8,17 @@ from pcii.base.plain_text import in_markdown
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots, calibration_plots
-from pcii.evaluation.tables import light_name, markdown, overviews, tables_of, with_interval
-from pcii.io.evaluation_layout import seal_evaluation
+from pcii.evaluation.pooling import pooled_tables
+from pcii.evaluation.tables import (
+    Table,
+    light_name,
+    markdown,
+    overviews,
+    tables_of,
+    with_interval,
+)
+from pcii.io.evaluation_layout import ROWS, seal_evaluation
+from pcii.io.sealed_json import hash_file
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
@@ -18,7 +27,11 @@ def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
     The caller keeps others from adding rows meanwhile.
     """
     sweep_temporaries(out)
-    pages = {"evaluation.md": _markdown(evaluation).encode(), "evaluation.html": _page(evaluation)}
+    made = _made(evaluation, hash_file(out / ROWS))
+    pages = {
+        "evaluation.md": _markdown(evaluation, made).encode(),
+        "evaluation.html": _page(evaluation, made),
+    }
     for name, content in pages.items():
         write_bytes_safely(out / name, content)
     seal_evaluation(out, evaluation, list(pages))
@@ -35,9 +48,21 @@ def _notes(evaluation: Mapping[str, Any]) -> list[str]:
     notes = [
         "Scores compare masks with the objects that belong to each plane, and are means over the planes "
         f"unless a plane is named. In brackets: {evaluation['interval']}.",
+        "In bold: the best mean at the same photons, and of the same scene. Others may be as good: see the "
+        "interval of the difference.",
         "p: two-sided sign-flip permutation test on the same datasets, without correction for multiple "
-        "comparisons.",
+        "comparisons. Of n pairs it cannot be less than 2 / 2^n, so fewer than six never give 0.05.",
     ]
+    if evaluation["pooled"]:
+        notes.append(
+            "Over all scenes: every scene counts once, as the mean over its seeds, and all methods are "
+            "compared on the same scenes and seeds. Intervals and p are of the spread between scenes."
+        )
+    if evaluation["made"]["differing"]:
+        notes.append(
+            f"Not all rows are of the same software ({', '.join(evaluation['made']['differing'])}): name all "
+            "datasets and methods again to measure older rows anew."
+        )
     if _methods(evaluation, "depth"):
         notes.append(
             "Depth: errors are in px of total disparity, over the objects' pixels, and less is better; a "
@@ -60,18 +85,19 @@ def _losses(group: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _markdown(evaluation: Mapping[str, Any]) -> str:
+def _markdown(evaluation: Mapping[str, Any], made: Table) -> str:
     blocks = ["# Evaluation", *_notes(evaluation)]
-    for table in overviews(evaluation["groups"]):
+    for table in (*pooled_tables(evaluation), *overviews(evaluation["groups"])):
         blocks += [f"## {table.title}", markdown(table)]
     for group in evaluation["groups"]:
         blocks.append(f"## {in_markdown(group['label'])}")
         blocks += [f"### {table.title}\n\n{markdown(table)}" for table in tables_of(group)]
         blocks += map(in_markdown, _losses(group))
+    blocks += [f"## {made.title}", markdown(made)]
     return "\n\n".join(blocks) + "\n"
 
 
-def _page(evaluation: Mapping[str, Any]) -> bytes:
+def _page(evaluation: Mapping[str, Any], made: Table) -> bytes:
     removal, depth = (_methods(evaluation, part) for part in ("object", "depth"))
     groups = [
         {
@@ -85,9 +111,9 @@ def _page(evaluation: Mapping[str, Any]) -> bytes:
         for group in evaluation["groups"]
     ]
     content = {
-        "version": evaluation["version"],
+        "made": made,
         "notes": _notes(evaluation),
-        "overviews": overviews(evaluation["groups"]),
+        "overviews": [*pooled_tables(evaluation), *overviews(evaluation["groups"])],
         "groups": groups,
     }
     return page("evaluation.html.j2", content)
@@ -107,3 +133,37 @@ def _plots(group: Mapping[str, Any], removal: Sequence[str], depth: Sequence[str
         ),
     ]
     return [(image, words) for image, words in plots if image]
+
+
+def _made(evaluation: Mapping[str, Any], rows_sha256: str) -> Table:
+    """How to cite an evaluation, and what it was made by; `rows_sha256` is that of its rows.jsonl."""
+    made = evaluation["made"]
+    groups = evaluation["groups"]
+    methods = len({row["method"] for group in groups for row in group["results"]})
+    days = "" if made["days"] is None else f", measured {' to '.join(dict.fromkeys(made['days']))}"
+    counted = (
+        (sum(group["datasets"] for group in groups), "dataset"),
+        (len(groups), "scene"),
+        (methods, "method"),
+    )
+    datasets, scenes, of_methods = (f"{n} {word}{'' if n == 1 else 's'}" for n, word in counted)
+    rows = [
+        (
+            "to cite",
+            f"Evaluation of {of_methods} on {datasets} of {scenes} by photon-integral-imaging "
+            f"{evaluation['version']}{days}; SHA-256 of rows.jsonl {rows_sha256}",
+        ),
+        ("machine", _counted(made["machines"])),
+        *((name, _counted(numbers)) for name, numbers in made["software"].items()),
+        ("datasets", f"SHA-256 of their identities {made['datasets']}"),
+    ]
+    if made["unknown"]:
+        rows.append(("software not known", f"{made['unknown']} rows: of functions, or of an earlier release"))
+    return Table("How this was made", ("what", "value"), tuple(row for row in rows if row[1]), words=2)
+
+
+def _counted(rows_by_text: Mapping[str, int]) -> str:
+    """Texts, with the number of rows of each where they are several."""
+    if len(rows_by_text) == 1:
+        return next(iter(rows_by_text))
+    return "; ".join(f"{text} ({rows} rows)" for text, rows in rows_by_text.items())

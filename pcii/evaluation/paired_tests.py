@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,11 @@ class Mean:
     low: float | None
     high: float | None
 
+    def figures(self) -> dict[str, Any]:
+        """As in evaluation.json."""
+        interval = None if self.low is None else [self.low, self.high]
+        return {"n": self.n, "mean": self.mean, "interval": interval}
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -33,6 +39,16 @@ class Difference:
     difference: Mean
     p: float
     exact: bool
+
+    @property
+    def least_p(self) -> float:
+        """The smallest `p` that so many pairs can give, whatever their values."""
+        return 2 / 2**self.difference.n if self.exact else 1 / (1 + FLIPS)
+
+    def figures(self) -> dict[str, Any]:
+        """As in evaluation.json."""
+        tested = {"p": self.p, "least_p": self.least_p, "exact": self.exact}
+        return {"difference": self.difference.figures(), **tested}
 
 
 def mean_interval(values: Sequence[float], bounds: tuple[float, float] = (-np.inf, np.inf)) -> Mean:
@@ -87,7 +103,7 @@ def paired_difference(first: Sequence[float], second: Sequence[float], seed: int
     Under the null hypothesis both signs of each difference are equally likely. `p` is the share of
     assignments of signs whose mean is at least as far from 0 as the observed one (two-sided): of all 2^n for
     n up to `EXACT_UP_TO`, else of `FLIPS` random ones, drawn from `seed`, and the observed one. So n pairs
-    give at least 2 / 2^n. Raises `InputError` for lists of different lengths, or without values.
+    give at least `least_p`. Raises `InputError` for lists of different lengths, or without values.
     """
     if len(first) != len(second):
         raise InputError("first, second: expected values of the same datasets, in the same order")

@@ -8,13 +8,14 @@ import hashlib
 import os
 import platform
 import re
-from collections.abc import Iterable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pcii.base
 from pcii.base.extensions import registered
@@ -59,6 +60,27 @@ def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None)
             is_source = name.startswith(_SOURCE)
             changes.append(f"the {name} has changed" if is_source else f"{name} {old} is now {new}")
     return ", ".join(changes)
+
+
+def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """What measured rows: how many each version of each package, and each machine, did; first and last day.
+
+    `differing` names what has several versions or sources, `unknown` is the number of rows that do not tell,
+    and `datasets` the SHA-256 of the identities of their datasets.
+    """
+    software: dict[str, Counter[str]] = defaultdict(Counter)
+    for row in rows:
+        for name, number in (row.get("software") or {}).items():
+            software[name][number] += 1
+    days = sorted(row["date"] for row in rows if "date" in row)
+    return {
+        "software": {name: dict(counter) for name, counter in software.items()},
+        "differing": sorted(name for name, counter in software.items() if len(counter) > 1),
+        "unknown": sum(not row.get("software") for row in rows),
+        "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
+        "days": [days[0], days[-1]] if days else None,
+        "datasets": _digest(sorted({row["identity"] for row in rows})),
+    }
 
 
 def machine() -> str:
@@ -122,6 +144,10 @@ def _hash_of(places: Iterable[Path]) -> str:
                 digest = hashlib.sha256(file.read_bytes()).hexdigest()
                 content.update(f"{name.as_posix()}\0{digest}\0".encode())
     return content.hexdigest()[:16]
+
+
+def _digest(texts: Iterable[str]) -> str:
+    return hashlib.sha256("\0".join(texts).encode(errors="backslashreplace")).hexdigest()
 
 
 def _processor() -> str:

@@ -8,8 +8,9 @@ line (see `pcii.io.sealed_json`).
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,17 @@ from pcii.io.sealed_json import check_seal, sealed
 
 Row = dict[str, Any]
 Key = tuple[str, Budget, str, tuple[float, ...]]
+Cells = Mapping[tuple[Budget, str], Mapping[str, Row]]
+"""Rows of one scene by budget and method, and then by the identity of their dataset."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What methods of one kind are compared by: the value of a row, and the sign that makes more better."""
+
+    name: str
+    of: Callable[[Row], float | None]
+    sign: int
 
 
 def by_light(budget: Budget) -> tuple[int, float]:

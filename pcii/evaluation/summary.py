@@ -2,14 +2,15 @@
 
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from itertools import combinations, pairwise
 from typing import Any
 
-from pcii.evaluation.paired_tests import Mean, mean_interval, paired_difference, positive_mean_interval
-from pcii.evaluation.rows import Budget, Row, by_light
+from pcii.evaluation.paired_tests import mean_interval, paired_difference, positive_mean_interval
+from pcii.evaluation.pooling import pooled
+from pcii.evaluation.provenance import record
+from pcii.evaluation.rows import Budget, Cells, Measure, Row, by_light
 
 INTERVALS = (
     "95 % interval of the mean over seeds by Student's t, clipped to [0, 1] for shares, and of the logarithm "
@@ -21,8 +22,6 @@ SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", 
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage", "answered"}
 SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 SHARES |= {"ece", "share", "confidence", "correct"}
-Cells = Mapping[tuple[Budget, str], Mapping[str, Row]]
-"""Rows by budget and method, and then by the identity of their dataset."""
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
@@ -36,10 +35,14 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     those of depth by "bad_1px", where less is. `monotonic` lists where it is significantly worse at one
     budget than at the next smaller one: its `difference` is negative for "iou" and positive for "bad_1px".
     `table1` has in how many seeds each object's entropy is lowest at the plane that the object belongs to.
+
+    `pooled` ranks methods over all groups (see `pcii.evaluation.pooling`), and `made` has by what the rows
+    were measured, on which machines and days (see `pcii.evaluation.provenance`).
     """
     groups: dict[tuple[str, str], list[Row]] = defaultdict(list)
     for row in rows:
         groups[row["title"], row["recipe"]].append(row)
+    kinds = [_by_kind(_cells(members)) for members in groups.values()]
     return {
         "version": version("photon-integral-imaging"),
         "interval": INTERVALS,
@@ -47,6 +50,11 @@ def summarise(rows: Sequence[Row]) -> dict[str, Any]:
             {"label": _label(rows[0], [members[0] for members in groups.values()]), **_group(recipe, rows)}
             for (_, recipe), rows in sorted(groups.items())
         ],
+        "pooled": [
+            *pooled([removal for removal, _ in kinds], _IOU),
+            *pooled([depth for _, depth in kinds], _BAD_1PX),
+        ],
+        "made": record(rows),
     }
 
 
@@ -74,35 +82,34 @@ def object_planes(planes: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     return plane_of
 
 
-@dataclass(frozen=True)
-class _Measure:
-    """What methods of one kind are compared by: the value of a row, and the sign that makes more better."""
-
-    name: str
-    of: Callable[[Row], float | None]
-    sign: int
+_IOU = Measure("iou", lambda row: over_planes(row, "object").get("iou"), 1)
+_BAD_1PX = Measure("bad_1px", lambda row: row["depth"].get("bad_1px"), -1)
 
 
-_IOU = _Measure("iou", lambda row: over_planes(row, "object").get("iou"), 1)
-_BAD_1PX = _Measure("bad_1px", lambda row: row["depth"].get("bad_1px"), -1)
-
-
-def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
+def _cells(rows: Sequence[Row]) -> Cells:
+    """Rows of a group in the order of their light and method, and in each cell by seed."""
     cells: dict[tuple[Budget, str], dict[str, Row]] = defaultdict(dict)
     for row in sorted(rows, key=lambda row: (row["seed"] or 0, row["identity"])):
         cells[row["budget"], row["method"]][row["identity"]] = row
-    order = sorted(cells, key=lambda cell: (by_light(cell[0]), cell[1]))
-    # All rows of a cell are of the same method.
-    is_depth = {cell: "depth" in next(iter(cells[cell].values())) for cell in order}
-    removal = {cell: cells[cell] for cell in order if not is_depth[cell]}
-    depth = {cell: cells[cell] for cell in order if is_depth[cell]}
+    return {cell: cells[cell] for cell in sorted(cells, key=lambda cell: (by_light(cell[0]), cell[1]))}
+
+
+def _by_kind(cells: Cells) -> tuple[Cells, Cells]:
+    """Cells of methods of removal, and of depth; all rows of a cell are of the same method."""
+    depth = {cell: rows for cell, rows in cells.items() if "depth" in next(iter(rows.values()))}
+    return {cell: rows for cell, rows in cells.items() if cell not in depth}, depth
+
+
+def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
+    cells = _cells(rows)
+    removal, depth = _by_kind(cells)
     names = {row["identity"]: row["dataset"] for row in rows}
     return {
         "recipe": recipe,
         "title": rows[0]["title"],
         "scene": rows[0]["scene"],
         "datasets": len(names),
-        "results": [_result(*cell, list(cells[cell].values())) for cell in order],
+        "results": [_result(*cell, list(own.values())) for cell, own in cells.items()],
         "paired": [*_paired(removal, _IOU), *_paired(depth, _BAD_1PX)],
         "monotonic": [*_losses(removal, _IOU), *_losses(depth, _BAD_1PX)],
         "table1": [
@@ -121,7 +128,7 @@ def _result(budget: Budget, method: str, rows: Sequence[Row]) -> dict[str, Any]:
         "method": method,
         "seeds": len(rows),
         "photons_per_view": sum(photons) / len(photons) if photons else None,
-        "seconds": _with_interval(positive_mean_interval([row["seconds"] for row in rows])),
+        "seconds": positive_mean_interval([row["seconds"] for row in rows]).figures(),
     }
     if "depth" in rows[0]:
         return result | {"depth": _means([row["depth"] for row in rows])} | _bounds(rows)
@@ -178,18 +185,11 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             means[name] = _means(known)
             continue
         mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
-        means[name] = _with_interval(mean)
+        means[name] = mean.figures()
     return means
 
 
-def _with_interval(mean: Mean) -> dict[str, Any]:
-    interval = None if mean.low is None else [mean.low, mean.high]
-    return {"n": mean.n, "mean": mean.mean, "interval": interval}
-
-
-def _compared(
-    first: Mapping[str, Row], second: Mapping[str, Row], measure: _Measure
-) -> dict[str, Any] | None:
+def _compared(first: Mapping[str, Row], second: Mapping[str, Row], measure: Measure) -> dict[str, Any] | None:
     """The measure of the first rows minus that of the second, on the datasets of both."""
     pairs: list[tuple[float, float]] = []
     for identity in first:
@@ -200,11 +200,10 @@ def _compared(
     if not pairs:
         return None
     test = paired_difference([a for a, _ in pairs], [b for _, b in pairs])
-    difference = _with_interval(test.difference)
-    return {"measure": measure.name, "difference": difference, "p": test.p, "exact": test.exact}
+    return {"measure": measure.name, **test.figures()}
 
 
-def _paired(cells: Cells, measure: _Measure) -> list[dict[str, Any]]:
+def _paired(cells: Cells, measure: Measure) -> list[dict[str, Any]]:
     entries: list[dict[str, Any]] = []
     for (budget, method), (other_budget, other_method) in combinations(cells, 2):
         if budget != other_budget:
@@ -215,7 +214,7 @@ def _paired(cells: Cells, measure: _Measure) -> list[dict[str, Any]]:
     return entries
 
 
-def _losses(cells: Cells, measure: _Measure) -> list[dict[str, Any]]:
+def _losses(cells: Cells, measure: Measure) -> list[dict[str, Any]]:
     """Where the whole interval of the change from one budget to the next larger one is for the worse."""
     entries: list[dict[str, Any]] = []
     for method in sorted({method for _, method in cells}):

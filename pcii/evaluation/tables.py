@@ -28,18 +28,23 @@ DEPTH_COLUMNS = (
 )
 ALL_PIXELS = "BadPix(0.07), all pixels"
 """The column that stands for those of objects where surfaces have no names, as in other people's data."""
+P_COLUMNS = ("p", "least p possible")
 EXPOSURE = "by exposure"
 """Name of the photon budget of datasets whose recipe has an exposure instead."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text: title, names of the columns, rows; the first `words` columns are left-aligned."""
+    """A table of text: title, names of the columns, rows; the first `words` columns are left-aligned.
+
+    `best` are cells (row, column) to stand out.
+    """
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     words: int = 1
+    best: frozenset[tuple[int, int]] = frozenset()
 
 
 def tables_of(group: Mapping[str, Any]) -> list[Table]:
@@ -56,32 +61,60 @@ def overviews(groups: Sequence[Mapping[str, Any]]) -> list[Table]:
 
 def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
     """Mean object IoU of every group and method by photon budget; labels of groups differ."""
-    return _by_budget(groups, "IoU by photon budget", "object", "iou")
+    return _by_budget(groups, "IoU by photon budget", "object", "iou", 1)
 
 
 def depth_overview(groups: Sequence[Mapping[str, Any]]) -> Table:
     """Share of errors of depth above 1 px of every group and method by photon budget."""
-    return _by_budget(groups, "Errors of depth above 1 px by photon budget", "depth", "bad_1px")
+    return _by_budget(groups, "Errors of depth above 1 px by photon budget", "depth", "bad_1px", -1)
 
 
-def _by_budget(groups: Sequence[Mapping[str, Any]], title: str, part: str, measure: str) -> Table:
+def p_cells(entry: Mapping[str, Any]) -> tuple[str, str]:
+    """A p-value and the smallest that is possible, as text."""
+    sampled = "" if entry["exact"] else " (sampled)"
+    return f"{entry['p']:.2g}{sampled}", f"{entry['least_p']:.2g}"
+
+
+def _best(contests: Sequence[object], figures: Sequence[Mapping[str, Any] | None], sign: int) -> set[int]:
+    """Numbers of the figures with the best mean of their contest, where another one is worse."""
+    entered: dict[object, list[tuple[float, int]]] = {}
+    for number, (contest, figure) in enumerate(zip(contests, figures, strict=True)):
+        if figure is not None:
+            entered.setdefault(contest, []).append((sign * figure["mean"], number))
+    decided = [own for own in entered.values() if min(own)[0] < max(own)[0]]
+    return {number for own in decided for value, number in own if value == max(own)[0]}
+
+
+def _by_budget(groups: Sequence[Mapping[str, Any]], title: str, part: str, measure: str, sign: int) -> Table:
     budgets: dict[Budget, None] = {}
-    cells: dict[tuple[str, str], dict[Budget, str]] = {}
+    cells: dict[tuple[str, str], dict[Budget, Any]] = {}
     for group in groups:
         for row in group["results"]:
             if part in row:
                 budgets[row["budget"]] = None
-                mean = with_interval(row[part].get(measure))
+                mean = row[part].get(measure)
                 cells.setdefault((group["label"], row["method"]), {})[row["budget"]] = mean
     order = sorted(budgets, key=by_light)
-    rows = [(*names, *(by_budget.get(budget, "–") for budget in order)) for names, by_budget in cells.items()]
-    return Table(title, ("scene", "method", *map(budget_name, order)), tuple(rows), words=2)
+    scenes, means = [scene for scene, _ in cells], list(cells.values())
+    rows = [
+        (*names, *(with_interval(by_budget.get(budget)) for budget in order))
+        for names, by_budget in cells.items()
+    ]
+    best = {
+        (number, column)
+        for column, budget in enumerate(order, start=2)
+        for number in _best(scenes, [by_budget.get(budget) for by_budget in means], sign)
+    }
+    header = ("scene", "method", *map(budget_name, order))
+    return Table(title, header, tuple(rows), words=2, best=frozenset(best))
 
 
 def markdown(table: Table) -> str:
     """The table in Markdown, without its title."""
     rule = [":--" if column < table.words else "--:" for column in range(len(table.header))]
     rows = [[in_markdown(cell) for cell in row] for row in (table.header, *table.rows)]
+    for row, column in table.best:
+        rows[1 + row][column] = f"**{rows[1 + row][column]}**"
     return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 
@@ -132,7 +165,21 @@ def _removal(group: Mapping[str, Any]) -> Table:
     planes = [f"IoU, {z:g} mm" for z in depths] if len(depths) > 1 else []
     names = [name for name, _, _ in shown]
     header = ("method", "photons", "seeds", *planes, *names, "seconds")
-    return Table("Removal of defocused points", header, tuple(rows))
+    best = _best_rows(results, [row["object"].get("iou") for row in results], 1, header, "IoU")
+    return Table("Removal of defocused points", header, tuple(rows), best=best)
+
+
+def _best_rows(
+    results: Sequence[Mapping[str, Any]],
+    figures: Sequence[Mapping[str, Any] | None],
+    sign: int,
+    header: Sequence[str],
+    name: str,
+) -> frozenset[tuple[int, int]]:
+    """The method and the figure, in the column `name`, of the rows that are best at their budget."""
+    columns = [0, *(number for number, column in enumerate(header) if column == name)]
+    numbers = _best([row["budget"] for row in results], figures, sign)
+    return frozenset((number, column) for number in numbers for column in columns)
 
 
 def _depth(group: Mapping[str, Any]) -> Table:
@@ -151,7 +198,9 @@ def _depth(group: Mapping[str, Any]) -> Table:
         )
         for row, mean in zip(results, means, strict=True)
     )
-    return Table("Depth", ("method", "photons", "seeds", *shown, "seconds"), rows)
+    header = ("method", "photons", "seeds", *shown, "seconds")
+    best = _best_rows(results, [mean["bad_1px"] for mean in means], -1, header, "bad_1px")
+    return Table("Depth", header, rows, best=best)
 
 
 def _mean(scores: Mapping[str, Any], *path: str) -> Mapping[str, Any] | None:
@@ -185,12 +234,12 @@ def _paired(group: Mapping[str, Any], measure: str, name: str) -> Table:
             budget_name(entry["budget"]),
             str(entry["difference"]["n"]),
             with_interval(entry["difference"]),
-            f"{entry['p']:.2g}" + ("" if entry["exact"] else " (sampled)"),
+            *p_cells(entry),
         )
         for entry in group["paired"]
         if entry["measure"] == measure
     )
-    header = ("methods", "photons", "seeds", f"difference of {name}", "p")
+    header = ("methods", "photons", "seeds", f"difference of {name}", *P_COLUMNS)
     kind = "methods" if measure == "iou" else "methods of depth"
     return Table(f"Pairs of {kind} on the same datasets", header, rows)
 

@@ -499,7 +499,7 @@ def test_markdown_tables_are_whole(series: Path, tmp_path: Path, calls: list[str
     assert len({len(re.findall(r"(?<!\\)\|", line)) for line in lines}) == 1
     assert lines[0] == "| scene | method | 20 | 50 |"
     # The scene with one dataset and one budget.
-    assert r"| ball \| bird | by count | – | 0.750 |" in lines
+    assert r"| ball \| bird | by count | – | **0.750** |" in lines
 
 
 def test_means_are_shown_with_their_interval() -> None:

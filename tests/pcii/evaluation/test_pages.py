@@ -24,14 +24,16 @@ from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
+from pcii.evaluation.rows import claim_rows
 from pcii.evaluation.summary import summarise
+from pcii.evaluation.tables import Table
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import read_manifest, write_manifest
 from pcii.removal.methods import METHODS
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
 ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}
-ELEMENTS |= {"div", "table", "tr", "th", "td", "figure", "img", "figcaption"}
+ELEMENTS |= {"div", "table", "tr", "th", "td", "strong", "figure", "img", "figcaption"}
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 SCRIPT = (Path(pages_module.__file__).parent / "templates" / "report.js").read_bytes()
 SCRIPT_HASH = base64.b64encode(hashlib.sha256(SCRIPT).digest()).decode()
@@ -91,6 +93,7 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 def pages(outcome: Outcome, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The report, and the evaluation of groups, objects, methods and datasets of such names."""
     out = tmp_path_factory.mktemp("pages")
+    claim_rows(out)
     write_report(out / "report.html", outcome)
     evaluation = summarise([row for name in NAMES for row in rows_of(name)])
     drawn = accuracy_plots(evaluation["groups"][0], NAMES[-2:])  # for all: a plot takes half a second
@@ -185,10 +188,11 @@ def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
 def test_a_title_of_each_kind_stays_in_its_place(name: str) -> None:
     group = {"label": name, "datasets": 1, "recipe": name, "plots": [], "tables": [], "losses": [name]}
-    content = {"version": name, "notes": [name], "overviews": [], "groups": [group]}
+    made = Table("made", ("what", "value"), (("machine", name),))
+    content = {"notes": [name], "overviews": [], "groups": [group], "made": made}
     read = Read(page("evaluation.html.j2", content).decode())
     assert {tag for tag, _ in read.elements} <= ELEMENTS
-    assert read.texts.count(visible(name)) == 4  # the note, the heading, the recipe and the sentence
+    assert read.texts.count(visible(name)) == 5  # the note, heading, recipe, sentence and machine
 
 
 def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) -> None:
@@ -207,7 +211,7 @@ def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) ->
         read = html.unescape(re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", in_markdown(name)))
         assert read == visible(name)
     lines = [line for line in text.splitlines() if line]
-    assert all(re.match(r"\||#+ |IoU of |Scores |p: |Depth: ", line) for line in lines)
+    assert all(re.match(r"\||#+ |IoU of |Scores |p: |Depth: |In bold: ", line) for line in lines)
 
 
 def test_what_a_page_lacks_is_no_empty_place() -> None:
