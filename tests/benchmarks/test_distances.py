@@ -80,13 +80,15 @@ def test_errors_of_colours_by_hand() -> None:
     assert demosaicing.errors(truth, truth)["ciede2000"].value == pytest.approx(0, abs=1e-9)
 
 
-def test_bias_is_told_from_noise() -> None:
-    rng, truth = np.random.default_rng(3), np.ones((32, 32, 3))
-    noisy = truth + rng.normal(0, 0.5, (8, *truth.shape))
+@pytest.mark.parametrize("black_rows", [0, 500])
+def test_bias_is_told_from_noise_on_what_is_lit(black_rows: int) -> None:
+    rng, truth = np.random.default_rng(3), np.zeros((32 + black_rows, 32, 3))
+    truth[:32] = 1
+    noisy = truth + truth * rng.normal(0, 0.5, (8, *truth.shape))
     told = radiance_images.errors(noisy.astype(np.float32), truth)
     assert told["rmse_percent"].value == pytest.approx(50, rel=0.03)
     assert told["bias_percent"].value < 4
-    assert radiance_images.errors((noisy + 0.2).astype(np.float32), truth)[
+    assert radiance_images.errors((noisy + 0.2 * truth).astype(np.float32), truth)[
         "bias_percent"
     ].value == pytest.approx(20, rel=0.1)
 
