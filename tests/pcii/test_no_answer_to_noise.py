@@ -1,4 +1,4 @@
-"""Noise gets no answers: films of even light, of any size, brightness and grid, and pixels that are hot."""
+"""Noise gets no answers: even light of any size, brightness and grid, shading, vignetting and hot pixels."""
 
 import itertools
 
@@ -7,6 +7,7 @@ import pytest
 from twins import even_light
 
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
 from pcii.depth.methods import estimate_depth
@@ -19,6 +20,10 @@ GRIDS = [(2, 1), (1, 8), (3, 3), (5, 5)]
 LIGHT = [1e-3, 0.05, 1.0, 100.0, 1e4]
 HOT = 10_000
 MOST_FALSE = 1 / 1000  # what both methods promise of noise, as a share of pixels
+
+MOST_FALSE_AT_BORDERS = 5 / 1000
+"""In full light, where the film is hardly wider than the parallax: at its borders each block is seen by other
+cameras, which vignetting makes differ without noise."""
 
 
 def grid_of(views: tuple[int, int], size: tuple[int, int]) -> CameraGrid:
@@ -69,6 +74,37 @@ def test_hot_pixels_are_not_answered(rate, pixels, everywhere):
     for views in ((5, 5), (2, 1)):
         counts = hot(views, rate, pixels, everywhere=everywhere, seed=0)
         assert max(answered(counts)) <= MOST_FALSE
+
+
+BUDGETS = [1e3, 1e5, 1e7, None]  # photons per view; None is full light
+
+
+def without_depth(kind: str, grid: CameraGrid) -> np.ndarray:
+    """Light (K, L, H, W) of mean 1 or so that shows no depth in `RANGE_MM`."""
+    y, x = (np.linspace(-1, 1, size) for size in (grid.height, grid.width))
+    radius = np.hypot(y[:, None], x)
+    light = {
+        "vignetting": (1 + 0.4 * radius**2) ** -2,
+        "shading": 1 + 0.5 * np.sin(2 * x + y[:, None]),
+        "flicker": np.random.default_rng(1).uniform(0.6, 1.4, (grid.rows, grid.cols, 1, 1)),
+        "hot": np.ones(()),
+    }[kind]
+    return np.broadcast_to(light, grid.shape_KLHW)
+
+
+@pytest.mark.parametrize("budget", BUDGETS)
+@pytest.mark.parametrize("kind", ["vignetting", "shading", "flicker", "hot"])
+def test_what_shows_no_depth_is_not_answered(kind, budget):
+    grid, rng = grid_of((5, 5), (96, 128)), np.random.default_rng(0)
+    light = without_depth(kind, grid)
+    if budget is None:
+        depth = estimate_depth(Views(light[..., None].astype(np.float32), grid), RANGE_MM)
+        assert np.isfinite(depth.z_mm).mean() <= MOST_FALSE_AT_BORDERS
+        return
+    film = rng.poisson(light * budget / (grid.height * grid.width))
+    if kind == "hot":
+        film += rng.poisson(4.0, film.shape) * (rng.random(film.shape[2:]) < 1e-3)
+    assert max(answered(PhotonCounts.from_dense(film, grid, cfa=None))) <= MOST_FALSE
 
 
 @pytest.mark.slow
