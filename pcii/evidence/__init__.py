@@ -1,6 +1,5 @@
 """Evidence of depth in photon counts: how well a section predicts the photons, and whether cameras agree.
 
-camera_sums         Sums over cameras in the blocks of a section, with a weight for each camera.
 cells               The coarse grid on which evidence of focus is kept.
 focus_kernels       Compiled loops over photons and planes: the gain of a plane over its blur, and planes
                     compared.
@@ -22,4 +21,5 @@ smoothing_kernels   Compiled: sums of photons at coarser and coarser scales, int
                     centres of cells.
 texture_evidence    Evidence of depth from texture: at which plane does a section show more contrast than
                     its noise explains?
+weighted_sums       Sums over cameras in the blocks of a section, with a weight for each camera.
 """

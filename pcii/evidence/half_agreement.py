@@ -29,8 +29,8 @@ import numpy as np
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.evidence.camera_sums import camera_sums, whole_shifts_px
 from pcii.evidence.cells import CELL_PX
+from pcii.evidence.weighted_sums import camera_sums, whole_shifts_px
 from pcii.imaging.bright_regions import box_around
 
 FALSE_RATE = 1e-3
@@ -122,23 +122,21 @@ class Halves:
     def agreement_over(self, rows: slice, cols: slice, where: np.ndarray) -> float:
         """t over the cells `where` (bool) of the box `rows`, `cols`, the largest of all planes and sizes.
 
-        All planes, since the halves may agree best at the plane of a surface in front of a region.
+        All planes, since the halves may agree best at the plane of a surface in front of a region; of blocks
+        of a size for which they agree better outside the range it is 0. That there is structure is enough:
+        at what depth, the evidence of focus decides.
         """
         cells = np.zeros(self.inside[0].p.shape[1:])
         cells[rows, cols] = where
         largest = 0.0
-        for side, inside, nearer, farther in zip(
-            BLOCKS_CELLS, self.inside, self.nearer, self.farther, strict=True
-        ):
+        for side, inside, outside in zip(BLOCKS_CELLS, self.inside, self.outside, strict=True):
             weight = _block_sums(cells, side)
-            blocks = np.nonzero(weight)
-            weight, own = weight[blocks], inside.at((slice(None), *blocks))
-            t = [
-                _t(e.p @ weight, np.maximum(e.p**2 @ weight**2, e.noise @ weight**2))
-                for out in (nearer, farther)
-                for e in [own.less(out.at((slice(None), *blocks)))]
-            ]
-            largest = max(largest, float(np.minimum(*t).max()))
+            blocks = (slice(None), *np.nonzero(weight))
+            weight, own = weight[blocks[1:]], inside.at(blocks)
+            total = own.p @ weight
+            if total.max() >= (outside.p[blocks] @ weight).max(initial=-np.inf):
+                t = _t(total, np.maximum(own.p**2 @ weight**2, own.noise @ weight**2))
+                largest = max(largest, float(t.max()))
         return largest
 
     def _at_labels(

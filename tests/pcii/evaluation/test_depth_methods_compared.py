@@ -96,9 +96,9 @@ def test_depth_means_the_default_under_its_own_name(tmp_path: Path) -> None:
 
 def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     both, out = saved(tmp_path / "both", (COUNTS, LIGHT)), tmp_path / "out"
-    command = ["evaluate", str(both.path), "-o", str(out), "--method", "depth"]
+    command = ["evaluate", str(both.path), "-o", str(out), "--method", "depth:variance-sweep"]
     assert command_line.run(cli.app, [*command, "--budget", FULL_LIGHT]) == 0
-    assert named(out) == {(FULL_LIGHT, "depth:posterior")}
+    assert named(out) == {(FULL_LIGHT, "depth:variance-sweep")}
     page = (out / "evaluation.html").read_text()
     assert "<td>full light</td>" in page
     assert page.count("data:image/png;base64,") == 2  # errors, and reliability
