@@ -1,6 +1,5 @@
 """The `simgen` command."""
 
-import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -135,13 +134,7 @@ def _made(folder: Path, manifest: dict[str, Any]) -> str:
     seconds = sum(manifest["timings_s"].values())
     photons = manifest["photons"]
     caught = f", {photons['total']} photons" if photons else ""
-    line = f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
-    if photons and photons.get("clump_pairs", 0) > photons.get("clump_pairs_allowed", math.inf):
-        line += (
-            f"\n{photons['clump_pairs']} pairs of photons came of one path each, where at most "
-            f"{photons['clump_pairs_allowed']:g}: a test of the counts might tell them from Poisson ones"
-        )
-    return line
+    return f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
 
 
 @app.command

@@ -17,9 +17,9 @@ from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
 from simgen.dataset.prepared import Prepared, capture_of, needs_of
-from simgen.dataset.resources import check_resources
+from simgen.dataset.resources import available_bytes, check_resources, shortage
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import plan
+from simgen.photons.counting_plan import plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
@@ -63,9 +63,14 @@ def draw_photons(
     recipe = validate(Recipe, values, "draw_photons")
     prepared = Prepared(recipe, scene.scene, scene.folder, None)
     render_scene = prepared.render_scene()
-    capture = capture_of(recipe, prepared.seed)
-    made = plan(capture, render_scene, backend.choose().kind)
-    check_resources(needs_of(recipe), made, Path())
+    capture, needs = capture_of(recipe, prepared.seed), needs_of(recipe)
+    setup, room = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth), available_bytes()
+    way = capture, setup, backend.choose().kind
+    made = plan(*way, may_explore=lambda first: shortage(needs, first, room) is None)
+    check_resources(needs, made, Path())
+    drawn = thin(capture, setup, made, report) if made.thins else None
+    if drawn is None and made.thins:
+        made = render_instead(*way)
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:
@@ -73,11 +78,7 @@ def draw_photons(
         image = render_view(render_scene, capture.rig, k, l, samples_per_pixel=made.samples, seed=path_seed)
         return sense(image, recipe.cfa)
 
-    if made.thins:
-        setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-        arrivals, _ = thin(capture, setup, made, report=report)
-    else:
-        arrivals, _ = draw_from_views(capture, mosaic_of, made, report)
+    arrivals, _ = drawn or draw_from_views(capture, mosaic_of, made, report)
     counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed).by_pixel(grid)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa

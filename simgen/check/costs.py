@@ -46,9 +46,12 @@ def cost_findings(facts: Facts) -> list[Finding]:
         found.append(Finding("ok", "memory", text))
     way = ""
     if facts.plan is not None:
-        way = "photons one by one (thinning)"
+        kept = "" if facts.plan.keeps_origins else ", whose origins are too many to be kept"
+        way = f"photons one by one (thinning){kept}"
         if not facts.plan.thins:
             way = f"counts drawn from views of {facts.plan.samples} samples per pixel"
+            if facts.plan.is_unbounded:
+                way += ", since rare light paths, as by mirrors, are too bright for single photons"
     if facts.needs.products.radiance != "none":
         way += f"{', ' if way else ''}full-light images"
     way = f"{way}; " if way else ""

@@ -26,14 +26,13 @@ from simgen.dataset.dataset_folder import claimed, finished, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
-from simgen.dataset.resources import check_resources
+from simgen.dataset.resources import available_bytes, check_resources, shortage
 from simgen.dataset.reuse import InCommon, Reuse, in_common
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan, plan
-from simgen.photons.exploration import explore
+from simgen.photons.counting_plan import Capture, Plan, plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin, write_counts
 from simgen.renderer import backend
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
 from simgen.truth.truth_file import TruthRequest, traced_for_visibility, write_truth
 
@@ -81,13 +80,22 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
         check_resources(needs, None, out)
         with clock.stage("load"):  # before anything is written: a bad scene shows here
             render_scene = common.scene(prepared.render_scene)
+        setup = Setup(render_scene, capture.rig, capture.cfa, recipe.render.max_depth)
         if recipe.products.counts:  # likewise: too much light
+            room = available_bytes()
+            planning = partial(
+                plan,
+                capture,
+                setup,
+                engine["kind"],
+                least_samples(recipe),
+                may_explore=lambda first: shortage(needs, first, room) is None,
+            )
             with clock.stage("plan"):
-                samples = least_samples(recipe)
-                made = common.plan(partial(plan, capture, render_scene, engine["kind"], samples))
+                made = common.plan(planning)
                 check_resources(needs, made, out)
         sweep_temporaries(out)
-        photons = _work(prepared, capture, render_scene, made, common, out, clock, report)
+        photons = _work(prepared, capture, setup, made, common, out, clock, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
         with clock.stage("hash"):
             budgets = (None, *recipe.photons.nested)
@@ -97,7 +105,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
             "identity": identity,
             "backend": engine,
             "photons": photons,
-            "skipped": skipped(prepared, made, photons, traced_for_visibility(out)),
+            "skipped": skipped(prepared, photons, traced_for_visibility(out)),
             "timings_s": clock.seconds,
             "files": files,
         }
@@ -109,7 +117,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
 def _work(
     prepared: Prepared,
     capture: Capture,
-    render_scene: RenderScene,
+    setup: Setup,
     made: Plan | None,
     common: InCommon,
     out: Path,
@@ -118,18 +126,26 @@ def _work(
 ) -> dict[str, Any] | None:
     """Write all products; what the manifest says of the photons, None without counts."""
     recipe, products, photons = prepared.recipe, prepared.recipe.products, None
-    thins, renders = made is not None and made.thins, made is not None and not made.thins
+
+    def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
+        return log | write_counts(capture, recipe.sensor, arrivals, out, with_origins=products.truth)
+
     if products.truth or products.view_truth:
         request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
         with clock.stage("truth"):
-            common.truth(out / TRUTH, lambda: write_truth(request, render_scene, capture.rig, out, report))
-    if made is not None and thins:
+            common.truth(
+                out / TRUTH, lambda: write_truth(request, setup.render_scene, capture.rig, out, report)
+            )
+    if made is not None and made.thins:
         with clock.stage("photons"):
-            setup = Setup(render_scene, capture.rig, capture.cfa, recipe.render.max_depth)
-            light = capture.photons, capture.photons_per_radiance
-            explored = common.exploration(partial(explore, setup, *light))
-            arrivals, photons = thin(capture, setup, made, explored, report)
-            photons |= write_counts(capture, recipe.sensor, arrivals, out, with_origins=products.truth)
+            drawn = thin(capture, setup, made, report)
+            if drawn is None:
+                made = render_instead(capture, setup, backend.choose().kind, least_samples(recipe))
+                check_resources(needs_of(recipe), made, out)
+            else:
+                photons = write(*drawn)
+                del drawn
+    renders = made is not None and photons is None
     views = RenderedViews(
         capture.rig,
         recipe.sensor,
@@ -141,9 +157,8 @@ def _work(
     )
     if products.radiance != "none" or renders:
         with clock.stage("radiance"):
-            views.render(render_scene, report)
+            views.render(setup.render_scene, report)
     if made is not None and renders:
         with clock.stage("counts"):
-            arrivals, photons = draw_from_views(capture, views.mosaic, made, report)
-            photons |= write_counts(capture, recipe.sensor, arrivals, out, with_origins=products.truth)
+            photons = write(*draw_from_views(capture, views.mosaic, made, report))
     return photons

@@ -5,7 +5,6 @@ from typing import Any
 
 from simgen.dataset.prepared import Prepared
 from simgen.dataset.software import versions
-from simgen.photons.counting_plan import Plan
 from simgen.renderer.mitsuba_scene import RenderScene
 
 RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
@@ -31,7 +30,7 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
 
 
 def skipped(
-    prepared: Prepared, made: Plan | None, photons: dict[str, Any] | None, shadow_rays: int | None
+    prepared: Prepared, photons: dict[str, Any] | None, shadow_rays: int | None
 ) -> list[dict[str, Any]]:
     """What was not done: what, why, and how much work that saved, and its unit.
 
@@ -49,7 +48,7 @@ def skipped(
     if photons is not None and photons.get("paths", 0) < photons.get("dense_paths_instead", 0):
         saved = photons["dense_paths_instead"] - photons["paths"]
         add("rendering for the photon counts", "photons are drawn one by one", saved, "light paths")
-    if products.radiance == "none" and (made is None or made.thins):
+    if products.radiance == "none" and (photons is None or photons["method"] == "thinning"):
         paths = pixels * recipe.render.samples_per_pixel
         add("radiance images", "the recipe does not ask for them", paths, "light paths")
     elif products.radiance == "mosaic" and recipe.cfa is not None:

@@ -32,6 +32,8 @@ VIEW_BYTES = 400.0
 PHOTON_BYTES = 200.0
 """Of a photon, or a pixel that counts without any, while the counts are made: 135 where the sensor has no
 faults, up to 260 where counters stop and budgets are nested."""
+SUM_BYTES = 8.0
+"""Of a pixel of any view while photons that are too many to be kept are counted."""
 ORIGIN_BYTES = 30.0
 """Of each of several counts of one pixel while their origins are written."""
 TILE_BYTES = 110.0
@@ -203,13 +205,16 @@ def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
 def _of_photons(needs: Needs, plan: Plan, room: float) -> Step:
     grid = needs.grid
     photons = plan.photons_per_view * grid.rows * grid.cols
-    rows = photons if plan.thins else min(photons, float(grid.height * grid.width * grid.rows * grid.cols))
+    pixels = float(grid.height * grid.width * grid.rows * grid.cols)
+    keeps_all = plan.thins and plan.keeps_origins
+    rows = photons if keeps_all else min(photons, pixels)
+    sums = SUM_BYTES * pixels if plan.thins and not keeps_all else 0.0
     absolute = needs.exposure if needs.photons.scope == "exposure" else None
     field, value = ("photons.budget", needs.photons.budget)
     if absolute is not None:
         field, value = "exposure.time_s", absolute.time_s
     fits = value * (room / (PHOTON_BYTES * photons)) / ROUNDING if photons > 0 else value
-    return Step(PHOTON_BYTES * rows, field, f"{value:g}", f"at most {_even(fits)}")
+    return Step(PHOTON_BYTES * rows + sums, field, f"{value:g}", f"at most {_even(fits)}")
 
 
 def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:

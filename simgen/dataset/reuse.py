@@ -15,7 +15,6 @@ from typing import Any, TypeVar
 from pcii.base.safe_files import new_folder_safely
 from simgen.dataset.prepared import Prepared, least_samples
 from simgen.photons.counting_plan import Plan
-from simgen.photons.exploration import Exploration
 from simgen.renderer.mitsuba_scene import RenderScene
 
 Made = TypeVar("Made")
@@ -70,12 +69,8 @@ class InCommon:
         return self.reuse.once("scene", self.scene_key, make)
 
     def plan(self, make: Callable[[], Plan]) -> Plan:
-        """How photon counts will be made."""
+        """How photon counts will be made, with what was found out about the light for that."""
         return self.reuse.once("plan", self.light_key, make)
-
-    def exploration(self, make: Callable[[], Exploration]) -> Exploration:
-        """What is found out about the light before photons are drawn."""
-        return self.reuse.once("exploration", self.light_key, make)
 
     def truth(self, folder: Path, make: Callable[[], None]) -> None:
         """The truth's folder."""

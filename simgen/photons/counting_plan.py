@@ -1,13 +1,15 @@
 """How photon counts will be made: thinned one by one or drawn from rendered views, and what led to it."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Rig
-from simgen.photons.rendering_noise import NOISE_SHARE, Probe, first_hit_depths_mm, probe
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.photons.candidates import Setup
+from simgen.photons.exploration import Exploration, explore
+from simgen.photons.rendering_noise import Probe, first_hit_depths_mm, probe
 from simgen.spec.recipe import MOST_PATHS, Photons
 
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
@@ -19,7 +21,12 @@ PROBE_SEED = 0
 """The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
 nothing else are made alike: all with the origins of photons or all without."""
 MOST_SINGLE_PHOTONS = 1 << 25
-"""So many photons are kept one by one at most; each takes some 200 bytes."""
+"""So many photons are kept one by one at most; each takes some 200 bytes. More are drawn in the same way, but
+only counted."""
+MOST_THINNED_PHOTONS = 1e10
+"""So many are drawn at most, which takes two cores four hours, as a hundred views of `MOST_PATHS` do."""
+ROUNDING = 1.05
+"""Two digits are off by up to 5 %: as many photons as are said to be possible are so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,24 +57,56 @@ class Plan:
     samples: int
     """Samples per pixel of the dense views that the counts are drawn from, or would need at least."""
     photons_per_view: float
+    keeps_origins: bool = True
+    """Whether photons are few enough to be kept one by one, each with its origin, if they are thinned."""
+    is_unbounded: bool = False
+    """Whether views are rendered since rare paths bring more light than any bound that thinning can use."""
     noise: float = 0.0
     """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
     normaliser_error: float = 0.0
     """Standard error of the light that a dense view's budget is divided by, as a share of it."""
     depths_mm: tuple[float, ...] = ()
     """Some of the depths that the corner cameras see, if photons are thinned."""
+    explored: Exploration | None = field(default=None, compare=False)
+    """What is known of the light, if photons are thinned."""
 
 
-def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: int = 1) -> Plan:
+def plan(
+    capture: Capture,
+    setup: Setup,
+    kind: str,
+    least_samples: int = 1,
+    *,
+    may_explore: Callable[[Plan], bool] = lambda _: True,
+) -> Plan:
     """Thin, or render densely, whichever takes less time for counts without rendering noise.
 
     Thinning takes time with the photons. Dense rendering takes it with the pixels and with the samples that
     each needs, which are more the more light there is. A probe of the light tells how many, unless a budget
-    is so small that one sample for each pixel takes longer than all its photons. Where dense rendering
-    cannot take enough, photons are thinned as long as there is memory for them. The seed has no part in it
-    (see `PROBE_SEED`). `kind` is that of the backend; views that are rendered in any case have
-    `least_samples` per pixel. Raises `InputError` for nested budgets of too many photons.
+    is so small that one sample for each pixel takes longer than all its photons. What is to be thinned is
+    explored first, if it `may_explore` (memory may not suffice), and rendered where the light has no bound.
+    The seed has no part in it (see `PROBE_SEED`). `kind` is that of the backend; views that are rendered in
+    any case have `least_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and
+    for more photons than can be made in either way.
     """
+    made = _cheaper_way(capture, setup, kind, least_samples, is_unbounded=False)
+    if not made.thins or not may_explore(made):
+        return made
+    explored = explore(setup, capture.photons, capture.photons_per_radiance)
+    if not explored.is_bounded:
+        return render_instead(capture, setup, kind, least_samples)
+    return replace(made, explored=explored)
+
+
+def render_instead(capture: Capture, setup: Setup, kind: str, least_samples: int = 1) -> Plan:
+    """A plan that doesn't thin, for light that turned out to have no bound; else as `plan`."""
+    return _cheaper_way(capture, setup, kind, least_samples, is_unbounded=True)
+
+
+def _cheaper_way(
+    capture: Capture, setup: Setup, kind: str, least_samples: int, *, is_unbounded: bool
+) -> Plan:
+    render_scene = setup.render_scene
     grid = capture.grid
     pixels = grid.height * grid.width
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
@@ -81,28 +120,46 @@ def plan(capture: Capture, render_scene: RenderScene, kind: str, least_samples: 
         return photons_per_view * grid.view_count <= MOST_SINGLE_PHOTONS
 
     per_view = _budget_per_view(capture)
-    if per_view is not None and is_cheaper(per_view, least_samples) and are_few(per_view):
-        return Plan(True, least_samples, per_view, depths_mm=first_hit_depths_mm(render_scene, grid))
+    small = per_view is not None and is_cheaper(per_view, least_samples) and are_few(per_view)
+    if per_view is not None and small and not is_unbounded:
+        depths_mm = first_hit_depths_mm(render_scene, grid)
+        return Plan(True, least_samples, per_view, depths_mm=depths_mm)
     probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
     per_view, gain = _photons(capture, probed)
     scope_pixels = _scope_pixels(capture)
-    samples = probed.samples_for(gain, scope_pixels)
-    samples = min(max(samples, least_samples), (MOST_PATHS - 1) // pixels)
-    noise = probed.photon_noise(gain, samples)
+    samples = max(probed.samples_for(gain, scope_pixels), least_samples)
     if capture.photons.nested and not are_few(per_view):
         raise InputError(
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
     # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
-    thins = are_few(per_view) and probed.mean > 0 and (is_cheaper(per_view, samples) or noise > NOISE_SHARE)
+    most_thinned = 0.0 if is_unbounded or probed.mean <= 0 else MOST_THINNED_PHOTONS / grid.view_count
+    most_samples = (MOST_PATHS - 1) // pixels
+    thins = per_view <= most_thinned and (is_cheaper(per_view, samples) or samples > most_samples)
+    if not thins and samples > most_samples:
+        raise _too_many_photons(capture, per_view, max(most_thinned, per_view * most_samples / samples))
     return Plan(
         thins=thins,
         samples=samples,
         photons_per_view=per_view,
-        noise=noise,
+        keeps_origins=are_few(per_view),
+        is_unbounded=is_unbounded,
+        noise=probed.photon_noise(gain, samples),
         normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
         depths_mm=first_hit_depths_mm(render_scene, grid) if thins else (),
+    )
+
+
+def _too_many_photons(capture: Capture, per_view: float, most_per_view: float) -> InputError:
+    """That so many photons of a view cannot be made exactly, and how many of them can."""
+    what, number, most = "exposure: {:.3g} photons per view", per_view, most_per_view
+    if capture.photons.scope != "exposure":
+        what, number = "photons.budget: {:g} photons", capture.photons.budget
+        most *= number / per_view
+    return InputError(
+        f"{what.format(number)} are more than can be made without rendering noise; at most "
+        f"{float(f'{most / ROUNDING:.2g}'):g} can be"
     )
 
 

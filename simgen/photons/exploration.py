@@ -2,16 +2,18 @@
 
 It depends on scene, cameras and photons wanted, not on the seed: datasets that differ in nothing else
 share it. A pilot suggests the majorant; then candidates are drawn for nothing but to lift it where it is
-exceeded. What is learned here costs no photon its independence.
+exceeded, until so many as the photons take hardly do so any more. Where they go on, as with mirrors that
+throw light on other surfaces, no majorant will do. What is learned here costs no photon its independence.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Setup, paths_of
+from simgen.photons.candidates import Accepted, CandidateSampler, Setup, paths_of
 from simgen.photons.majorant import Majorant
 from simgen.photons.photon_scopes import cell_groups
 from simgen.photons.pilot import EXPLORATION_SEED, send_pilot
@@ -22,6 +24,13 @@ WARM_UP_SHARE = 0.15
 """The warm-up's rounds aim for this share of the photons, but take so many candidates at least, at most."""
 WARM_UP_CANDIDATES = (1 << 13, 1 << 17)
 WARM_UP_ROUNDS = 2
+REHEARSALS = 8
+"""Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
+REHEARSAL_PATHS = 1 << 18
+ENOUGH = 0.5
+"""One with this share of the clumps that are allowed is the last: the draw will hardly have too many."""
+LEAST_PASSED = 2
+"""If there is none, so many must have no more than are allowed: the draw then takes four attempts or so."""
 EXCESS_SHARE = 1e-5
 """Share of the light that the warm-up leaves above the majorant."""
 LIKELY_SHARE = 0.3
@@ -33,7 +42,8 @@ LEAST_SHARE = 1e-4
 class Exploration:
     """A majorant, ambient light (C,), the share of candidates that is kept, and the light paths it took.
 
-    `majorant` is None if there is no light at all; who lifts it lifts a copy.
+    `majorant` is None if there is no light at all; who lifts it lifts a copy. Where photons would come in
+    clumps whatever it is, `is_bounded` is False, and they cannot be thinned.
     """
 
     majorant: Majorant | None
@@ -42,6 +52,7 @@ class Exploration:
     paths: int
     max_dark_candidates: int
     """Where so many candidates of a scope find no light it has none."""
+    is_bounded: bool = True
 
 
 def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
@@ -59,28 +70,78 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
         return float(photons_per_radiance * mean[cells].mean() * pixels)
 
     pilot = send_pilot(setup, expected)
-    share, paths = LIKELY_SHARE, 0
-    if pilot.majorant is not None:
-        share, paths = _warm_up(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean))
-    return Exploration(pilot.majorant, pilot.ambient, share, pilot.paths + paths, pilot.max_dark_candidates)
+    if pilot.majorant is None:
+        return Exploration(None, pilot.ambient, LIKELY_SHARE, pilot.paths, pilot.max_dark_candidates)
+    warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean))
+    warmed.warm_up()
+    is_bounded = warmed.rehearse()
+    paths = pilot.paths + warmed.paths
+    return Exploration(
+        pilot.majorant, pilot.ambient, warmed.share, paths, pilot.max_dark_candidates, is_bounded
+    )
 
 
-def _warm_up(
-    setup: Setup, majorant: Majorant, groups: list[np.ndarray], ambient: np.ndarray, photons: float
-) -> tuple[float, int]:
-    """Lift a majorant where candidates exceed it; the share that it keeps, and the paths that took."""
-    number = int(np.clip(WARM_UP_SHARE * photons / LIKELY_SHARE, *WARM_UP_CANDIDATES))
-    share, paths = LIKELY_SHARE, 0
-    for done in range(WARM_UP_ROUNDS):
-        path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=done)
-        sampler = sampler_for(setup, majorant, groups, ambient)
-        found = sampler.try_candidates(np.arange(number) % len(groups), None, path_seed)
-        paths += paths_of(sampler, number, found.ratio.size)
-        factor = _factor(found.ratio)
-        share = max(found.photons.n.sum() / number / factor, LEAST_SHARE)
-        majorant.scale(factor)
-        majorant.lift(found.over)
-    return share, paths
+@dataclass
+class _Warming:
+    """A majorant that is lifted where candidates exceed it, the share that it keeps, the paths it took."""
+
+    setup: Setup
+    majorant: Majorant
+    groups: list[np.ndarray]
+    ambient: np.ndarray
+    photons: float
+    share: float = LIKELY_SHARE
+    paths: int = 0
+    rounds: int = 0
+
+    def warm_up(self) -> None:
+        """Bring all bounds to about what the light needs."""
+        number = int(np.clip(WARM_UP_SHARE * self.photons / LIKELY_SHARE, *WARM_UP_CANDIDATES))
+        for _ in range(WARM_UP_ROUNDS):
+            found = self._try(self._sampler(), number)
+            factor = _factor(found.ratio)
+            self.share = max(self.share / factor, LEAST_SHARE)
+            self.majorant.scale(factor)
+            self.majorant.lift(found.over)
+
+    def rehearse(self) -> bool:
+        """Draw and lift until a draw would have few clumps; whether one will in reasonable time."""
+        passed = 0
+        for turn in range(REHEARSALS):
+            sampler = self._sampler()
+            most = REHEARSAL_PATHS // sampler.paths_each
+            found = self._try(sampler, int(np.clip(self.photons / self.share, WARM_UP_CANDIDATES[0], most)))
+            self.majorant.lift(found.over, reach=1 + turn // 2)
+            number = found.photons.n
+            pairs = int((number * (number - 1) // 2).sum())
+            allowed = pairs_allowed(int(number.sum()), math.prod(self.setup.grid.shape_KLHW))
+            if pairs <= ENOUGH * allowed:
+                return True
+            passed += pairs <= allowed
+        return passed >= LEAST_PASSED
+
+    def _sampler(self) -> CandidateSampler:
+        return sampler_for(self.setup, self.majorant, self.groups, self.ambient)
+
+    def _try(self, sampler: CandidateSampler, number: int) -> Accepted:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=self.rounds)
+        found = sampler.try_candidates(np.arange(number) % len(self.groups), None, path_seed)
+        self.rounds += 1
+        self.paths += paths_of(sampler, number, found.ratio.size)
+        self.share = max(found.photons.n.sum() / number, LEAST_SHARE)
+        return found
+
+
+def pairs_allowed(photons: int, pixels: int) -> float:
+    """How many pairs of photons that one path gave no test of the counts can tell from chance.
+
+    Poisson counts with the rates r_x have r_x^2 / 2 pairs of photons in pixel x on average, and as much
+    variance; clumps add a share of r_x. A test that knows all rates weighs the pairs of each pixel by
+    1 / r_x: then chance has the variance P / 2 over P pixels, and a share of 1 / sqrt(2 P) of the photons is
+    one standard deviation. No other weights see clumps better. So much is allowed, P being all `pixels` of
+    all views.
+    """
+    return photons / float(np.sqrt(2 * pixels))
 
 
 def _factor(ratio: np.ndarray) -> float:

@@ -17,7 +17,6 @@ from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan
-from simgen.photons.exploration import Exploration
 from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
@@ -31,19 +30,24 @@ def thin(
     capture: Capture,
     setup: Setup,
     made: Plan,
-    explored: Exploration | None = None,
     report: Report = silent,
-) -> tuple[PhotonTable, dict[str, Any]]:
-    """Photons of all views drawn one by one, and what the manifest says of them."""
+) -> tuple[PhotonTable, dict[str, Any]] | None:
+    """Photons of all views drawn one by one, and what the manifest says of them.
+
+    None if too many of them came in clumps, however often they were drawn: then views are to be rendered.
+    """
     grid = capture.grid
     photons, log = thin_photons(
         setup,
         capture.photons,
         seed=capture.seed,
         photons_per_radiance=capture.photons_per_radiance,
-        explored=explored,
+        explored=made.explored,
+        keeps_origins=made.keeps_origins,
         report=report,
     )
+    if log["clump_pairs"] > log["clump_pairs_allowed"]:
+        return None
     return photons, log | {
         "dense_paths_instead": made.samples * grid.view_count * grid.height * grid.width,
         "normaliser_standard_error": 0.0,

@@ -22,7 +22,6 @@ from simgen.truth.first_hits import first_hits_of_view
 
 NOISE_SHARE = 0.01
 NORMALISER_ERROR = 0.003
-MOST_SAMPLES = 64
 PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
@@ -48,11 +47,11 @@ class Probe:
         return math.sqrt(self.variance / paths) / self.mean if self.mean > 0 else 0.0
 
     def samples_for(self, photons_per_radiance: float, pixels: int | None = None) -> int:
-        """Samples per pixel that keep the noise below `NOISE_SHARE`; `MOST_SAMPLES` at most for that.
+        """Samples per pixel that keep the noise below `NOISE_SHARE`, however many these are.
 
         With a budget that is counted over so many `pixels`, enough for `NORMALISER_ERROR` too.
         """
-        noise = min(math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE), MOST_SAMPLES)
+        noise = math.ceil(self.photon_noise(photons_per_radiance, 1) / NOISE_SHARE)
         error = 0.0 if pixels is None else self.light_error(pixels) / NORMALISER_ERROR
         return max(noise, math.ceil(error**2), 1)
 

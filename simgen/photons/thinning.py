@@ -18,7 +18,7 @@ anew from the majorant as it is by then.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,13 +27,14 @@ import numpy as np
 from pcii.base.progress import Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Setup, paths_of
-from simgen.photons.exploration import LEAST_SHARE, Exploration, explore
+from simgen.photons.exploration import LEAST_SHARE, Exploration, explore, pairs_allowed
 from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, places, scopes_for
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
-ATTEMPTS = 4
+ATTEMPTS = 8
+"""Each succeeds in most cases, since a rehearsal did."""
 
 
 @dataclass
@@ -54,11 +55,13 @@ def thin_photons(
     seed: int,
     photons_per_radiance: float | None = None,
     explored: Exploration | None = None,
+    keeps_origins: bool = True,
     report: Report = silent,
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """All photons of all views, ordered by view and pixel, and a log of how they came about.
 
     One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
+    Without `keeps_origins` the same photons, a row for each pixel that caught any: of more than memory holds.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
@@ -66,7 +69,7 @@ def thin_photons(
     """
     if explored is None:
         explored = explore(setup, photons, photons_per_radiance)
-    return _Drawing(setup, photons, seed, photons_per_radiance, explored, report).run()
+    return _Drawing(setup, photons, seed, photons_per_radiance, explored, report).run(keeps_origins)
 
 
 class _Drawing:
@@ -90,19 +93,20 @@ class _Drawing:
         self.majorant = None if explored.majorant is None else explored.majorant.copy()
         self.attempt = 0
 
-    def run(self) -> tuple[PhotonTable, dict[str, Any]]:
+    def run(self, keeps_origins: bool) -> tuple[PhotonTable, dict[str, Any]]:
         """Draw, anew if too many photons came in clumps."""
-        paths, drawn, allowed = self.explored.paths, list[PhotonTable](), 0.0
+        paths, drawn, allowed = self.explored.paths, no_photons(), 0.0
         while self.majorant is not None:
+            drawn = no_photons()  # before as many are drawn again
             self.scopes.start()
             self.tally = _Tally()
-            drawn = list(self._exposed() if self.gain is not None else self._budgeted())
+            rounds = self._exposed() if self.gain is not None else self._budgeted()
+            drawn = joined([no_photons(), *rounds]) if keeps_origins else self._summed(rounds)
             paths += self.tally.paths
             self.attempt += 1
             allowed = pairs_allowed(self.tally.kept, math.prod(self.setup.grid.shape_KLHW))
             if self.tally.pairs <= allowed or self.attempt == ATTEMPTS:
                 break
-            drawn.clear()  # before as many are drawn again
         tally, scopes = self.tally, self.scopes
         log = {
             "method": "thinning",
@@ -117,9 +121,17 @@ class _Drawing:
             "paths": paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        photons = joined([no_photons(), *drawn])
-        drawn.clear()  # of tens of millions of photons none is kept twice while they are sorted
-        return photons.by_pixel(self.setup.grid), log
+        return drawn.by_pixel(self.setup.grid), log
+
+    def _summed(self, rounds: Iterable[PhotonTable]) -> PhotonTable:
+        """A row for each pixel that caught photons, in all of these rounds."""
+        grid = self.setup.grid
+        counts = np.zeros(math.prod(grid.shape_KLHW), dtype=np.int64)
+        for photons in rounds:
+            np.add.at(counts, photons.flat_pixels(grid), 1)
+        pixel = np.flatnonzero(counts)
+        k, l, i, j = np.unravel_index(pixel, grid.shape_KLHW)
+        return PhotonTable(k, l, i, j, counts[pixel])
 
     def _sampler(self) -> CandidateSampler:
         assert self.majorant is not None
@@ -189,15 +201,3 @@ class _Drawing:
         self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)
         photons = found.photons.take(path)
         return replace(photons, n=np.ones_like(photons.n), scope=scope, rank=rank)
-
-
-def pairs_allowed(photons: int, pixels: int) -> float:
-    """How many pairs of photons that one path gave no test of the counts can tell from chance.
-
-    Poisson counts with the rates r_x have r_x^2 / 2 pairs of photons in pixel x on average, and as much
-    variance; clumps add a share of r_x. A test that knows all rates weighs the pairs of each pixel by
-    1 / r_x: then chance has the variance P / 2 over P pixels, and a share of 1 / sqrt(2 P) of the photons is
-    one standard deviation. No other weights see clumps better. So much is allowed, P being all `pixels` of
-    all views.
-    """
-    return photons / float(np.sqrt(2 * pixels))

@@ -45,31 +45,29 @@ def test_datasets_are_the_same_whatever_was_made_before(recipe_file: str, tmp_pa
     ("overrides", "again"),
     [
         (["seed=4"], set[str]()),
-        (["photons.budget=300"], {"plan", "explore"}),
+        (["photons.budget=300"], {"plan"}),
         (["analysis.z_mm=[500.0]"], {"write_truth"}),
-        (["grid.pitch_mm=[9.0,18.0]"], {"plan", "explore", "write_truth"}),
-        ([ERRORS, "seed=4"], {"plan", "explore", "write_truth"}),
-        (["scene=two_objects"], {"render_scene", "plan", "explore", "write_truth"}),
+        (["grid.pitch_mm=[9.0,18.0]"], {"plan", "write_truth"}),
+        ([ERRORS, "seed=4"], {"plan", "write_truth"}),
+        (["scene=two_objects"], {"render_scene", "plan", "write_truth"}),
     ],
 )
 def test_only_what_depends_on_a_change_is_made_again(
     recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
 ) -> None:
     made: list[str] = []
-    for owner, name in (
-        (Prepared, "render_scene"), (module, "plan"), (module, "explore"), (module, "write_truth"),
-    ):  # fmt: skip
+    for owner, name in ((Prepared, "render_scene"), (module, "plan"), (module, "write_truth")):
         work = getattr(owner, name)
 
-        def watched(*args: object, work: object = work, name: str = name) -> object:
+        def watched(*args: object, work: object = work, name: str = name, **options: object) -> object:
             made.append(name)
             assert callable(work)
-            return work(*args)
+            return work(*args, **options)
 
         monkeypatch.setattr(owner, name, watched)
     reuse = Reuse()
     make(prepare(*load_recipe(recipe_file)), tmp_path / "first", silent, reuse)
-    assert sorted(made) == ["explore", "plan", "render_scene", "write_truth"]
+    assert sorted(made) == ["plan", "render_scene", "write_truth"]
     made.clear()
     make(prepare(*load_recipe(recipe_file, overrides)), tmp_path / "second", silent, reuse)
     assert set(made) == again

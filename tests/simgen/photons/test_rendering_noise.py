@@ -11,7 +11,7 @@ from lit_scenes import two_balls
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
-from simgen.photons.rendering_noise import MOST_SAMPLES, NOISE_SHARE, PROBE_SAMPLES, Probe, probe
+from simgen.photons.rendering_noise import NOISE_SHARE, PROBE_SAMPLES, Probe, probe
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
@@ -46,7 +46,7 @@ def test_samples_are_as_many_as_are_needed() -> None:
     eight = Probe(mean=2.0, variance=8.0)
     assert eight.samples_for(0.00875) == 4  # a share of 0.035 at one sample
     assert eight.samples_for(1e-9) == 1
-    assert eight.samples_for(1e9) == MOST_SAMPLES
+    assert eight.samples_for(1e9) == 400_000_000_000
     assert Probe(mean=2.0, variance=0.0).samples_for(1e9) == 1
 
 
@@ -62,10 +62,8 @@ AMOUNT = st.floats(min_value=1e-6, max_value=1e6)
 def test_one_sample_less_would_be_too_few(mean: float, variance: float, gain: float) -> None:
     looked = Probe(mean, variance)
     samples = looked.samples_for(gain)
-    assert 1 <= samples <= MOST_SAMPLES
     tiny = 1 + 1e-12  # rounding of a quotient
-    if samples < MOST_SAMPLES:
-        assert looked.photon_noise(gain, samples) <= NOISE_SHARE * tiny
+    assert looked.photon_noise(gain, samples) <= NOISE_SHARE * tiny
     if samples > 1:
         assert looked.photon_noise(gain, samples - 1) * tiny >= NOISE_SHARE
 

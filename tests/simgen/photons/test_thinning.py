@@ -11,16 +11,20 @@ from scipy import stats
 
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
+from simgen.cameras.rig import as_rig
+from simgen.dataset.prepared import prepare
 from simgen.photons.candidates import Setup, even_film_points
-from simgen.photons.exploration import Exploration, explore
+from simgen.photons.counting_plan import Capture, plan
+from simgen.photons.exploration import Exploration, explore, pairs_allowed
 from simgen.photons.majorant import Majorant, fit
-from simgen.photons.thinning import pairs_allowed, thin_photons
+from simgen.photons.rendering_noise import NOISE_SHARE
+from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.recipe import Photons
+from simgen.spec.recipe import Photons, load_recipe
 from simgen.spec.scene import Scene
 
 pytestmark = pytest.mark.renders
@@ -461,6 +465,7 @@ def test_where_all_of_the_film_is_lit_one_draw_is_enough_and_planted_holes_are_c
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("simgen.photons.thinning.ATTEMPTS", 1)
+    monkeypatch.setattr("simgen.photons.exploration.REHEARSALS", 0)  # which would mend them
     scene = lit([WALL, ball("grey", 0.0, 600.0, (0.5, 0.5, 0.5))])
     pairs, allowed = clumps_of(scene)
     assert pairs <= allowed
@@ -474,6 +479,36 @@ def test_where_all_of_the_film_is_lit_one_draw_is_enough_and_planted_holes_are_c
     monkeypatch.setattr("simgen.photons.pilot.fit", with_holes)
     pairs, allowed = clumps_of(scene)
     assert pairs > allowed
+
+
+@pytest.mark.skipif(not COMPILED, reason="takes minutes, one candidate after the other")
+def test_the_papers_photons_are_drawn_once() -> None:
+    made, near = load_recipe("paper")
+    prepared = prepare(made, near)
+    setup = Setup(prepared.render_scene(), made.grid.camera_grid(), made.cfa, made.render.max_depth)
+    explored = explore(setup, made.photons)
+    assert explored.is_bounded
+    logs = [thin_photons(setup, made.photons, seed=seed, explored=explored)[1] for seed in range(4)]
+    assert [log["attempts"] for log in logs] == [1] * 4
+
+
+def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has() -> None:
+    lamp = {
+        "type": "area",
+        "position_mm": (-250, -350, 150),
+        "target_mm": (0, 0, 580),
+        "luminance_cd_m2": 2e4,
+    }
+    lamp |= {"width_mm": 60, "height_mm": 60}
+    metal = {"finish": {"type": "metal", "name": "Al", "roughness": 0.02}}
+    grid = replace(GRID, height=256, width=256, pixel_mm=0.25)
+    for material, is_bounded in ((metal, False), ({"reflectance": (0.7, 0.3, 0.2)}, True)):
+        thing = ball("ball", 40.0, 590.0, (1, 1, 1)) | {"material": material}
+        setup = Setup(lit([WALL, thing], [lamp]), grid, "GRBG", 3)
+        capture = Capture(as_rig(grid), "GRBG", Photons(budget=3000), None, seed=1)
+        made = plan(capture, setup, backend.choose().kind)
+        assert (made.thins, made.is_unbounded) == (is_bounded, not is_bounded)
+        assert made.noise <= NOISE_SHARE
 
 
 @pytest.mark.parametrize(("size", "number"), [((32, 32), 4096), ((30, 50), 1000), ((1, 7), 3), ((5, 5), 1)])
