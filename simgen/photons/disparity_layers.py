@@ -77,7 +77,8 @@ class DisparityLayers:
 
     def layer_of(self, z_mm: np.ndarray) -> np.ndarray:
         """Layer of first hits at planar depth `z_mm`; of what is nearer than all, the nearest layer."""
-        nearness = np.divide(self.disparity_mm / self.step_px, z_mm)
+        per_mm = self.disparity_mm / self.step_px
+        nearness = per_mm / np.maximum(z_mm, per_mm / self.layer_at.size)
         return self.layer_at[np.minimum(np.rint(nearness), self.layer_at.size - 1).astype(np.int64)]
 
     def tiles_of(self, samples: Samples, aside: int = 0) -> np.ndarray:
@@ -121,7 +122,8 @@ def layers_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> DisparityLay
     longer = max(grid.pitch_mm)
     disparity_mm = grid.focal_mm * longer / grid.pixel_mm
     cameras = max(grid.rows, grid.cols)
-    disparity_px = disparity_mm / z_mm
+    # A point that moves by more than a film from camera to camera, as in their own plane, is seen by one.
+    disparity_px = disparity_mm / np.maximum(z_mm, disparity_mm / max(grid.height, grid.width))
     thin = 4 * LAYER_BLUR_TILES * tile_px / max(cameras - 1, 1)
     step_px = max(thin, float(disparity_px.max()) / MOST_LAYERS)
     levels = np.unique(np.rint(disparity_px / step_px))
