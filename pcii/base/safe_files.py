@@ -44,7 +44,11 @@ def write_json_safely(path: Path, value: Any) -> None:
 
 @contextmanager
 def new_folder_safely(folder: Path) -> Iterator[Path]:
-    """An empty folder to fill, which replaces `folder` when the block ends without an exception."""
+    """An empty folder to fill, which replaces `folder` when the block ends without an exception.
+
+    Where `folder` is a symbolic link, what it leads to is replaced.
+    """
+    folder = folder.resolve() if folder.is_symlink() else folder
     with temporary_folder(folder) as temporary:
         yield temporary
         replace_folder(temporary, folder)

@@ -8,6 +8,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 
+LARGEST_COUNT = 1 << 40
+"""Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 LARGEST_TOTAL = (1 << 63) - 1
 
 
@@ -16,6 +18,12 @@ def read_only(array: np.ndarray) -> np.ndarray:
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+def check_unmasked(name: str, values: object) -> None:
+    """Raise `InputError` for a masked array of which anything is masked: it would be taken for a number."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise InputError(f"{name}: masked values have no number; give an array without a mask")
 
 
 def check_z_mm(z_mm: object) -> np.ndarray:
@@ -46,3 +54,24 @@ def check_total(name: str, counts: np.ndarray) -> None:
     total = (int((wide >> half).sum()) << 32) + int((wide & np.uint64((1 << 32) - 1)).sum())
     if total > LARGEST_TOTAL:
         raise InputError(f"{name}: {total} photons in all are more than 64-bit numbers hold, {LARGEST_TOTAL}")
+
+
+def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
+    """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
+    check_unmasked(name, values)
+    array = np.asarray(values)
+    if array.dtype.kind == "f":
+        is_whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
+        if not is_whole or (array.size and np.abs(array).max() > 2**53):
+            raise InputError(f"{name}: photon counts must be whole numbers")
+        array = array.astype(np.int64)
+    if array.dtype.kind not in "iub":
+        raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
+    if array.dtype.kind == "b":
+        array = array.astype(np.uint8)
+    array = array.astype(array.dtype.newbyteorder("="), copy=False)
+    if array.size and array.min() < 0:
+        raise InputError(f"{name}: photon counts must not be negative")
+    if array.size and array.max() > LARGEST_COUNT:
+        raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
+    return array

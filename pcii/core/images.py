@@ -8,7 +8,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, times
 from pcii.core.array_labels import VIEWS_LABELS
-from pcii.core.arrays import read_only
+from pcii.core.arrays import check_unmasked, read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.view_figures import chosen_camera, draw_light, light_thumbnail, middle_camera
@@ -59,7 +59,8 @@ class Views(Brief):
         if isinstance(self.radiance, np.ndarray):
             if self.radiance.dtype.kind not in "fiu":
                 raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
-            if self.radiance.dtype in (np.uint8, np.uint16):
+            check_unmasked("radiance", self.radiance)
+            if self.radiance.dtype.newbyteorder("=") in (np.uint8, np.uint16):
                 raise InputError(
                     f"radiance: {self.radiance.dtype} of pictures is sRGB, not light; decode it by "
                     "pcii.srgb_to_linear, or give linear values as float32"

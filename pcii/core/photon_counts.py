@@ -10,7 +10,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, times
 from pcii.core.array_labels import COUNTS_LABELS
-from pcii.core.arrays import check_total, read_only
+from pcii.core.arrays import check_total, read_only, whole_counts
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
 from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of
 from pcii.core.view_figures import chosen_camera, draw_light, draw_photons, middle_camera, photon_thumbnail
@@ -19,9 +19,6 @@ from pcii.core.xarray_form import labelled_dataset
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
-
-LARGEST_COUNT = 1 << 40
-"""Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,7 +52,7 @@ class PhotonCounts(Brief):
     def from_dense(
         cls, counts_KLHW: np.ndarray, grid: CameraGrid, *, cfa: str | None = None
     ) -> "PhotonCounts":
-        """Counts from a dense stack (K, L, H, W) of whole numbers >= 0.
+        """Counts from a copy of a dense stack (K, L, H, W) of whole numbers >= 0.
 
         Raises `InputError` for another shape, and for negative, fractional or too large counts.
 
@@ -71,7 +68,9 @@ class PhotonCounts(Brief):
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         check_total("counts", counts)
-        return cls(grid, cfa, _dense=read_only(counts))
+        # Who gave the array may write to it later.
+        kept = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
+        return cls(grid, cfa, _dense=read_only(kept))
 
     @classmethod
     def from_events(
@@ -263,26 +262,6 @@ class PhotonCounts(Brief):
 def _check_grid(value: object) -> None:
     if not isinstance(value, CameraGrid):
         raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
-
-
-def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
-    """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
-    array = np.asarray(values)
-    if array.dtype.kind == "f":
-        is_whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
-        if not is_whole or (array.size and np.abs(array).max() > 2**53):
-            raise InputError(f"{name}: photon counts must be whole numbers")
-        array = array.astype(np.int64)
-    if array.dtype.kind not in "iub":
-        raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
-    if array.dtype.kind == "b":
-        array = array.astype(np.uint8)
-    array = array.astype(array.dtype.newbyteorder("="), copy=False)
-    if array.size and array.min() < 0:
-        raise InputError(f"{name}: photon counts must not be negative")
-    if array.size and array.max() > LARGEST_COUNT:
-        raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
-    return array
 
 
 def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:

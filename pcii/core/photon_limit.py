@@ -87,6 +87,8 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
     PhotonCounts(shape=1 x 2 x 40 x 60, cfa=GRBG, photons=2056, kept=events)
     """
     check_photons(photons)
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
     if views.cfa is not None and cfa not in (None, views.cfa):
         raise InputError(f"cfa: the views are mosaics of the pattern {views.cfa}, not {cfa}")
     if views.radiance.shape[4] == 1 and views.cfa is None and cfa is not None:

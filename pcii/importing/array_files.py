@@ -41,7 +41,7 @@ def import_arrays(
         numbers = numbers[..., None]
     if numbers.ndim != 5 or 0 in numbers.shape or numbers.shape[4] not in (1, 3):
         raise InputError(f"{name}: expected (K, L, H, W) or (K, L, H, W, 1 or 3), got {numbers.shape}")
-    if numbers.dtype.kind != "f" and numbers.dtype not in (np.uint8, np.uint16):
+    if numbers.dtype.kind != "f" and numbers.dtype.newbyteorder("=") not in (np.uint8, np.uint16):
         raise InputError(f"{name}: expected float, uint8 or uint16, got {numbers.dtype}")
     if numbers.dtype.kind == "u" and encoding is None:
         raise InputError(

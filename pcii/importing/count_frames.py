@@ -7,7 +7,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts, whole_counts
+from pcii.core.arrays import LARGEST_COUNT, whole_counts
+from pcii.core.photon_counts import PhotonCounts
 from pcii.importing.array_files import opened_array
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
 from pcii.importing.file_patterns import files_by_camera

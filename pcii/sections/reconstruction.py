@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.core.arrays import LARGEST_COUNT
 from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
 from pcii.core.images import Views
-from pcii.core.photon_counts import LARGEST_COUNT, PhotonCounts
+from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Normalisation, Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
 from pcii.sections.image_moves import AxisMoves, axis_moves, step_px

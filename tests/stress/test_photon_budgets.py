@@ -8,8 +8,8 @@ from rational_sections import samples_of, variance_of
 from twins import even_light, unit_grid
 
 import pcii
+from pcii.core.arrays import LARGEST_COUNT
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import LARGEST_COUNT
 from pcii.sections.photon_statistics import view_samples
 
 BUDGETS = [0, *(10**power for power in range(13))]

@@ -73,6 +73,16 @@ def test_a_folder_takes_the_place_of_another_as_a_whole(tmp_path):
         assert [p.name for p in tmp_path.iterdir()] == ["group"]
 
 
+def test_what_a_link_leads_to_is_replaced(tmp_path):
+    (tmp_path / "disk").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "disk")
+    with new_folder_safely(link) as new:
+        (new / "file").write_text("whole")
+    assert link.is_symlink()
+    assert (tmp_path / "disk" / "file").read_text() == "whole"
+
+
 def test_a_folder_that_cannot_be_replaced_stays(tmp_path):
     place = tmp_path / "group"
     place.mkdir()

@@ -6,7 +6,9 @@ from property_settings import at_least
 from twins import unit_grid
 
 from pcii.base.errors import InputError
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_limit import limit_photons
 from pcii.sections.reconstruction import reconstruct
 
 
@@ -98,6 +100,28 @@ def test_counts_of_the_other_byte_order_are_counts():
     grid = unit_grid(2, 2, 4, 4)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 7, dtype=">u2"), grid)
     assert reconstruct(counts, 1e9).counts[0, 0, 0, 0] == 28
+
+
+def test_counts_stay_as_they_are_when_the_array_changes():
+    dense = np.ones((1, 1, 2, 2), dtype=np.uint16)
+    counts = PhotonCounts.from_dense(dense, unit_grid(1, 1, 2, 2))
+    dense[:] = 9
+    assert counts.to_numpy().sum() == 4
+
+
+def test_masked_values_and_seeds_below_0_are_refused():
+    grid, masked = unit_grid(1, 1, 2, 2), np.ma.masked_equal(np.arange(4).reshape(1, 1, 2, 2), 3)
+    with pytest.raises(InputError, match=r"^counts: masked"):
+        PhotonCounts.from_dense(masked, grid)
+    with pytest.raises(InputError, match=r"^radiance: masked"):
+        Views(masked[..., None].astype(float), grid)
+    with pytest.raises(InputError, match=r"^seed: "):
+        limit_photons(Views(np.ones((1, 1, 2, 2, 1)), grid), 10, seed=-1)
+
+
+def test_pictures_of_the_other_byte_order_are_no_light_either():
+    with pytest.raises(InputError, match="sRGB"):
+        Views(np.ones((1, 1, 2, 2, 1), ">u2"), unit_grid(1, 1, 2, 2))
 
 
 def test_a_narrow_dtype_does_not_wrap_in_the_total():
