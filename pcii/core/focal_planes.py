@@ -14,7 +14,12 @@ from pcii.base.errors import InputError
 from pcii.base.short_form import Brief, listed
 from pcii.core.arrays import check_z_mm, read_only
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import depth_of_total_disparity_mm, disparity_px, total_disparity_px
+from pcii.core.geometry import (
+    depth_of_total_disparity_mm,
+    disparity_px,
+    shifts_to_centre_px,
+    total_disparity_px,
+)
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts, PhotonEvents
 from pcii.core.truth import PhotonTruth
@@ -104,10 +109,8 @@ class FocalPlanes(Brief):
         A point of the plane that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual
         centre, d the disparity; not a whole number in general.
         """
-        across, down = disparity_px(self.grid, self.z_mm)
-        K, L = self.grid.rows, self.grid.cols
-        rows = (np.arange(K) - (K - 1) / 2) * down[:, None]
-        return read_only(rows), read_only((np.arange(L) - (L - 1) / 2) * across[:, None])
+        rows, cols = shifts_to_centre_px(self.grid, *disparity_px(self.grid, self.z_mm))
+        return read_only(rows), read_only(cols)
 
     @cached_property
     def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:

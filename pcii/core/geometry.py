@@ -60,6 +60,17 @@ def total_disparity_px(grid: CameraGrid, z_mm: np.ndarray | float) -> np.ndarray
         return np.maximum((grid.cols - 1) * d_x, (grid.rows - 1) * d_y)
 
 
+def shifts_to_centre_px(
+    grid: CameraGrid, across: np.ndarray, down: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shifts of rows (Z, K) and columns (Z, L) of cameras to the virtual centre, for disparities (Z,) in px.
+
+    A point that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual centre.
+    """
+    rows = (np.arange(grid.rows) - (grid.rows - 1) / 2) * down[:, None]
+    return rows, (np.arange(grid.cols) - (grid.cols - 1) / 2) * across[:, None]
+
+
 def blur_half_extent_px(grid: CameraGrid, z_mm: np.ndarray | float, z0_mm: float) -> np.ndarray:
     """Half-extent in px of the blur of a point at z in the section at z0: total disparity's change / 2."""
     return np.abs(total_disparity_px(grid, z_mm) - total_disparity_px(grid, z0_mm)) / 2

@@ -51,7 +51,7 @@ def focus_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthM
     photons = _photons_nearby(evidence, best)
     abstains = (best_gain < SIGNIFICANT_NATS) | (photons < FEWEST_PHOTONS)
     abstains |= confidence < LEAST_CONFIDENCE
-    abstains |= ~halves_of(counts, planes).agree(best, ~abstains)
+    abstains |= ~halves_of(counts, planes, out_of_focus=True).agree(best, ~abstains)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
     return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))

@@ -154,6 +154,6 @@ def _halves_agree(
         for size, blocks in zip((data.grid.height, data.grid.width), best.shape, strict=True)
     )
     plane = best[np.ix_(i, j)] // 2
-    agree = halves_of(data, every_other).agree(plane, np.ones(plane.shape, bool))
+    agree = halves_of(data, every_other, out_of_focus=True).agree(plane, np.ones(plane.shape, bool))
     agree = cells_to_pixels(agree, CELL_PX, data.grid)
     return agree[::block_px, ::block_px]

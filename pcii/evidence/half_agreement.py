@@ -22,6 +22,7 @@ show structure at any of them decide.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.weighted_sums import camera_sums, whole_shifts_px
 from pcii.imaging.bright_regions import box_around
+from pcii.sections.photon_statistics import cell_sums
 
 FALSE_RATE = 1e-3
 """Largest share of pure noise in which the halves may seem to agree."""
@@ -89,14 +91,15 @@ class Products:
 class Halves:
     """How well the halves agree at Z planes, at planes out of focus and at Y planes outside the range.
 
-    Each has one entry for each size of blocks: `inside` (Z, ...) products at the planes, `nearer` and
-    `farther` (Z, ...) those out of focus, `outside` (Y, ...) those outside the range.
+    Each has one entry for each size of blocks: `inside` (Z, ...) products at the planes, `outside` (Y, ...)
+    those outside the range, `nearer` and `farther` (Z, ...) those out of focus, none unless `halves_of` was
+    asked for them.
     """
 
     inside: Sequence[Products]
-    nearer: Sequence[Products]
-    farther: Sequence[Products]
     outside: Sequence[Products]
+    nearer: Sequence[Products] = ()
+    farther: Sequence[Products] = ()
 
     @property
     def planes(self) -> int:
@@ -110,13 +113,14 @@ class Halves:
         blocks and windows decide in which the halves agree at that plane or at one outside the range.
         """
         agreed, undecided = np.zeros(label.shape, bool), where.copy()
-        for size in range(len(BLOCKS_CELLS)):
-            for sigma in WINDOWS_BLOCKS:
-                here, own = self._at_labels(size, sigma, label, undecided)
-                elsewhere, best = self._outside_range(size, sigma, label.shape)
-                nearer_here = own >= best
-                agreed |= undecided & here & nearer_here
-                undecided &= ~here & (nearer_here | ~elsewhere)
+        for size, sigma in product(range(len(BLOCKS_CELLS)), WINDOWS_BLOCKS):
+            if not undecided.any():
+                break
+            here, own_sum = self._at_labels(size, sigma, label, undecided)
+            outside, outside_sum = self._outside_range(size, sigma, label.shape)
+            is_inside = own_sum >= outside_sum
+            agreed |= undecided & here & is_inside
+            undecided &= ~here & (is_inside | ~outside)
         return agreed
 
     def agreement_over(self, rows: slice, cols: slice, where: np.ndarray) -> float:
@@ -130,7 +134,7 @@ class Halves:
         cells[rows, cols] = where
         largest = 0.0
         for side, inside, outside in zip(BLOCKS_CELLS, self.inside, self.outside, strict=True):
-            weight = _block_sums(cells, side)
+            weight = cell_sums(cells, side, np.float64)
             blocks = (slice(None), *np.nonzero(weight))
             weight, own = weight[blocks[1:]], inside.at(blocks)
             total = own.p @ weight
@@ -147,7 +151,7 @@ class Halves:
         agreed, total = np.zeros(label.shape, bool), np.zeros(label.shape)
         for z in np.unique(label[where]):
             at_plane = where & (label == z)
-            rows, cols = box_around(_block_sums(at_plane, side) > 0, (reach, reach))
+            rows, cols = box_around(cell_sums(at_plane, side, np.float64) > 0, (reach, reach))
             own, nearer, farther = (
                 each[size].at((z, rows, cols)) for each in (self.inside, self.nearer, self.farther)
             )
@@ -183,34 +187,40 @@ def least_agreement(planes: int) -> float:
     return float(np.sqrt(2 * np.log(planes / FALSE_RATE)))
 
 
-def halves_of(data: PhotonCounts | Views, planes: FocalPlanes) -> Halves:
-    """How well the halves of the cameras agree at these planes, out of focus, and outside their range."""
+def halves_of(data: PhotonCounts | Views, planes: FocalPlanes, *, out_of_focus: bool = False) -> Halves:
+    """How well the halves of the cameras agree at these planes and outside their range.
+
+    With `out_of_focus` also at planes nearer and farther than each, which `Halves.agree` needs.
+    """
     own_px = planes.total_disparity_px
     nearest, farthest = own_px.max(), own_px.min()
     # From infinity, where the films' own structure is, to as far in front of the range.
     away_px = OUTSIDE_STEP_PX * (np.arange(np.ceil(nearest / OUTSIDE_STEP_PX)) + 0.5)
     behind_px = farthest - away_px
     outside_px = np.concatenate([np.maximum(behind_px[behind_px > -OUTSIDE_STEP_PX], 0), nearest + away_px])
-    # Planes out of focus need not be exact: of all planes they share as many as they can.
-    out_px = [
-        step * np.round((own_px + np.array([[1], [-1]]) * OUT_OF_FOCUS_BLOCKS * side * CELL_PX) / step)
+    groups_px = [
+        (own_px, outside_px, *(_out_of_focus_px(own_px, side) if out_of_focus else ()))
         for side in BLOCKS_CELLS
-        for step in [side * CELL_PX / 2]
     ]
-    total_px = np.unique(np.concatenate([own_px, outside_px, *(each.ravel() for each in out_px)]))
+    total_px = np.unique(np.concatenate([px for groups in groups_px for px in groups]))
     half = np.add.outer(np.arange(data.grid.rows), np.arange(data.grid.cols)) % 2
     weights = np.stack([half == 0, half == 1]).astype(np.float64)
     sums, samples = camera_sums(data, whole_shifts_px(data.grid, total_px), weights, CELL_PX)
-    own, outside = (np.searchsorted(total_px, each) for each in (own_px, outside_px))
-    halves: list[tuple[Products, ...]] = []
-    for side, (nearer_px, farther_px) in zip(BLOCKS_CELLS, out_px, strict=True):
-        groups = own, np.searchsorted(total_px, nearer_px), np.searchsorted(total_px, farther_px), outside
-        used, places = np.unique(np.concatenate(groups), return_inverse=True)
+    halves: list[list[Products]] = []
+    for side, groups in zip(BLOCKS_CELLS, groups_px, strict=True):
+        used, places = np.unique(np.searchsorted(total_px, np.concatenate(groups)), return_inverse=True)
         products = _products(sums, samples, used, side, is_counted=isinstance(data, PhotonCounts))
-        halves.append(
-            tuple(products.at(part) for part in np.split(places, np.cumsum([len(g) for g in groups])[:-1]))
-        )
+        ends = np.cumsum([px.size for px in groups])[:-1]
+        halves.append([products.at(part) for part in np.split(places, ends)])
     return Halves(*zip(*halves, strict=True))
+
+
+def _out_of_focus_px(own_px: np.ndarray, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """Total disparities (Z,) nearer and farther than those of the planes, for blocks of `side` cells."""
+    # They need not be exact: rounded, those of many planes are the same.
+    step_px, away_px = side * CELL_PX / 2, OUT_OF_FOCUS_BLOCKS * side * CELL_PX
+    nearer, farther = (step_px * np.round((own_px + away) / step_px) for away in (away_px, -away_px))
+    return nearer, farther
 
 
 def _products(
@@ -227,10 +237,13 @@ def _products(
 def _products_of_plane(
     sums: np.ndarray, samples: np.ndarray, side: int, *, is_counted: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    shape = _block_sums(sums[0], side).shape
+    shape = cell_sums(sums[0], side, np.float64).shape
     products, noise, compared = np.ones(shape), np.ones(shape), np.ones(shape, bool)
     for half_sums, half_samples in zip(sums, samples, strict=True):
-        block_sums, block_samples = _block_sums(half_sums, side), _block_sums(half_samples, side)
+        block_sums, block_samples = (
+            cell_sums(half_sums, side, np.float64),
+            cell_sums(half_samples, side, np.float64),
+        )
         near_sums, near_samples = _neighbour_sums(block_sums), _neighbour_sums(block_samples)
         covered = (block_samples > 0) & (near_samples > 0)
         expected = np.divide(block_samples * near_sums, near_samples, out=np.zeros(shape), where=covered)
@@ -249,13 +262,6 @@ def _neighbour_sums(blocks: np.ndarray) -> np.ndarray:
     padded = np.pad(blocks, 1)
     rows = padded[:-2] + padded[1:-1] + padded[2:]
     return rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] - blocks
-
-
-def _block_sums(cells: np.ndarray, side: int) -> np.ndarray:
-    """Sums over blocks of `side` x `side` cells, sizes rounded up."""
-    h, w = cells.shape
-    padded = np.pad(cells, ((0, -h % side), (0, -w % side)))
-    return padded.reshape(padded.shape[0] // side, side, -1, side).sum(axis=(1, 3))
 
 
 def _in_cells(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:

@@ -8,7 +8,7 @@ differences of its running sums over rows and columns, so that they cost as much
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px
+from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px, shifts_to_centre_px
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import BLOCK_PX
@@ -20,12 +20,10 @@ def whole_shifts_px(grid: CameraGrid, total_disparity_px: np.ndarray) -> tuple[n
     As `FocalPlanes.whole_shifts_px`, but also at 0, infinitely far, and below it, where no surface can be.
     """
     across, down = parallax_px(grid, depth_of_total_disparity_mm(grid, np.ones(1)))
-    K, L = grid.rows, grid.cols
-    total = np.asarray(total_disparity_px, dtype=np.float64)[:, None]
-    rows = (np.arange(K) - (K - 1) / 2) * (total * down - grid.shear_px[1])
-    cols = (np.arange(L) - (L - 1) / 2) * (total * across - grid.shear_px[0])
-    row_shifts, col_shifts = (np.floor(shifts + 0.5).astype(np.int32) for shifts in (rows, cols))
-    return row_shifts, col_shifts
+    total = np.asarray(total_disparity_px, dtype=np.float64)
+    exact = shifts_to_centre_px(grid, total * across - grid.shear_px[0], total * down - grid.shear_px[1])
+    rows, cols = (np.floor(shifts + 0.5).astype(np.int32) for shifts in exact)
+    return rows, cols
 
 
 def camera_sums(
@@ -78,8 +76,8 @@ def _of_events(
             cells_of_events(*place, shifts[0][z], shifts[1][z], film, block_px, block)
             inside = block >= 0
             for group, own in enumerate(weight):
-                size = shape[2] * shape[3]
-                sums[z, group] = np.bincount(block[inside], own[inside], size).reshape(shape[2:])
+                summed = np.bincount(block[inside], own[inside], shape[2] * shape[3])
+                sums[z, group] = summed.reshape(shape[2:])
 
     in_threads(of_planes, len(sums))
     return sums
@@ -92,23 +90,20 @@ def _of_images(
 
     sums = np.zeros(shape)
     running = np.zeros((data.grid.height + 1, data.grid.width + 1))
+
+    def add_view(first: int, last: int, k: int, l: int, mean: float) -> None:
+        for z in range(first, last):
+            rows, cols = edges[0][z, k], edges[1][z, l]
+            blocks = np.diff(np.diff(running[rows[:, None], cols], axis=0), axis=1)
+            blocks += mean * np.outer(np.diff(rows), np.diff(cols))
+            for group in np.flatnonzero(weights[:, k, l]):
+                sums[z, group] += weights[group, k, l] * blocks
+
     for k, l in np.ndindex(data.grid.rows, data.grid.cols):
         image = data.view(k, l).astype(np.float64)
         image = image.sum(axis=-1) if image.ndim == 3 else image
         # From the mean, running sums stay small and lose no digits.
-        mean = image.mean()
+        mean = float(image.mean())
         np.cumsum(np.cumsum(image - mean, axis=0), axis=1, out=running[1:, 1:])
-        used = np.flatnonzero(weights[:, k, l])
-
-        def of_planes(
-            first: int, last: int, k: int = k, l: int = l, used: np.ndarray = used, mean=mean
-        ) -> None:
-            for z in range(first, last):
-                rows, cols = edges[0][z, k], edges[1][z, l]
-                blocks = np.diff(np.diff(running[rows[:, None], cols], axis=0), axis=1)
-                blocks += mean * np.outer(np.diff(rows), np.diff(cols))
-                for group in used:
-                    sums[z, group] += weights[group, k, l] * blocks
-
-        in_threads(of_planes, len(sums))
+        in_threads(add_view, len(sums), k, l, mean)
     return sums

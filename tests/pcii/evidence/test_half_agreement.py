@@ -28,7 +28,7 @@ def test_a_surface_is_agreed_on_where_it_is():
     grid, rng = unit_grid(5, 7, 128, 160), np.random.default_rng(0)
     rates = patch_views(0.05 * blocky_texture(rng, 64, 64), 32, 48, 3, grid)
     counts = PhotonCounts.from_dense(bayer_photons(rates, "GRBG", seed=0), grid, cfa="GRBG")
-    halves = halves_of(counts, planes_of(grid))
+    halves = halves_of(counts, planes_of(grid), out_of_focus=True)
     least = least_agreement(halves.planes)
     own = at(halves, DISPARITIES_PX.index(3), (32, 40))
     assert own[10:22, 14:26].mean() > 0.95
@@ -40,7 +40,7 @@ def test_what_one_camera_alone_shows_is_not_agreed_on():
     grid, rng = unit_grid(3, 3, 96, 96), np.random.default_rng(1)
     film = rng.poisson(0.5, grid.shape_KLHW)
     film[1, 2] = rng.poisson(50 * blocky_texture(rng, 96, 96)[..., 0])
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid), out_of_focus=True)
     least = least_agreement(len(DISPARITIES_PX))
     assert not any(at(halves, plane, (24, 24)).any() for plane in range(6))
     assert halves.agreement_over(slice(0, 24), slice(0, 24), np.ones((24, 24), dtype=bool)) < least
@@ -52,7 +52,7 @@ def test_noise_agrees_as_seldom_as_is_said(rate, views):
     grid = unit_grid(*views, 64, 80)
     above = []
     for seed in range(20):
-        halves = halves_of(even_light(grid, rate, seed), planes_of(grid))
+        halves = halves_of(even_light(grid, rate, seed), planes_of(grid), out_of_focus=True)
         above.append(np.any([at(halves, plane, (16, 20)) for plane in range(6)], axis=0).mean())
     assert np.mean(above) <= 1 / 1000  # of places, as is said
 
@@ -62,7 +62,7 @@ def test_halves_that_are_the_same_agree_on_noise():
     grid = unit_grid(2, 1, 64, 80)
     film = np.repeat(np.random.default_rng(0).poisson(1.0, (1, 1, 64, 80)), 2, axis=0)
     film[1, 0, :-1] = film[1, 0, 1:]  # at the disparity 1
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa=None), planes_of(grid), out_of_focus=True)
     assert at(halves, 0, (16, 20)).mean() > 0.9
 
 
@@ -106,7 +106,7 @@ def test_agreement_over_a_box_is_that_of_the_formula():
     compared = np.ones(p.shape, bool)
     compared[:, 4] = False
     own = [Products(p, 0 * p, compared), *nothing[1:]]
-    halves = Halves(own, nothing, nothing, nothing)
+    halves = Halves(own, nothing)
     where = np.array([[True, False], [True, True]])
     own = p[:, 2:4, 3:5][:, where]
     t = max((one.sum() / np.sqrt((one**2).sum()) for one in own), default=0.0)
@@ -119,7 +119,11 @@ def test_even_light_is_no_light_to_agree_on(count, size):
     grid = unit_grid(2, 3, *size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa="GRBG")
     shape = -(-size[0] // 4), -(-size[1] // 4)
-    assert not at(halves_of(counts, FocalPlanes.at_total_disparity(counts.grid, [2.0, 4.0])), 1, shape).any()
+    assert not at(
+        halves_of(counts, FocalPlanes.at_total_disparity(counts.grid, [2.0, 4.0]), out_of_focus=True),
+        1,
+        shape,
+    ).any()
 
 
 def test_bayer_colours_do_not_pass_for_light():
@@ -127,5 +131,5 @@ def test_bayer_colours_do_not_pass_for_light():
     colours = np.tile(colour_cells("GRBG"), (32, 32))
     rates = np.array([0.2, 5.0, 40.0])[colours] * np.ones(grid.shape_KLHW)
     film = np.random.default_rng(4).poisson(rates)
-    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), planes_of(grid))
+    halves = halves_of(PhotonCounts.from_dense(film, grid, cfa="GRBG"), planes_of(grid), out_of_focus=True)
     assert not any(at(halves, plane, (16, 16)).any() for plane in range(6))

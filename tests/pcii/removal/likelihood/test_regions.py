@@ -36,7 +36,7 @@ def halves_with(p: list[np.ndarray]) -> Halves:
     own, nothing = (
         [Products(part * is_own, 0 * part, np.ones(part.shape, bool)) for part in p] for is_own in (1, 0)
     )
-    return Halves(own, nothing, nothing, nothing)
+    return Halves(own, nothing)
 
 
 AGREED, UNSURE = (halves_with([np.full(shape, p) for shape in BLOCKS]) for p in (1.0, 0.0))
