@@ -213,7 +213,7 @@ def test_completion_is_installed_where_the_shell_looks(name: str, shell: str, tm
     assert any("verify" in text and name in text for text in written)
 
 
-def test_words_of_strangers_do_not_command_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+def test_control_characters_in_names_do_not_reach_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     app = command_app("works", "Works.")
 
     @app.command

@@ -2,7 +2,7 @@
 
 results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum; of
                          what `pcii run` made, by what (see `pcii.app.long_steps`) and how long it took;
-                         what is due: parts that a run has yet to make, and those made from older parts
+                         `due`, the parts that have to be made, or made again
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
@@ -11,8 +11,9 @@ score.json               as in `Score.to_dict`
 
 A replacement is written completely under a temporary name. Then the old entry is removed from results.json,
 the replacement renamed, and its entry added: a kill at any time leaves the old results, none, or the new
-ones. `due` tells of each part whether it belongs to the others: a run that ends before its last part leaves
-the rest due, and so does a command that replaces what the scores or the report were made from.
+ones. `due` lists the parts that are missing or older than the others and have to be made: after a run that was
+interrupted, those that it had not reached; after a command that replaced masks or depth, the scores and the
+report.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -135,7 +136,7 @@ class Results:
             self._list(remaining | listed, made, due - {name})
 
     def begin(self, parts: Iterable[str]) -> None:
-        """Say that these parts are to be made, before the first of them is: until then they are due."""
+        """List parts as due before the first of them is made; each is until it is made."""
         held = read_results(self.path)
         self._list(held["files"], held.get("made", {}), {*held.get("due", ()), *parts})
 

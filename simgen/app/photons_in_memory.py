@@ -17,7 +17,7 @@ from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
 from simgen.dataset.prepared import Prepared, capture_of, needs_of
-from simgen.dataset.resources import available_bytes, check_resources, shortage
+from simgen.dataset.resources import check_resources, fits
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin
@@ -63,14 +63,14 @@ def draw_photons(
     recipe = validate(Recipe, values, "draw_photons")
     prepared = Prepared(recipe, scene.scene, scene.folder, None)
     render_scene = prepared.render_scene()
-    capture, needs = capture_of(recipe, prepared.seed), needs_of(recipe)
-    setup, room = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth), available_bytes()
-    way = capture, setup, backend.choose().kind
-    made = plan(*way, may_explore=lambda first: shortage(needs, first, room) is None)
+    capture, needs, kind = capture_of(recipe, prepared.seed), needs_of(recipe), backend.choose().kind
+    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
+    made = plan(capture, setup, kind, may_explore=fits(needs))
     check_resources(needs, made, Path())
     drawn = thin(capture, setup, made, report) if made.thins else None
     if drawn is None and made.thins:
-        made = render_instead(*way)
+        made = render_instead(capture, setup, kind)
+        check_resources(needs, made, Path())
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:

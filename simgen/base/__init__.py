@@ -7,6 +7,7 @@ locations       Where scenes and recipes are found: the working directory, the s
 overrides       Values given as `key=value`, as `--set` has them.
 random_streams  Random streams, keyed by stage of the work: the same for any number of workers and any
                 order.
+round_numbers   Numbers of two digits for messages, and by how much they may be off.
 srgb            sRGB primaries (IEC 61966-2-1) from CIE XYZ.
 strict_models   What scene and recipe files share: strict models, TOML, and errors that point at the
                 field.

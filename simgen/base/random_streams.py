@@ -31,14 +31,16 @@ Stage = Literal[
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")
-"""What the same cameras have in whatever picture they take: it follows from the recipe's seed alone."""
+"""Stages that describe the cameras themselves. They depend on the recipe's seed alone, so that the same
+cameras photograph every scene."""
 _SEED_BITS = 64
+"""A recipe's seed is below 2^63, and is the rest of a draw's seed after division by 2^64."""
 
 
 def seed_of_draw(seed: int, drawn: Any) -> int:
-    """A seed of its own for each thing that is drawn with a recipe's seed: that seed, and a hash above it.
+    """The seed of one draw: the recipe's seed in the low 64 bits, a hash of `drawn` above it.
 
-    `drawn` are plain values that say what that is.
+    `drawn` holds the values, as JSON has them, that determine the draw.
     """
     digest = hashlib.sha256(json.dumps(drawn, sort_keys=True).encode()).digest()
     return int.from_bytes(digest[:16], "big") << _SEED_BITS | seed

@@ -56,8 +56,7 @@ def disparity_findings(facts: Facts) -> list[Finding]:
         found.append(Finding("ok", "disparity", away))
     if not facts.seen:
         return found
-    near = float(min(thing.z_mm.min() for thing in facts.seen))
-    far = float(max(thing.z_mm.max() for thing in facts.seen))
+    near, far = _depths_seen(facts)
     spread = float(apart_px(grid, near, far))
     text = (
         f"{_disparity(facts, near)} at the nearest point, {near:.0f} mm; {_disparity(facts, far)} at the "
@@ -109,7 +108,7 @@ def _separation(facts: Facts, near: ObjectFacts, far: ObjectFacts) -> Finding:
 
 
 def no_planes_findings(facts: Facts) -> list[Finding]:
-    """Whether neither scene nor recipe names depths, which analysis then has to be told each time."""
+    """Whether neither scene nor recipe names depths, so that `pcii` needs `--z-mm` each time."""
     if facts.analysis.z_mm:
         return []
     listed_mm = ", ".join(f"{z:g}" for z in facts.planes_mm) or "..."
@@ -151,15 +150,20 @@ def _range_findings(facts: Facts) -> list[Finding]:
     text = f"depth maps look from {limits[0]:g} to {limits[1]:g} mm"
     if not outside:
         return [Finding("ok", "focus", f"{text}, where all objects are")]
-    near = float(min(thing.z_mm.min() for thing in facts.seen))
-    far = float(max(thing.z_mm.max() for thing in facts.seen))
-    misses = not any(((t.z_mm >= limits[0]) & (t.z_mm <= limits[1])).any() for t in facts.seen)
-    if not misses:
-        near, far = min(limits[0], near), max(limits[1], far)
-    remedy = f"analysis.z_range_mm = [{np.floor(near):.0f}, {np.ceil(far):.0f}]"
-    if misses:
-        return [Finding("bad", "focus", f"{text}, where no object is", remedy)]
+    near, far = _depths_seen(facts)
+    if not any(((t.z_mm >= limits[0]) & (t.z_mm <= limits[1])).any() for t in facts.seen):
+        return [Finding("bad", "focus", f"{text}, where no object is", _range_mm(near, far))]
+    remedy = _range_mm(min(limits[0], near), max(limits[1], far))
     return [Finding("warn", "focus", f"{text}, and part of {listed(outside)} is outside", remedy)]
+
+
+def _depths_seen(facts: Facts) -> tuple[float, float]:
+    """The nearest and the farthest depth of any object that is seen."""
+    return float(min(t.z_mm.min() for t in facts.seen)), float(max(t.z_mm.max() for t in facts.seen))
+
+
+def _range_mm(near: float, far: float) -> str:
+    return f"analysis.z_range_mm = [{np.floor(near):.0f}, {np.ceil(far):.0f}]"
 
 
 def overlap_findings(facts: Facts) -> list[Finding]:

@@ -18,7 +18,7 @@ from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
 from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, pixels_without_occluders
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
-from simgen.dataset.resources import available_bytes, shortage
+from simgen.dataset.resources import available_bytes, fits
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import plan
 from simgen.renderer import backend
@@ -43,7 +43,7 @@ def probe_scene(target: Prepared) -> Facts:
     render_scene = target.render_scene()
     grid = recipe.grid.camera_grid()
     made = None
-    needs, memory_bytes = needs_of(recipe), available_bytes()
+    needs = needs_of(recipe)
     if recipe.products.counts:
         capture = capture_of(recipe, target.seed)
         made = plan(
@@ -51,7 +51,7 @@ def probe_scene(target: Prepared) -> Facts:
             Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth),
             kind,
             least_samples(recipe),
-            may_explore=lambda first: shortage(needs, first, memory_bytes) is None,
+            may_explore=fits(needs),
         )
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
     image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
@@ -98,7 +98,7 @@ def probe_scene(target: Prepared) -> Facts:
         path_s=path_s,
         hit_s=hit_s,
         compiled=compiled,
-        memory_bytes=memory_bytes,
+        memory_bytes=available_bytes(),
         disk_bytes=shutil.disk_usage(Path()).free,
         corners=len(corners),
         lamps_away=_lamps_away(scene, list(boxes.values())),

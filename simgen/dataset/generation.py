@@ -26,7 +26,7 @@ from simgen.dataset.dataset_folder import claimed, finished, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews
-from simgen.dataset.resources import available_bytes, check_resources, shortage
+from simgen.dataset.resources import check_resources, fits
 from simgen.dataset.reuse import InCommon, Reuse, in_common
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan, plan, render_instead
@@ -82,14 +82,13 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
             render_scene = common.scene(prepared.render_scene)
         setup = Setup(render_scene, capture.rig, capture.cfa, recipe.render.max_depth)
         if recipe.products.counts:  # likewise: too much light
-            room = available_bytes()
             planning = partial(
                 plan,
                 capture,
                 setup,
                 engine["kind"],
                 least_samples(recipe),
-                may_explore=lambda first: shortage(needs, first, room) is None,
+                may_explore=fits(needs),
             )
             with clock.stage("plan"):
                 made = common.plan(planning)

@@ -15,6 +15,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
+from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.photons.pilot import MOST_RAYS
@@ -44,9 +45,6 @@ TRUTH_BYTES = 6
 """Depth (float32) and object (int16) of a pixel."""
 EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
-
-ROUNDING = 1.05
-"""Two digits are off by up to 5 %: what is said to fit does so."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +110,12 @@ def shortage(needs: Needs, plan: Plan | None, room: float) -> Step | None:
     """The step that is largest beyond the room, None if all fit."""
     most = max(steps(needs, plan, room), key=lambda step: step.bytes)
     return most if most.bytes > room else None
+
+
+def fits(needs: Needs) -> Callable[[Plan], bool]:
+    """Whether memory, as it is now, holds all steps of a plan."""
+    room = available_bytes()
+    return lambda made: shortage(needs, made, room) is None
 
 
 def check_resources(needs: Needs, plan: Plan | None, out: Path) -> None:
@@ -214,7 +218,7 @@ def _of_photons(needs: Needs, plan: Plan, room: float) -> Step:
     if absolute is not None:
         field, value = "exposure.time_s", absolute.time_s
     fits = value * (room / (PHOTON_BYTES * photons)) / ROUNDING if photons > 0 else value
-    return Step(PHOTON_BYTES * rows + sums, field, f"{value:g}", f"at most {_even(fits)}")
+    return Step(PHOTON_BYTES * rows + sums, field, f"{value:g}", f"at most {two_digits(fits)}")
 
 
 def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:
@@ -263,8 +267,8 @@ def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:
         middle = (low + high) / 2
         fits = TILE_BYTES * tile_count(changed(10**middle), z_mm) <= room
         low, high = (middle, high) if fits else (low, middle)
-    right = f"at least {_even(value / 10**low * ROUNDING)}" if field == "grid.pixel_mm" else ""
-    right = right or f"at most {_even(value * 10**low / ROUNDING)}"
+    right = f"at least {two_digits(value / 10**low * ROUNDING)}" if field == "grid.pixel_mm" else ""
+    right = right or f"at most {two_digits(value * 10**low / ROUNDING)}"
     if not math.isinf(z_mm.min()):
         right += f", with what is seen at {z_mm.min():.0f} mm,"
     return Step(TILE_BYTES * tile_count(cameras, z_mm), field, f"{value:g}", right)
@@ -276,11 +280,6 @@ def _scaled(pair: tuple[float, float], which: float, share: float) -> tuple[floa
     return first, second
 
 
-def _even(value: float) -> str:
-    """A number with two digits."""
-    return f"{float(f'{value:.2g}'):g}"
-
-
 def _longer(one: str, size: int, other: str, other_size: int) -> tuple[str, int]:
     return (f"grid.{one}", size) if size >= other_size else (f"grid.{other}", other_size)
 
@@ -288,7 +287,7 @@ def _longer(one: str, size: int, other: str, other_size: int) -> tuple[str, int]
 def _linear(needed: float, room: float, field: str, value: float, unit: str = "") -> Step:
     """A step whose need grows in proportion to the value of a field."""
     fits = value * (room / needed) / ROUNDING if needed > 0 else math.inf
-    right = str(math.floor(fits)) if isinstance(value, int) and math.isfinite(fits) else _even(fits)
+    right = str(math.floor(fits)) if isinstance(value, int) and math.isfinite(fits) else two_digits(fits)
     return Step(needed, field, f"{value:g}{unit}", f"at most {right}{unit}")
 
 

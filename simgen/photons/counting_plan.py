@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
+from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.cameras.rig import Rig
 from simgen.photons.candidates import Setup
 from simgen.photons.exploration import Exploration, explore
@@ -25,8 +26,6 @@ MOST_SINGLE_PHOTONS = 1 << 25
 only counted."""
 MOST_THINNED_PHOTONS = 1e10
 """So many are drawn at most, which takes two cores four hours, as a hundred views of `MOST_PATHS` do."""
-ROUNDING = 1.05
-"""Two digits are off by up to 5 %: as many photons as are said to be possible are so."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +119,12 @@ def _cheaper_way(
         return photons_per_view * grid.view_count <= MOST_SINGLE_PHOTONS
 
     per_view = _budget_per_view(capture)
-    small = per_view is not None and is_cheaper(per_view, least_samples) and are_few(per_view)
-    if per_view is not None and small and not is_unbounded:
+    if (
+        per_view is not None
+        and not is_unbounded
+        and are_few(per_view)
+        and is_cheaper(per_view, least_samples)
+    ):
         depths_mm = first_hit_depths_mm(render_scene, grid)
         return Plan(True, least_samples, per_view, depths_mm=depths_mm)
     probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
@@ -133,10 +136,12 @@ def _cheaper_way(
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
-    # What the virtual centre sees no light of may be dark altogether, which dense views tell at once.
-    most_thinned = 0.0 if is_unbounded or probed.mean <= 0 else MOST_THINNED_PHOTONS / grid.view_count
+    # Where the virtual centre sees no light there may be none at all, which rendered views show at once.
+    may_thin = not is_unbounded and probed.mean > 0
+    most_thinned = MOST_THINNED_PHOTONS / grid.view_count if may_thin else 0.0
     most_samples = (MOST_PATHS - 1) // pixels
-    thins = per_view <= most_thinned and (is_cheaper(per_view, samples) or samples > most_samples)
+    is_better = is_cheaper(per_view, samples) or samples > most_samples
+    thins = may_thin and per_view <= most_thinned and is_better
     if not thins and samples > most_samples:
         raise _too_many_photons(capture, per_view, max(most_thinned, per_view * most_samples / samples))
     return Plan(
@@ -159,7 +164,7 @@ def _too_many_photons(capture: Capture, per_view: float, most_per_view: float) -
         most *= number / per_view
     return InputError(
         f"{what.format(number)} are more than can be made without rendering noise; at most "
-        f"{float(f'{most / ROUNDING:.2g}'):g} can be"
+        f"{two_digits(most / ROUNDING)} can be"
     )
 
 

@@ -2,8 +2,9 @@
 
 It depends on scene, cameras and photons wanted, not on the seed: datasets that differ in nothing else
 share it. A pilot suggests the majorant; then candidates are drawn for nothing but to lift it where it is
-exceeded, until so many as the photons take hardly do so any more. Where they go on, as with mirrors that
-throw light on other surfaces, no majorant will do. What is learned here costs no photon its independence.
+exceeded, until a rehearsal, with as many candidates as the draw needs, rarely exceeds it. Where mirrors
+reflect light onto other surfaces no majorant may suffice. What is learned here costs no photon its
+independence.
 """
 
 import math
@@ -28,9 +29,10 @@ REHEARSALS = 8
 """Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
 REHEARSAL_PATHS = 1 << 18
 ENOUGH = 0.5
-"""One with this share of the clumps that are allowed is the last: the draw will hardly have too many."""
+"""A rehearsal with at most this share of the allowed pairs (`pairs_allowed`) is the last."""
 LEAST_PASSED = 2
-"""If there is none, so many must have no more than are allowed: the draw then takes four attempts or so."""
+"""If there is none, so many rehearsals must be within the rule; if a draw in four is, eight all fail in 10 %
+of cases, and views are rendered then."""
 EXCESS_SHARE = 1e-5
 """Share of the light that the warm-up leaves above the majorant."""
 LIKELY_SHARE = 0.3
@@ -42,8 +44,8 @@ LEAST_SHARE = 1e-4
 class Exploration:
     """A majorant, ambient light (C,), the share of candidates that is kept, and the light paths it took.
 
-    `majorant` is None if there is no light at all; who lifts it lifts a copy. Where photons would come in
-    clumps whatever it is, `is_bounded` is False, and they cannot be thinned.
+    `majorant` is None if there is no light at all; who lifts it lifts a copy. `is_bounded` is False if paths
+    exceed every majorant so often that photons come in clumps, several from one path: no thinning then.
     """
 
     majorant: Majorant | None
@@ -105,16 +107,16 @@ class _Warming:
             self.majorant.lift(found.over)
 
     def rehearse(self) -> bool:
-        """Draw and lift until a draw would have few clumps; whether one will in reasonable time."""
+        """Rehearse and lift until a draw would be within `pairs_allowed`; whether one in four will be."""
         passed = 0
         for turn in range(REHEARSALS):
             sampler = self._sampler()
             most = REHEARSAL_PATHS // sampler.paths_each
             found = self._try(sampler, int(np.clip(self.photons / self.share, WARM_UP_CANDIDATES[0], most)))
+            # As in a draw: rare light shows on few tiles at a time, so tiles farther away are raised too.
             self.majorant.lift(found.over, reach=1 + turn // 2)
-            number = found.photons.n
-            pairs = int((number * (number - 1) // 2).sum())
-            allowed = pairs_allowed(int(number.sum()), math.prod(self.setup.grid.shape_KLHW))
+            pairs, photons = pairs_of(found.photons.n), int(found.photons.n.sum())
+            allowed = pairs_allowed(photons, math.prod(self.setup.grid.shape_KLHW))
             if pairs <= ENOUGH * allowed:
                 return True
             passed += pairs <= allowed
@@ -130,6 +132,11 @@ class _Warming:
         self.paths += paths_of(sampler, number, found.ratio.size)
         self.share = max(found.photons.n.sum() / number, LEAST_SHARE)
         return found
+
+
+def pairs_of(photons: np.ndarray) -> int:
+    """Pairs of photons that one path gave, from the number of photons of each path."""
+    return int((photons * (photons - 1) // 2).sum())
 
 
 def pairs_allowed(photons: int, pixels: int) -> float:

@@ -1,6 +1,7 @@
 """Recipes: one TOML file a dataset, resolved and validated before anything is rendered."""
 
 from collections.abc import Sequence
+from copy import deepcopy
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -262,11 +263,11 @@ def read_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[dict[
     if path is None:
         names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
         raise InputError(f"recipe: there is no {name_or_path!r}{suggestion(Path(name_or_path).stem, names)}")
-    values = read_toml(path)
-    scene = values.get("scene")
+    written = read_toml(path)
+    values = deepcopy(written)
     override(values, overrides)
-    if values.get("scene") != scene:
-        values = {name: value for name, value in read_toml(path).items() if name not in OF_ITS_SCENE}
+    if values.get("scene") != written.get("scene"):
+        values = {name: value for name, value in written.items() if name not in OF_ITS_SCENE}
         override(values, overrides)
     source = str(path) if not overrides else f"{path} with --set {' '.join(overrides)}"
     return values, source, path.parent

@@ -30,7 +30,8 @@ SHORT_NAMES = {"scene_number": "draw"}
 _ORDER = {"scene": -2, "scene_number": -1, "seed": 1}
 PLAIN = r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}"
 LONGEST_STEM = 40
-"""So many letters of a value that is not plain are told beside its hash."""
+"""Letters kept before the hash of a value that is no plain name: with several fields a folder's name stays
+below the 255 bytes that file systems allow."""
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ def test_a_sensor_has_no_faults_and_a_recipe_no_exposure_unless_told() -> None:
 def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> None:
     own, _ = load_recipe("small")
     assert own.title == "Ball and bird, small"
-    assert load_recipe("small", ["scene=same_colour"])[0].title == ""  # so the scene's own title is told
+    assert load_recipe("small", ["scene=same_colour"])[0].title == ""  # so the scene's own title is used
     assert load_recipe("small", ["scene=two_objects", "seed=3"])[0].title == own.title
     assert load_recipe("small", ["title=Balls", "scene=same_colour"])[0].title == "Balls"
     assert load_recipe("small", ["scene=same_colour", f"title={own.title}"])[0].title == own.title

@@ -219,7 +219,7 @@ def test_a_dense_stack_of_more_than_int64_holds_is_refused_by_name() -> None:
 
 
 @pytest.mark.parametrize("kept", ["events", "dense"])
-def test_some_cameras_see_a_point_where_all_of_them_do(kept: str):
+def test_a_selection_of_cameras_keeps_the_place_of_a_point(kept: str):
     """A point at 1 mm falls on itself in sections of any cameras, at the place that their centre says."""
     grid = unit_grid(5, 6, 40, 40, pitch_mm=(4.0, 2.0))
     dense = np.zeros(grid.shape_KLHW, dtype=int)

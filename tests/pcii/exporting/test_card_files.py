@@ -166,7 +166,7 @@ class Shown(HTMLParser):
 
 
 @pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
-def test_words_of_strangers_are_text_in_markdown_and_in_yaml(tmp_path, name):
+def test_names_with_markup_appear_as_plain_text_in_cards(tmp_path, name):
     root = make_dataset(tmp_path / "data", title=name, objects={"1": name})
     for address in (name, f"https://example.org/{name}", f"javascript://{name}"):
         write_card(root, Terms(address, (name,), name, address))

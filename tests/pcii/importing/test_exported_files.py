@@ -138,7 +138,7 @@ def large_views(dataset: pcii.Dataset, root: Path) -> Path:
 
 
 def many_photons(dataset: pcii.Dataset, root: Path) -> Path:
-    """More photons in a pixel than origins are told of."""
+    """More photons in a pixel than there are rows of origins."""
     n = dataset.counts.events.n.copy()
     n[0] = 10_000_000
     return changed(pcii.export_dataset(dataset, "events", root) / "events.npz", n=n)

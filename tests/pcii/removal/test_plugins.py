@@ -167,7 +167,7 @@ def test_nonsense_is_reported_in_one_sentence(tmp_path, monkeypatch, name, sente
         ("unnamed", r"must return a name as `method`, not None$"),
     ],
 )
-def test_what_is_no_result_at_all_cannot_be_made(tmp_path, monkeypatch, name, sentence):
+def test_results_of_wrong_types_are_refused(tmp_path, monkeypatch, name, sentence):
     install(tmp_path, monkeypatch, good="strange_code:good")
     with pytest.raises(InputError, match=sentence):
         segment(counts(), 1.0, method=getattr(import_module("strange_code"), name))
