@@ -11,9 +11,9 @@ score.json               as in `Score.to_dict`
 
 A replacement is written completely under a temporary name. Then the old entry is removed from results.json,
 the replacement renamed, and its entry added: a kill at any time leaves the old results, none, or the new
-ones. `due` lists the parts that are missing or older than the others and have to be made: after a run that was
-interrupted, those that it had not reached; after a command that replaced masks or depth, the scores and the
-report.
+ones. `due` lists the parts that are missing or older than the others and have to be made: after a run that
+was interrupted, those that it had not reached; after a command that replaced masks or depth, the scores and
+the report.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping

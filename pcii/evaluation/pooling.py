@@ -1,7 +1,7 @@
 """Methods pooled over scenes and ranked, on the datasets that all of them were scored on.
 
-Each scene counts once, as the mean over its seeds: further seeds tell more of the same scene, and only other
-scenes tell how far a result holds. Pairs are of the same scene and seed.
+Each scene counts once, as the mean over its seeds: further seeds say more about the same scene, and only
+other scenes say how far a result holds. Pairs are of the same scene and seed.
 """
 
 from collections.abc import Mapping, Sequence

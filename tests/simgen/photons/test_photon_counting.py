@@ -477,6 +477,8 @@ def test_darkness_is_planned_too() -> None:
     for kind in ("llvm", "scalar"):
         made = planned(recipe(grid=PROBED, photons={"budget": 1000}), dark, kind)
         assert (made.thins, made.samples, made.noise, made.normaliser_error) == (False, 1, 0, 0)
+        exposed = recipe(grid=PROBED, photons={"scope": "exposure"}, exposure={})
+        assert not planned(exposed, dark, kind).thins
     # What the virtual centre sees says nothing about how large a budget is.
     with pytest.raises(InputError, match=r"photons\.nested: 6e\+12 photons are too many"):
         planned(recipe(grid=PROBED, photons=nested(budget=1e12)), dark, "llvm")
