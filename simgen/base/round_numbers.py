@@ -8,6 +8,6 @@ def two_digits(value: float) -> str:
     """A number with two digits.
 
     >>> two_digits(1234.0), two_digits(0.0456)
-    ('1.2e+03', '0.046')
+    ('1200', '0.046')
     """
     return f"{float(f'{value:.2g}'):g}"
