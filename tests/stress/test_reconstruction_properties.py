@@ -102,7 +102,8 @@ def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: f
         sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, variance=True)
     except pcii.InputError as fault:
         assert str(fault).startswith("radiance: ")  # noqa: PT017
-        assert not np.isfinite(light).all() or np.abs(light).max() > 1e150
+        # Its square is too large for float64, or that of the greatest difference is too small for it.
+        assert not np.isfinite(light).all() or np.abs(light).max() > 1e150 or 0 < np.ptp(light) < 1.5e-154
         return
     assert sections.variance is not None
     assert np.isfinite(sections.estimate).all()
