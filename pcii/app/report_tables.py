@@ -120,10 +120,12 @@ def _objects(row: Row) -> str:
 
 def depth_table(outcome: Outcome) -> Table:
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
-    depth = outcome.score.depth
+    depth, truth = outcome.score.depth, outcome.dataset.truth
+    has_objects = truth is not None and bool((truth.object_id > 0).any())
+    where = "the objects' pixels" if has_objects else "all pixels with a true depth"
     rows: list[tuple[str, str]] = []
     if depth["coverage"] is not None:
-        rows.append(("pixels of the objects with an estimate", _percent(depth["coverage"])))
+        rows.append((f"share of {where} with an estimate", _percent(depth["coverage"])))
         if depth["median_mm"] is not None:
             for name in ("median", "mean"):
                 key = {"median": "median", "mean": "mae"}[name]
@@ -131,9 +133,7 @@ def depth_table(outcome: Outcome) -> Table:
                 rows.append((f"{name} error of those", value))
         rows.append(("off by more than 1 px of total disparity, or no estimate", _percent(depth["bad_1px"])))
         rows.append(("off by more than 3 px of total disparity, or no estimate", _percent(depth["bad_3px"])))
-    where, hci = "the objects' pixels", depth["hci_objects"]
-    if not hci["answered"]:
-        where, hci = "all pixels", depth["hci"]
+    hci = depth["hci_objects"]
     if hci["answered"]:
         value = (
             f"BadPix(0.07) {_percent(hci['badpix_007'])}, MSE × 100 {hci['mse_x100']:.2f}, "

@@ -34,20 +34,21 @@ ROUNDING = 1e-6
 def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
     """Errors of a depth map over the objects' pixels, those of `hci_errors`, and its `calibration`.
 
+    The objects' pixels are those with a `Truth.object_z_mm`: all with a true depth, if no object is known.
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
     since a dark backdrop has no photons to estimate depth from.
     `mae_mm`, `median_mm`, `mae_px` and `median_px` are mean and median absolute errors of the pixels with an
     estimate, in mm and in px of total disparity; `bad_1px` and `bad_3px` the shares with larger errors;
-    `coverage` the share with an estimate. All are None without a depth map, without truth or without objects.
+    `coverage` the share with an estimate. All are None without a depth map, and where no true depth is known.
     """
     keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px")
     errors: dict[str, Any] = dict.fromkeys(keys)
     errors["hci"] = hci_errors(grid, depth, truth, None if truth is None else np.isfinite(truth.z_mm))
-    errors["hci_objects"] = hci_errors(grid, depth, truth, None if truth is None else truth.object_id > 0)
+    on_object = None if truth is None else np.isfinite(truth.object_z_mm)
+    errors["hci_objects"] = hci_errors(grid, depth, truth, on_object)
     errors |= calibration(grid, depth, truth)
-    if grid is None or depth is None or truth is None or not (truth.object_id > 0).any():
+    if grid is None or depth is None or truth is None or on_object is None or not on_object.any():
         return errors
-    on_object = truth.object_id > 0
     estimate, true = depth.z_mm[on_object], truth.z_mm[on_object]
     answered = _answered(estimate)
     error_mm = np.abs(estimate[answered] - true[answered])

@@ -118,6 +118,10 @@ def test_all_pixels_and_those_of_objects_are_distinguished() -> None:
     assert found["hci"]["badpix_007"] == found["hci"]["answered"] == 0.5
     assert found["hci_objects"]["badpix_007"] == 0.0
     assert found["coverage"] == 1.0
+    nameless = Truth(np.where(ids > 0, z, np.inf), np.zeros_like(ids), {})  # then all that is hit is judged
+    alike = depth_errors(GRID, DepthMap(estimate, np.ones(z.shape)), nameless)
+    assert alike["hci"] == alike["hci_objects"]
+    assert [alike[key] for key in ("coverage", "median_mm", "bad_1px")] == [1.0, 0.0, 0.0]
 
 
 def test_depths_that_cannot_be_are_no_answers() -> None:
