@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pcii.base.errors import InputError
 from pcii.base.jobs import AGAIN_S, Done, Job, attempt
+from pcii.base.progress import Report, silent
 
 MOST_WORKERS = 1024
 """More are taken for a slip: no machine has so many cores."""
@@ -31,16 +32,16 @@ class Crew:
         if self.resource is not None and self.scheduler is None:
             raise InputError("resource: workers of a cluster have such; give its scheduler too")
 
-    def run(self, job: Job, pieces: Sequence[int]) -> Generator[Done]:
-        """Do these pieces and yield each when it is done.
+    def run(self, job: Job, pieces: Sequence[int], report: Report = silent) -> Generator[Done]:
+        """Do these pieces and yield each when it is done; `report` is told while a cluster has no workers.
 
-        Raises what is no fault of a single piece, such as a full disk, and `InputError` if there is no such
-        cluster.
+        Raises what is no fault of a single piece, such as a full disk, `InputError` if there is no such
+        cluster, and ConnectionError if its scheduler ends meanwhile.
         """
         if self.scheduler is not None:
             from pcii.base.dask_cluster import run_on_cluster
 
-            yield from run_on_cluster(job, pieces, self.scheduler, self.resource)
+            yield from run_on_cluster(job, pieces, self.scheduler, self.resource, report)
         elif self.workers > 1:
             from pcii.base.worker_processes import run_in_processes
 

@@ -44,9 +44,10 @@ class Stages(AbstractContextManager["Stages"]):
                 TimeElapsedColumn,
                 TimeRemainingColumn,
             )
+            from rich.table import Column
 
             self._rich = Progress(
-                TextColumn("{task.description}", markup=False),
+                TextColumn("{task.description}", markup=False, table_column=Column()),  # which wraps
                 BarColumn(),
                 MofNCompleteColumn(),
                 TimeElapsedColumn(),

@@ -94,7 +94,8 @@ def evaluate(
     again = _again(remaining, made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
-    with closing(crew.run(Measuring(remaining, folder.resolve()), range(len(remaining)))) as work:
+    measuring = Measuring(remaining, folder.resolve())
+    with closing(crew.run(measuring, range(len(remaining)), report)) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)

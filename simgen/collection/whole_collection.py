@@ -25,7 +25,7 @@ def generate_collection(sweep: Sweep, out: Path, crew: Crew = ALONE, report: Rep
         begin(sweep, out)
     rows, faults, pieces = dict[int, Row](), list[str](), range(len(sweep))
     try:
-        with closing(crew.run(DatasetJob(sweep, out), pieces)) as work:
+        with closing(crew.run(DatasetJob(sweep, out), pieces, report)) as work:
             for done in work:
                 if done.result is None:
                     faults.append(done.fault)

@@ -1,10 +1,12 @@
-"""Collections on a Dask cluster of processes: the same bytes, also when a worker dies."""
+"""Collections on a Dask cluster: the same bytes though a worker dies; no worker; a scheduler that dies."""
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -63,3 +65,57 @@ def test_a_scheduler_that_does_not_answer_is_named(tmp_path: Path, monkeypatch: 
         generate_collection(
             load_sweep(str(path), seeds=2), tmp_path / "out", Crew(scheduler="tcp://127.0.0.1:9")
         )
+
+
+@pytest.fixture
+def started() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts Python with these arguments; what it says on standard error is to be read."""
+    processes: list[subprocess.Popen[str]] = []
+
+    def start(*arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, *arguments]
+        processes.append(
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        )
+        return processes[-1]
+
+    yield start
+    for process in processes:
+        process.kill()
+        process.communicate()
+
+
+def test_workers_are_waited_for_and_a_scheduler_that_dies_is_told_of_in_one_line(
+    started: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    path, out = tmp_path / "tiny.toml", tmp_path / "out"
+    path.write_text(TOML)
+    scheduler = started(
+        "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"
+    )
+    address = line_with("Scheduler at:", scheduler).split()[-1]
+    often = "from pcii.base import progress; progress.LOG_EVERY_S = 0"
+    run = f"{often}; from simgen.app.commands import main; raise SystemExit(main())"
+    given = ["-o", str(out), "--seeds", "1000", "--scheduler", address]
+    command = started("-c", run, "generate", str(path), *given)
+    assert f"dask worker {address} --nthreads 1: 0/1" in line_with("waiting for a worker", command)
+    started("-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1")
+    assert line_with("datasets: 1/1000", command)
+    scheduler.kill()
+    _, told = command.communicate(timeout=60)
+    lines = [line for line in told.splitlines() if not line.startswith(("datasets", "waiting for a worker"))]
+    assert len(lines) == 1, told
+    assert lines[0].startswith(f"error: {address}: the Dask scheduler has ended")
+    assert "the same command goes on" in lines[0]
+    assert command.returncode == 1
+    assert 1 <= len(open_collection(out)) < 1000
+
+
+def line_with(text: str, process: subprocess.Popen[str]) -> str:
+    """The next line with this text, or "" if the process ends before; after a minute it is ended."""
+    assert process.stderr is not None
+    end = threading.Timer(60, process.kill)
+    end.start()
+    found = next((line for line in process.stderr if text in line), "")
+    end.cancel()
+    return found
