@@ -12,18 +12,16 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
-from scipy.ndimage import gaussian_filter
 
 import pcii
 from pcii.core.bayer import colour_index
+from pcii.figures.exposure import filled_means, smoothed, smoothing_for
 from pcii.figures.pictures import depth_image, to_srgb8, white_level
 
 PART = np.s_[394:640, 300:720]
 """Ball and bird, in pixels of the virtual centre."""
 MIDDLE_PX = 540
 """Side of the part of a view that is shown."""
-SMOOTHING_PX = 1.5
-"""Standard deviation with which sections are shown, whose pixels hold a tenth of a photon each."""
 NEAR_MM, FAR_MM = 515.0, 655.0
 WIDE_IN, GAP_IN, TITLE_IN, EDGE_IN = 2.85, 0.12, 0.36, 0.14
 GROUND, INK, FAINT = "#0d1016", "#eceff4", "#9aa4b2"
@@ -78,11 +76,11 @@ def main(dataset: Path) -> None:
 
 
 def light(sections: pcii.Sections) -> np.ndarray:
-    """Photons per sample and colour, (Z, H, W, 3), smoothed: sums and samples each, then divided."""
-    over_pixels = (0, SMOOTHING_PX, SMOOTHING_PX, 0)
-    summed = gaussian_filter(sections.counts.astype(np.float64), over_pixels)
-    samples = gaussian_filter(sections.coverage.astype(np.float64), over_pixels)
-    return summed / np.maximum(samples, 1e-9)
+    """Photons per sample and colour, (Z, H, W, 3), smoothed as in a report."""
+    sigma = smoothing_for([counts[PART] for counts in sections.counts])
+    print(f"sections are smoothed by {sigma:g} pixels: README says so")
+    planes = zip(sections.counts, sections.coverage, strict=True)
+    return np.stack([filled_means(*smoothed(sums, samples, sigma)) for sums, samples in planes])
 
 
 def photons(axis: Axes, counts: pcii.PhotonCounts) -> None:

@@ -10,7 +10,15 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, crop_of, depth_error_mm, depth_panels, figure6, figure7
+from pcii.app.report_figures import (
+    Crop,
+    crop_of,
+    depth_error_mm,
+    depth_panels,
+    figure6,
+    figure7,
+    smoothing_of,
+)
 from pcii.app.report_origin import origin
 from pcii.app.report_slider import slider
 from pcii.app.report_tables import depth_table, key_facts, score_table, table1
@@ -26,16 +34,24 @@ COARSE_PX = 320
 """Smaller pictures are enlarged with sharp pixels."""
 
 
-def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
-    """Write the report of one run as a self-contained HTML file."""
-    write_bytes_safely(path, page("report.html.j2", _content(outcome, report), script="report.js"))
+def write_report(
+    path: Path, outcome: Outcome, report: Report = silent, smoothing_px: float | None = None
+) -> None:
+    """Write the report of one run as a self-contained HTML file.
+
+    Photons of sections are shown smoothed by a Gaussian with a standard deviation of `smoothing_px`: by
+    default what so many photons need, 0 for none.
+    """
+    content = _content(outcome, smoothing_px, report)
+    write_bytes_safely(path, page("report.html.j2", content, script="report.js"))
 
 
-def _content(outcome: Outcome, report: Report) -> dict[str, Any]:
+def _content(outcome: Outcome, asked_px: float | None, report: Report) -> dict[str, Any]:
     dataset = outcome.dataset
     manifest, crop = dataset.manifest, crop_of(outcome)
     z_mm = outcome.sections.z_mm.tolist()
     truth = dataset.truth
+    smoothing_px = smoothing_of(outcome, crop, asked_px)
     return {
         "title": manifest.get("title") or dataset.name,
         "grid": dataset.grid,
@@ -53,9 +69,10 @@ def _content(outcome: Outcome, report: Report) -> dict[str, Any]:
             "height": crop.height_px,
             "is_coarse": max(crop.width_px, crop.height_px) < COARSE_PX,
         },
-        "slider": slider(outcome, crop, report),
-        "figure6": figure6(outcome, crop),
-        "figure7": figure7(outcome, crop),
+        "smoothing_px": smoothing_px,
+        "slider": slider(outcome, crop, smoothing_px, report),
+        "figure6": figure6(outcome, crop, smoothing_px),
+        "figure7": figure7(outcome, crop, smoothing_px),
         "depth": depth_panels(outcome, crop),
         "has_depths": bool(np.isfinite(outcome.depth.z_mm).any()),
         "depth_range": [f"{z:g}" for z in depth_range_of(dataset, z_mm)],
@@ -63,7 +80,7 @@ def _content(outcome: Outcome, report: Report) -> dict[str, Any]:
         "depth_table": depth_table(outcome),
         "table1": table1(outcome),
         "scores": score_table(outcome),
-        "origin": origin(outcome),
+        "origin": origin(outcome, asked_px),
     }
 
 

@@ -14,7 +14,7 @@ from pcii.core.estimates import Segmented
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.figures import pictures as picture
-from pcii.figures.exposure import block_sums, encoded, filled_means
+from pcii.figures.exposure import block_sums, encoded, filled_means, smoothed, smoothing_for
 from pcii.imaging.bright_regions import box_around
 from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.true_masks import object_masks, pixel_masks
@@ -69,17 +69,39 @@ def crop_of(outcome: Outcome) -> Crop:
     return Crop(*box, -(-longest // LONGEST_PX))
 
 
-def block_estimate(sections: Sections, plane: int, crop: Crop) -> tuple[np.ndarray, np.ndarray]:
+def smoothing_of(outcome: Outcome, crop: Crop, asked_px: float | None) -> float:
+    """Standard deviation in pixels of the Gaussian with which photons of sections are shown, 0 for none.
+
+    If nothing is asked for it follows from the photons.
+    """
+    if not outcome.dataset.has_counts:
+        return 0.0
+    if asked_px is not None:
+        return asked_px
+    return smoothing_for([counts[crop.rows, crop.cols] for counts in outcome.sections.counts])
+
+
+def smoothing_words(smoothing_px: float) -> str:
+    """What a caption says of the smoothing of the photons that it is of."""
+    return f", smoothed by {smoothing_px:g} px" if smoothing_px else ""
+
+
+def block_estimate(
+    sections: Sections, plane: int, crop: Crop, smoothing_px: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples.
 
-    At some depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the
-    estimate is that of the blocks around.
+    Both are smoothed by a Gaussian with a standard deviation of `smoothing_px` pixels of the frame. At some
+    depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the estimate is
+    that of the blocks around.
     """
-    samples = crop.sums(sections.coverage[plane])
-    return filled_means(crop.sums(sections.counts[plane]), samples), samples
+    sums, samples = crop.sums(sections.counts[plane]), crop.sums(sections.coverage[plane])
+    if smoothing_px:
+        sums, samples = smoothed(sums, samples, smoothing_px / crop.step_px)
+    return filled_means(sums, samples), samples
 
 
-def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
+def figure6(outcome: Outcome, crop: Crop, smoothing_px: float) -> list[Panel]:
     """Panels of Figure 6: central view raw and demosaiced, sections, photons of one view, truth."""
     dataset = outcome.dataset
     k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
@@ -97,10 +119,11 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
             image = picture.to_srgb8(colour, white)
             panels.append(_photo(image, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
     if outcome.full_light is not None:
-        panels += _section_panels(outcome.full_light, crop, "full light", letters)
+        panels += _section_panels(outcome.full_light, crop, "full light", letters, 0.0)
     if dataset.has_counts:
         per_view = dataset.counts.total / dataset.grid.view_count
-        panels += _section_panels(outcome.sections, crop, f"{per_view:.0f} photons per view", letters)
+        light = f"{per_view:.0f} photons per view"
+        panels += _section_panels(outcome.sections, crop, light, letters, smoothing_px)
         counts = dataset.counts.view(k, l)
         shown = crop.sums(counts[..., None])
         image = picture.to_srgb8(shown, max(1.0, picture.white_level(shown)))
@@ -117,7 +140,7 @@ def figure6(outcome: Outcome, crop: Crop) -> list[Panel]:
     return panels
 
 
-def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
+def figure7(outcome: Outcome, crop: Crop, smoothing_px: float) -> list[list[Panel]]:
     """Panels of Figure 7 for each method and plane: section after removal, truth, comparison.
 
     Without truth all are in one row.
@@ -125,14 +148,15 @@ def figure7(outcome: Outcome, crop: Crop) -> list[list[Panel]]:
     truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
     by_object = object_masks(grid, truth, z_mm) if truth else None
     by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
-    sections = encoded([block_estimate(outcome.sections, plane, crop) for plane in range(len(z_mm))])
+    sections = _section_images(outcome.sections, crop, smoothing_px)
     rows: list[list[Panel]] = []
     for focus in outcome.focus:
         for plane, z in enumerate(z_mm):
             kept = crop.middles(focus.in_focus[plane])
             image = sections[plane] * kept[..., None]
             empty = "" if focus.in_focus[plane].any() else ", nothing is kept"
-            panels = [_photo(image, f"{focus.method}, {z:g} mm: after removal{empty}")]
+            words = f"after removal{empty or smoothing_words(smoothing_px)}"
+            panels = [_photo(image, f"{focus.method}, {z:g} mm: {words}")]
             if by_object is not None and by_pixel is not None:
                 true = crop.middles(by_object[plane])
                 image = picture.mask_image(true)
@@ -149,7 +173,7 @@ def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:
     near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
     found, sure = crop.middles(depth.z_mm), crop.middles(depth.confidence)
     image = picture.depth_image(found, near, far, sure)
-    panels = [_drawing(image, "estimated depth, darker where less sure")]
+    panels = [_drawing(image, "estimated depth, greyer where less sure, black where unknown")]
     if truth is not None:
         true = crop.middles(truth.object_z_mm)
         panels.append(_drawing(picture.depth_image(true, near, far), _true_depth_words(truth)))
@@ -181,11 +205,18 @@ def _true_depth_words(truth: Truth) -> str:
     return "true depth of the objects" if (truth.object_id > 0).any() else "true depth"
 
 
-def _section_panels(sections: Sections, crop: Crop, light: str, letters: Iterator[str]) -> list[Panel]:
+def _section_images(sections: Sections, crop: Crop, smoothing_px: float) -> list[np.ndarray]:
+    planes = range(len(sections.z_mm))
+    return encoded([block_estimate(sections, plane, crop, smoothing_px) for plane in planes])
+
+
+def _section_panels(
+    sections: Sections, crop: Crop, light: str, letters: Iterator[str], smoothing_px: float
+) -> list[Panel]:
     equation = "Eq. 2" if sections.counts.dtype.kind == "f" else "Eq. 3"
-    images = encoded([block_estimate(sections, plane, crop) for plane in range(len(sections.z_mm))])
+    images, words = _section_images(sections, crop, smoothing_px), smoothing_words(smoothing_px)
     return [
-        _photo(image, f"({next(letters)}) section at {z:g} mm, {light} ({equation})")
+        _photo(image, f"({next(letters)}) section at {z:g} mm, {light} ({equation}){words}")
         for z, image in zip(sections.z_mm, images, strict=True)
     ]
 

@@ -14,13 +14,16 @@ from pcii.evaluation.provenance import machine, software_of
 from pcii.evaluation.tables import Table
 
 
-def origin(outcome: Outcome) -> dict[str, Any]:
-    """Content of the last part of a report: tables of names and values, savings, and the recipe as JSON."""
+def origin(outcome: Outcome, smoothing_px: float | None) -> dict[str, Any]:
+    """Content of the last part of a report: tables of names and values, savings, and the recipe as JSON.
+
+    `smoothing_px` is what was asked for.
+    """
     manifest = outcome.dataset.manifest
     recipe = {name: manifest[name] for name in ("recipe", "scene") if manifest.get(name)}
     return {
         "data": _of_dataset(manifest, outcome.dataset.name),
-        "analysis": _of_analysis(outcome),
+        "analysis": _of_analysis(outcome, smoothing_px),
         "skipped": _skipped(manifest),
         "recipe": json.dumps(recipe, indent=1, ensure_ascii=False).splitlines() if recipe else [],
     }
@@ -65,14 +68,14 @@ def _has(part: Mapping[str, Any], *names: str) -> bool:
     return all(part.get(name) is not None for name in names)
 
 
-def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
+def _of_analysis(outcome: Outcome, smoothing_px: float | None) -> list[tuple[str, str]]:
     """Rows (name, value) on the analysis that this report shows."""
     methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))
     versions = {name: text for method in methods for name, text in software_of(method).items()}
     now = datetime.now(UTC)
     beside = "; depth was mapped beside the removal" if outcome.focus else ""
     return [
-        ("command", _command(outcome)),
+        ("command", _command(outcome, smoothing_px)),
         ("date", f"{now:%Y-%m-%d %H:%M} UTC"),
         ("machine", machine()),
         ("time", _stages(outcome.timings_s, 2) + beside),
@@ -80,8 +83,8 @@ def _of_analysis(outcome: Outcome) -> list[tuple[str, str]]:
     ]
 
 
-def _command(outcome: Outcome) -> str:
-    """The command that makes the same results, with all that it may leave out; folders by their names."""
+def _command(outcome: Outcome, smoothing_px: float | None) -> str:
+    """The command that makes the same report, with all that it may leave out; folders by their names."""
     words = ["pcii", "run", outcome.dataset.name, "-o", "RESULTS"]
     for z in outcome.sections.z_mm:
         words += ["--z-mm", f"{z:.17g}" if float(f"{z:g}") != z else f"{z:g}"]
@@ -89,6 +92,8 @@ def _command(outcome: Outcome) -> str:
         words += ["--method", focus.method]
     if outcome.depth_method != DEFAULT_METHOD:
         words += ["--depth-method", outcome.depth_method]
+    if smoothing_px is not None:
+        words += ["--smoothing-px", f"{smoothing_px:g}"]
     return shlex.join([*words, *budget_words(outcome.dataset)])
 
 

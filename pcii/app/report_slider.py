@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, block_estimate
+from pcii.app.report_figures import Crop, block_estimate, smoothing_words
 from pcii.base.progress import Report
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
@@ -60,8 +60,11 @@ def slider_planes(outcome: Outcome) -> tuple[FocalPlanes, dict[int, int]]:
     return planes, {number: depths[z] for number, z in enumerate(z_mm) if depths[z] >= 0}
 
 
-def slider(outcome: Outcome, crop: Crop, report: Report) -> dict[str, Any]:
-    """Content of the slider: depths, pictures by light, masks by points, maps to read out."""
+def slider(outcome: Outcome, crop: Crop, smoothing_px: float, report: Report) -> dict[str, Any]:
+    """Content of the slider: depths, pictures by light, masks by points, maps to read out.
+
+    Photons are shown smoothed, and as they are too.
+    """
     dataset = outcome.dataset
     planes, own = slider_planes(outcome)
     blocks = replace(crop, step_px=int(np.ceil(np.sqrt(crop.height_px * crop.width_px / MOST_BLOCKS))))
@@ -73,14 +76,18 @@ def slider(outcome: Outcome, crop: Crop, report: Report) -> dict[str, Any]:
     lights: list[dict[str, Any]] = []
     read: list[np.ndarray] = []
     for number, (label, source) in enumerate(sources):
-        shown: list[tuple[np.ndarray, np.ndarray]] = []
+        ways = dict.fromkeys((smoothing_px, 0.0) if isinstance(source, PhotonCounts) else (0.0,))
+        shown: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {way: [] for way in ways}
         for done, (sections, plane) in enumerate(_each(source, planes), start=1):
-            shown.append(block_estimate(sections, plane, crop))
+            for way, estimates in shown.items():
+                estimates.append(block_estimate(sections, plane, crop, way))
             if number == 0:
                 read.append(_read_values(sections, plane, blocks))
             report(f"pictures of {label}", done, len(planes))
-        images = [picture.photo_uri(image) for image in encoded(shown)]
-        lights.append({"label": label, "images": images})
+        for way, estimates in shown.items():
+            words = smoothing_words(way) or " as they are" * (len(shown) > 1)
+            images = [picture.photo_uri(image) for image in encoded(estimates)]
+            lights.append({"label": f"{label}{words}", "images": images})
     maps = _maps(outcome, blocks)
     step_mm = max(each["step"] for each in maps if each["name"] in ("estimate", "truth"))
     return {

@@ -96,7 +96,7 @@ def depth(
         say(f"{results.save_depth(depth_map)}")
         with results.replacing("depth.png") as path:
             write_png(path, depth_image(depth_map.z_mm, *z_range, depth_map.confidence))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, darker where less sure")
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, greyer where less sure")
     _say_next_score(data, out)
 
 

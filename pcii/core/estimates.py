@@ -130,7 +130,7 @@ class DepthMap(Brief):
     def plot(
         self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None
     ) -> np.ndarray:
-        """Draw depth in mm, darker where less sure, with a colour bar; return the Matplotlib axes (1,).
+        """Draw depth in mm, greyer where less sure, with a colour bar; return the Matplotlib axes (1,).
 
         The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
         those of a new figure. Raises `InputError` if they are no Matplotlib axes.
@@ -139,7 +139,7 @@ class DepthMap(Brief):
         from pcii.figures.panels import several_axes
 
         panels = several_axes(axes, 1, self.z_mm.shape)
-        draw_depth(panels[0], self.z_mm, self.confidence, z_range_mm, "depth, darker where less sure")
+        draw_depth(panels[0], self.z_mm, self.confidence, z_range_mm, "depth, greyer where less sure")
         return panels
 
     def to_xarray(self) -> "xarray.Dataset":

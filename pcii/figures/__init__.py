@@ -9,7 +9,7 @@ Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it is given, o
 too. Matplotlib is imported on the first picture.
 
 charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
-exposure      What of an image is shown, and how bright: blocks of pixels, means of colours, a common
+exposure      What of an image is shown, and how bright: blocks, smoothed photons, means, a common
               exposure.
 maps          Maps over pixels with a scale or names: depth, entropy, objects.
 palette       Colours and markers that the colour-blind can distinguish, and names as Matplotlib shows them.

@@ -40,7 +40,7 @@ def draw_depth(
     limits_mm: tuple[float, float] | None,
     title: str,
 ) -> None:
-    """Depth (H, W) in mm with a colour bar, near is bright; darker where less sure, black where not known."""
+    """Depth (H, W) in mm with a colour bar, near is bright; greyer where less sure, black where not known."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

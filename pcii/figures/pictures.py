@@ -13,6 +13,8 @@ PHOTO_QUALITY = 78
 LOSSLESS_PX = 16_384
 """Up to so many pixels single pixels are seen, and colours of neighbours must not mix."""
 WHOLE = np.s_[:, :]
+UNSURE = 0.5
+"""Grey of depths without any confidence."""
 AGREED, MISSED, WRONG = (235, 235, 235), (70, 130, 235), (235, 80, 50)
 """Colours of the comparison with the truth: claimed and true, true only, claimed only."""
 
@@ -70,15 +72,17 @@ def depth_image(
 ) -> np.ndarray:
     """Depth in viridis from near (bright) to far (dark), 8-bit RGB (H, W, 3); black where not finite.
 
-    With `confidence` (H, W), from 0 to 1, colours are the darker the less sure a depth is.
+    With `confidence` (H, W), from 0 to 1, colours are the greyer the less sure a depth is: were they darker,
+    what is far could not be told from what is unsure, and both not from black.
     """
     from matplotlib import colormaps
 
     known = np.isfinite(z_mm)
     nearness = (far_mm - np.where(known, z_mm, far_mm)) / max(far_mm - near_mm, 1e-9)
-    weight = known if confidence is None else np.where(known, confidence, 0)
-    image = colormaps["viridis"](np.clip(nearness, 0, 1))[..., :3] * weight[..., None]
-    return (image * 255).astype(np.uint8)
+    image = colormaps["viridis"](np.clip(nearness, 0, 1))[..., :3]
+    if confidence is not None:
+        image = UNSURE + (image - UNSURE) * np.where(known, confidence, 0)[..., None]
+    return (image * known[..., None] * 255).astype(np.uint8)
 
 
 def error_image(error: np.ndarray, limit: float) -> np.ndarray:

@@ -44,8 +44,8 @@ def outcome_of(
     return Outcome(dataset, full_light, sections, focus, depth, result, {"depth": 1.0})
 
 
-def page_of(outcome: Outcome, folder: Path) -> str:
-    write_report(folder / "report.html", outcome)
+def page_of(outcome: Outcome, folder: Path, **options: Any) -> str:
+    write_report(folder / "report.html", outcome, **options)
     return (folder / "report.html").read_text(encoding="utf-8")
 
 

@@ -37,7 +37,7 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 def test_the_slider_reads_out_what_the_results_say(full: Outcome) -> None:
     crop = Crop(slice(3, 40), slice(5, 48), 2)
-    shown = slider(full, crop, silent)
+    shown = slider(full, crop, 0.0, silent)
     blocks = shown["crop"]
     assert (blocks.step_px, blocks.rows.start, blocks.cols.start) == (1, 3, 5)
     maps = {each["name"]: each for each in shown["maps"]}
@@ -59,7 +59,7 @@ def test_blocks_of_pixels_are_read_out_where_there_are_many(
     full: Outcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pcii.app.report_slider.MOST_BLOCKS", 250)
-    shown = slider(full, crop_of(full), silent)
+    shown = slider(full, crop_of(full), 0.0, silent)
     blocks, estimate = shown["crop"], shown["maps"][0]
     assert blocks.step_px == 3
     rows, cols = np.minimum(np.arange(0, 40, 3) + 1, 39), np.arange(0, 48, 3) + 1
@@ -124,7 +124,7 @@ def test_radiance_alone_has_light_to_read_out(tmp_path: Path) -> None:
     words = words_of(page_of(outcome, tmp_path))
     assert "light, share of the most" in words
     assert "photons in the section" not in words
-    shown = slider(outcome, crop_of(outcome), silent)
+    shown = slider(outcome, crop_of(outcome), 0.0, silent)
     light = np.stack([decoded(each, shown["crop"]) for each in shown["planes"]])
     means = np.stack([reconstruct(LIGHT, float(z)).estimate[0].mean(axis=-1) for z in shown["z_mm"]])
     np.testing.assert_allclose(light, means / means.max(), atol=2e-5)
@@ -179,9 +179,9 @@ def test_how_it_was_made(full: Outcome, tmp_path: Path, monkeypatch: pytest.Monk
     ]
     manifest = read_manifest(full.dataset.path)
     write_manifest(tmp_path, manifest | {"skipped": skipped, "versions": {"mitsuba": "3.9.1"}, "files": {}})
-    monkeypatch.setattr(report_origin, "_of_analysis", lambda _: [])
+    monkeypatch.setattr(report_origin, "_of_analysis", lambda *_: [])
     dataset = open_dataset(tmp_path)
-    rows = report_origin.origin(Outcome(dataset, *list(vars(full).values())[1:]))
+    rows = report_origin.origin(Outcome(dataset, *list(vars(full).values())[1:]), None)
     assert rows["skipped"].rows == (
         ("a <b>", "no need", "2.5 MB before compression"),
         ("rays", "none asked", "1,200 rays"),
@@ -189,6 +189,25 @@ def test_how_it_was_made(full: Outcome, tmp_path: Path, monkeypatch: pytest.Monk
     )
     assert ("software", "mitsuba 3.9.1") in rows["data"]
     assert ("identity", manifest["identity"]) in rows["data"]
+
+
+def test_smoothing_is_said_and_can_be_left_out(full: Outcome, tmp_path: Path) -> None:
+    """Fewer than two photons a voxel are smoothed; the slider shows them as they are too."""
+    toggles = re.compile(r'name="light"[^>]*> ([^<]*)</label>')
+    page = page_of(full, tmp_path)
+    (width,) = set(re.findall(r"smoothed by ([\d.]+) px", page))
+    assert 1 < float(width) < 4
+    assert toggles.findall(page) == [
+        f"photon counts, smoothed by {width} px",
+        "photon counts as they are",
+        "full light",
+    ]
+    assert f"by hand, 500 mm: after removal, smoothed by {width} px" in words_of(page)
+    assert "--smoothing-px" not in words_of(page).split("How this was made")[1]
+    page = page_of(full, tmp_path, smoothing_px=0)
+    assert "smoothed" not in page
+    assert toggles.findall(page) == ["photon counts", "full light"]
+    assert "--smoothing-px 0" in words_of(page)
 
 
 def test_the_command_makes_the_same_results(full: Outcome, tmp_path: Path) -> None:
@@ -200,7 +219,7 @@ def test_the_command_makes_the_same_results(full: Outcome, tmp_path: Path) -> No
 def test_a_report_is_the_same_twice_but_for_its_date(
     full: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(report_origin, "_of_analysis", lambda _: [("command", "pcii run")])
+    monkeypatch.setattr(report_origin, "_of_analysis", lambda *_: [("command", "pcii run")])
     assert page_of(full, tmp_path) == page_of(full, tmp_path)
 
 

@@ -11,6 +11,7 @@ from report_outcomes import COUNTS, FOUND, IDS, LIGHT, TRUTH, outcome_of, page_o
 from pcii.sections.reconstruction import reconstruct
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")]
+PHOTONS = "photon counts, smoothed by 2 px"
 SHOWN = "[...document.querySelectorAll('#look .frame img')].filter(i => !i.hidden).map(i => i.alt)"
 
 
@@ -30,7 +31,7 @@ def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         ("light", LIGHT, None),
     ):
         folder = tmp_path_factory.mktemp(name)
-        page_of(outcome_of(folder / "d", images, truth), folder)
+        page_of(outcome_of(folder / "d", images, truth), folder, smoothing_px=2.0)
         found[name] = folder / "report.html"
     return found
 
@@ -41,15 +42,15 @@ def read(browser: Page, name: str) -> str:
 
 def test_the_slider_moves_through_the_depths(browser: Page, reports: dict[str, Path]) -> None:
     browser.open(reports["full"])
-    assert browser.value(SHOWN) == ["section at 500 mm, photon counts"]
+    assert browser.value(SHOWN) == [f"section at 500 mm, {PHOTONS}"]
     browser.click("#plane")  # the middle
     middle = browser.text("#depth-shown")
-    assert browser.value(SHOWN) == [f"section at {middle}, photon counts"]
+    assert browser.value(SHOWN) == [f"section at {middle}, {PHOTONS}"]
     browser.press("ArrowRight")
     after = browser.text("#depth-shown")
     assert float(after.split()[0]) > float(middle.split()[0])
     assert browser.value("document.querySelector('#plane').getAttribute('aria-valuetext')") == after
-    assert browser.text("#shown") == f"section at {after}, photon counts"
+    assert browser.text("#shown") == f"section at {after}, {PHOTONS}"
     for place, depth in (("first", "500 mm"), ("last", "700 mm")):
         browser.click(f".jumps button:{place}-of-type")
         assert browser.text("#depth-shown") == browser.text('[aria-pressed="true"]') == depth
@@ -59,6 +60,8 @@ def test_the_slider_moves_through_the_depths(browser: Page, reports: dict[str, P
 def test_toggles_change_light_points_and_comparison(browser: Page, reports: dict[str, Path]) -> None:
     browser.open(reports["full"])
     browser.click('input[name="light"][value="1"]')
+    assert browser.value(SHOWN) == ["section at 500 mm, photon counts as they are"]
+    browser.click('input[name="light"][value="2"]')
     assert browser.value(SHOWN) == ["section at 500 mm, full light"]
     browser.click('input[name="points"][value="0"]')
     assert browser.value(SHOWN) == ["section at 500 mm, full light", "kept by by hand"]
