@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import CoercionError, Parameter
 
+from pcii.core.arrays import MOST_DEPTHS
 from pcii.io.dataset import Dataset, budget_of, open_dataset
 
 if TYPE_CHECKING:
     from cyclopts import Token
-
-MOST_DEPTHS = 10_000
-"""More are taken for a slip."""
 
 
 def depths_mm(text: str) -> list[float]:

@@ -7,6 +7,7 @@ from pcii.base.command_output import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
 from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.lens_arrays import LensArray
 from pcii.importing.light_encoding import Encoding, check_encoding
@@ -157,10 +158,12 @@ def import_dataset(
     held_dataset(out, None, content=False)
     with Stages() as report:
         imported = read(asked, report)
-        z_range = z_range_mm or imported.z_range_mm
-        sharp, warning = checked(imported, asked, z_range)
         images = imported.images
         origin, given = imported.origin, [images, *imported.beside]
+        if photons is not None and any(isinstance(one, PhotonCounts) for one in given):
+            raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
+        z_range = z_range_mm or imported.z_range_mm
+        sharp, warning = checked(imported, asked, z_range)
         if photons is not None and isinstance(images, Views):
             given.append(limit_photons(images, photons, seed=seed))
             origin += f"; {photons:g} photons expected in each view, seed {seed}"
@@ -168,8 +171,9 @@ def import_dataset(
             out,
             given,
             imported.truth,
-            z_mm=depths or [float(f"{z:.3g}") for z in sharp] or None,
+            z_mm=depths or imported.z_mm or [float(f"{z:.3g}") for z in sharp] or None,
             z_range_mm=z_range,
+            photon_budget=photons or imported.photon_budget,
             title=title or source.resolve().name,
             licence=licence,
             citation=citation,
@@ -181,7 +185,7 @@ def import_dataset(
         say(note)
     if sharp:
         say(f"sharpest at {', '.join(f'{z:.3g}' for z in sharp)} mm")
-    elif warning is None:
+    elif warning is None and not imported.z_mm:
         say("nothing is clearly sharp at any depth that was looked at")
     if warning is not None:
         answer(f"warning: {warning}; then delete {out} and import again")

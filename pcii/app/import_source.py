@@ -1,13 +1,14 @@
 """What `pcii import` was told to read, read, and how to mend it if the views do not fit together."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report
+from pcii.base.short_form import listed
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
@@ -55,6 +56,8 @@ class Imported:
     z_range_mm: tuple[float, float] | None = None
     notes: list[str] = field(default_factory=list)
     beside: tuple[Views | PhotonCounts, ...] = ()
+    z_mm: tuple[float, ...] = ()
+    photon_budget: float | None = None
 
     def view_of(self) -> Callable[[int, int], np.ndarray]:
         """A function that returns the light (H, W) of a view, all colours together."""
@@ -76,9 +79,18 @@ def read(asked: Request, report: Report) -> Imported:
     if asked == Request(source, None, ViewOrder()) and (file := exported_file(source)) is not None:
         found = import_exported(file)
         notes = ["with the truth of the virtual centre"] if found.truth is not None else []
+        if found.z_mm:
+            notes.append(f"with depths to look at: {listed(found.z_mm)} mm")
         first, *others = found.images
         return Imported(
-            first, f"{file.name}, exported from a dataset", found.truth, None, notes, tuple(others)
+            first,
+            f"{file.name}, exported from a dataset",
+            found.truth,
+            found.z_range_mm,
+            notes,
+            tuple(others),
+            found.z_mm,
+            found.photon_budget,
         )
     if source.is_dir() and asked.lenses is not None:
         raise InputError(f"{source}: --lens-array is for one picture, and this is a folder")
@@ -166,20 +178,23 @@ def _with_pattern(imported: Imported, cfa: str | None) -> Imported:
         origin = f"{imported.origin}; of each pixel the colour of a {cfa} pattern"
     else:
         origin = f"{imported.origin}; mosaics of the pattern {cfa}"
-    return Imported(
-        Views(radiance, views.grid, cfa), origin, imported.truth, imported.z_range_mm, imported.notes
-    )
+    return replace(imported, images=Views(radiance, views.grid, cfa), origin=origin)
 
 
 def checked(
     imported: Imported, asked: Request, z_range_mm: tuple[float, float] | None
 ) -> tuple[tuple[float, ...], str | None]:
-    """Depths at which things are sharpest, and a warning with what mends it, or None."""
+    """Depths at which things are sharpest, and a warning with what mends it, or None.
+
+    Cameras that the source tells itself are not doubted, nor are depths searched if it tells those too.
+    """
+    if imported.z_mm:
+        return (), None
     counted = is_picture(asked.source) if asked.pattern is None else "{index" in asked.pattern
     found = check_grid(
         imported.view_of(), imported.images.grid, z_range_mm, order=asked.order, counted=counted
     )
-    return found.z_mm, _warning(found, asked, imported, z_range_mm)
+    return found.z_mm, _warning(found, asked, imported, z_range_mm) if asked.optics is not None else None
 
 
 def _warning(

@@ -11,6 +11,8 @@ from pcii.base.errors import InputError
 LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 LARGEST_TOTAL = (1 << 63) - 1
+MOST_DEPTHS = 10_000
+"""More that are typed or stored are taken for a slip."""
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
     k03_l04         channels R, G, B, or Y for a mosaic (radiance, float32), and photons (uint32)
     virtual_centre  channels Z (planar depth in mm, float32, infinity for none) and objectId (uint32)
 
-Each part says in `comments` what the grid is, as JSON, and in `worldToCamera` where its camera is.
+Each part says in `comments` what the grid is, the suggested depths and the photon budget, as JSON, and in
+`worldToCamera` where its camera is.
 """
 
 import json
@@ -98,6 +99,8 @@ def _comments(dataset: Dataset) -> str:
         "grid": asdict(dataset.grid),
         "cfa": dataset.cfa,
         "radiance_unit": dataset.manifest.get("radiance_unit"),
+        "analysis": {name: dataset.analysis.get(name) for name in ("z_mm", "z_range_mm")},
+        "photon_budget": dataset.photon_budget,
         "objects": dict(dataset.manifest.get("objects", {})),
         "axes": "X right, Y down, Z forward, mm; Z is planar depth from the plane of the cameras",
     }

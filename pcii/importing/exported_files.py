@@ -11,6 +11,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
+from pcii.core.arrays import check_z_mm
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
@@ -20,16 +21,24 @@ from pcii.exporting.exr_parts import CENTRE
 from pcii.exporting.exr_parts import FILE as PARTS
 from pcii.importing.array_files import check_archive, opened_array
 from pcii.importing.image_decoding import check_unpacked
+from pcii.io.dataset_writer import check_budget, check_depth_range
 
 GRID = tuple(field.name for field in fields(CameraGrid))
 
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """Photon counts, radiance or both, and the truth if the file has it."""
+    """Photon counts, radiance or both, and the truth if the file has it.
+
+    `z_mm` (empty if it names none) and `z_range_mm` are the depths that the dataset suggested,
+    `photon_budget` that of its counts.
+    """
 
     images: tuple[PhotonCounts | Views, ...]
     truth: Truth | None
+    z_mm: tuple[float, ...] = ()
+    z_range_mm: tuple[float, float] | None = None
+    photon_budget: float | None = None
 
 
 def exported_file(source: Path) -> Path | None:
@@ -91,9 +100,11 @@ def _events(path: Path) -> Exported:
             maps = {name: optional(f"truth_{name}") for name in OPTIONAL_MAPS}
             named = dict(zip(keys, titles, strict=True))
             truth = Truth(read("truth_z_mm"), read("truth_object_id"), named, photons, **maps)
+        told = {name: optional(name) for name in ("analysis_z_mm", "analysis_z_range_mm", "photon_budget")}
+        suggested = _suggested(*(None if value is None else value.tolist() for value in told.values()))
     except InputError as fault:
         raise fault if str(fault).startswith(str(path)) else InputError(f"{path}: {fault}") from None
-    return Exported((counts,), truth)
+    return Exported((counts,), truth, *suggested)
 
 
 def _parts(path: Path) -> Exported:
@@ -130,11 +141,25 @@ def _parts(path: Path) -> Exported:
             z_mm, object_id = (parts[CENTRE][name] for name in ("Z", "objectId"))
             named = {int(key): str(name) for key, name in told.get("objects", {}).items()}
             truth = Truth(z_mm, object_id.astype(np.int32), named)
+        analysis = told.get("analysis") or {}
+        suggested = _suggested(analysis.get("z_mm"), analysis.get("z_range_mm"), told.get("photon_budget"))
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
     if not images:
         raise InputError(f"{path}: has neither radiance nor photons of the views")
-    return Exported(tuple(images), truth)
+    return Exported(tuple(images), truth, *suggested)
+
+
+def _suggested(
+    z_mm: object, z_range_mm: object, photon_budget: object
+) -> tuple[tuple[float, ...], tuple[float, float] | None, float | None]:
+    """What a file says of depths and budget, None or nothing where it does not; `InputError` for nonsense."""
+    near_far = check_depth_range(z_range_mm) if z_range_mm else None
+    return (
+        tuple(check_z_mm(z_mm).tolist()) if z_mm else (),
+        None if near_far is None else (near_far[0], near_far[1]),
+        None if photon_budget is None else check_budget(photon_budget),
+    )
 
 
 def _check_parts(path: Path, headers: Sequence[Mapping[str, Any]], grid: CameraGrid) -> None:

@@ -75,10 +75,20 @@ class Dataset(Brief):
 
     @property
     def budgets(self) -> tuple[float | None, ...]:
-        """Photon budgets of the stored counts: nested ones, then that of the recipe, None for an exposure."""
+        """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure.
+
+        They are those of the recipe; a dataset without one, as of images by others, may have a budget too.
+        """
         photons = self.manifest.get("recipe", {}).get("photons", {})
         largest = None if photons.get("scope") == "exposure" else photons.get("budget")
-        return (*sorted(photons.get("nested") or []), largest)
+        return (*sorted(photons.get("nested") or []), self.manifest.get("photon_budget") or largest)
+
+    @property
+    def photon_budget(self) -> float | None:
+        """Photon budget of `counts`; None without counts, for those of an exposure, and if it is unknown."""
+        if not self.has_counts or self.budget == FULL_LIGHT:
+            return None
+        return self.budgets[-1] if self.budget is None else self.budget
 
     def at_budget(self, budget: Budget) -> "Dataset":
         """The dataset with the photons of one of its `budgets`, or with its radiance alone ("full-light").

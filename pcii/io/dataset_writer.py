@@ -13,7 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.safe_files import named_in_errors, replace_folder, temporary_folder
 from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
-from pcii.core.arrays import check_z_mm
+from pcii.core.arrays import MOST_DEPTHS, check_z_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
@@ -37,6 +37,8 @@ from pcii.io.zarr_groups import DTYPES, write_arrays_safely
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
 LARGEST_ID = 10**9 - 1
+LARGEST_BUDGET = 1 << 53
+"""Of larger whole numbers doubles, and so JSON, no longer hold every one."""
 
 
 def save_dataset(
@@ -46,6 +48,7 @@ def save_dataset(
     *,
     z_mm: object = None,
     z_range_mm: tuple[float, float] | None = None,
+    photon_budget: float | None = None,
     title: str | None = None,
     licence: str | None = None,
     citation: str | None = None,
@@ -56,12 +59,13 @@ def save_dataset(
     `images` is `PhotonCounts`, `Views`, or a pair of them of the same cameras and Bayer pattern; full-colour
     views go with mosaic counts. `truth` is of the virtual centre; its `photons`, if known, are in the order
     of the counts' events. `z_mm` and `z_range_mm` (near, far) are depths to look at, suggested to `pcii run`
-    and others. `title`, `licence`, `citation` and `origin` (where the images come from) are shown in reports.
+    and others. `photon_budget`, if it is known, is how many photons were expected in each view. `title`,
+    `licence`, `citation` and `origin` (where the images come from) are shown in reports.
 
     The folder is complete or is not there. Its identity is a hash of the content of its files, the grid and
-    the objects' names; a folder that holds this very dataset keeps its files, and takes over new suggested
-    depths and texts. Raises `InputError` for a folder that holds anything else, before anything is written,
-    and for parts that do not belong together.
+    the objects' names; a folder that holds this very dataset keeps its files, and takes over a new budget,
+    new suggested depths and texts. Raises `InputError` for a folder that holds anything else, before anything
+    is written, and for parts that do not belong together.
 
     >>> from tempfile import TemporaryDirectory
     >>> from pcii.core.camera_grid import CameraGrid
@@ -73,6 +77,10 @@ def save_dataset(
     """
     counts, views = _counts_and_views(images)
     analysis = _analysis(z_mm, z_range_mm)
+    if photon_budget is not None:
+        photon_budget = check_budget(photon_budget)
+        if counts is None:
+            raise InputError("photon_budget: is of photon counts, and these images are radiance alone")
     texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
     for name, text in texts.items():
         if text is not None and not isinstance(text, str):
@@ -91,7 +99,8 @@ def save_dataset(
             if truth is not None:
                 _write_truth(new, truth, counts)
             manifest = _content(new, counts, views, truth)
-            write_manifest(new, texts | manifest | {"analysis": analysis, "versions": _versions()})
+            told = {"analysis": analysis, "photon_budget": photon_budget, "versions": _versions()}
+            write_manifest(new, texts | manifest | told)
             held = held_dataset(out, manifest["identity"])
             if held is None:
                 replace_folder(new, out)
@@ -172,6 +181,8 @@ def _analysis(z_mm: object, z_range_mm: object) -> dict[str, Any]:
     found: dict[str, Any] = {}
     if z_mm is not None:
         found["z_mm"] = check_z_mm(z_mm).tolist()
+        if len(found["z_mm"]) > MOST_DEPTHS:
+            raise InputError(f"z_mm: expected at most {MOST_DEPTHS} depths, got {len(found['z_mm'])}")
     if z_range_mm is not None:
         found["z_range_mm"] = check_depth_range(z_range_mm)
     return found
@@ -186,6 +197,14 @@ def check_depth_range(z_range_mm: object) -> list[float]:
     if not near < far:
         raise InputError(f"z_range_mm: expected two depths in mm, near and far, got {z_range_mm!r}")
     return [float(near), float(far)]
+
+
+def check_budget(photon_budget: object) -> float:
+    """The expected photons of a view; raises `InputError` for what is no number from 0 to 2^53."""
+    number = photon_budget if isinstance(photon_budget, int | float | np.integer | np.floating) else 0
+    if not 0 < number <= LARGEST_BUDGET:
+        raise InputError(f"photon_budget: expected photons, above 0 and up to 2^53, got {photon_budget!r}")
+    return float(number)
 
 
 def _check_truth(truth: object, images: Any) -> None:

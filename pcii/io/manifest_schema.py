@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
+from pcii.core.arrays import MOST_DEPTHS
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
 
@@ -57,7 +58,7 @@ class FileEntry(_Model):
 class Analysis(_Model):
     """Depths that the recipe suggests."""
 
-    z_mm: Annotated[list[Depth] | None, Field(max_length=10_000)] = None
+    z_mm: Annotated[list[Depth] | None, Field(max_length=MOST_DEPTHS)] = None
     z_range_mm: Annotated[list[Depth] | None, Field(min_length=2, max_length=2)] = None
 
 
@@ -139,6 +140,7 @@ class DatasetManifest(_Model):
     radiance_channels: Literal[1, 3] | None = None
     objects: dict[ObjectKey, Text] = {}
     analysis: Analysis | None = None
+    photon_budget: Photons | None = None
     recipe: Recipe = Recipe()
     backend: Backend | None = None
     photons: PhotonLog | None = None

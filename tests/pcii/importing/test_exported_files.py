@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from stored_datasets import DENSE, GRID, make_dataset, one_sentence
+from twins import unit_grid
 
 import pcii
 from pcii.app.commands import app
@@ -45,6 +46,7 @@ def test_events_come_back(dataset: pcii.Dataset, tmp_path: Path) -> None:
     assert known.photons is not None
     assert np.array_equal(truth.photons.z_mm, known.photons.z_mm)
     assert np.array_equal(truth.photons.j, known.photons.j)
+    assert (found.z_mm, found.z_range_mm, found.photon_budget) == ((540,), (450, 750), 10)
 
 
 def test_parts_of_an_exr_file_come_back(dataset: pcii.Dataset, tmp_path: Path) -> None:
@@ -61,6 +63,7 @@ def test_parts_of_an_exr_file_come_back(dataset: pcii.Dataset, tmp_path: Path) -
     truth, known = the_truth(found.truth), the_truth(dataset.truth)
     assert np.array_equal(truth.z_mm, known.z_mm)
     assert truth.names == known.names
+    assert (found.z_mm, found.z_range_mm, found.photon_budget) == ((540,), (450, 750), 10)
 
 
 @pytest.mark.parametrize("format", ["events", "exr"])
@@ -85,12 +88,31 @@ def test_exr_refuses_depths_that_it_would_round(tmp_path: Path) -> None:
 @pytest.mark.parametrize("format", ["events", "exr"])
 def test_the_command_needs_no_options_for_them(dataset: pcii.Dataset, tmp_path: Path, format: str) -> None:
     folder = pcii.export_dataset(dataset, format, tmp_path / "out")  # pyright: ignore[reportArgumentType]
-    app(["import", str(folder), "-o", str(tmp_path / "again")], result_action="return_value")
-    again = pcii.open_dataset(tmp_path / "again")
+    again = imported(folder, tmp_path / "again")
     assert again.grid == dataset.grid
+    assert again.analysis == dataset.analysis
+    assert again.budgets == dataset.budgets
     assert again.counts.total == dataset.counts.total
     assert (again.views is None) == (format == "events")
     assert np.array_equal(the_truth(again.truth).z_mm, the_truth(dataset.truth).z_mm)
+    other = imported(folder, tmp_path / "other", "--z-mm", "600", "--z-range-mm", "500", "700")
+    assert other.analysis == {"z_mm": [600], "z_range_mm": [500, 700]}
+    with pytest.raises(pcii.InputError, match="has photon counts already"):
+        imported(folder, tmp_path / "fewer", "--photons", "5")
+
+
+def imported(folder: Path, out: Path, *options: str) -> pcii.Dataset:
+    app(["import", str(folder), "-o", str(out), *options], result_action="return_value")
+    return pcii.open_dataset(out)
+
+
+@pytest.mark.parametrize("format", ["hci", "events", "exr"])
+def test_cameras_that_files_tell_are_not_doubted(tmp_path: Path, capsys, format) -> None:
+    noise = np.random.default_rng(1).poisson(0.1, (3, 3, 48, 48))  # nothing fits, by any cameras
+    counts = pcii.PhotonCounts.from_dense(noise, unit_grid(3, 3, 48, 48))
+    made = pcii.save_dataset(tmp_path / "made", (counts, pcii.Views(noise[..., None], counts.grid)))
+    imported(pcii.export_dataset(made, format, tmp_path / "out"), tmp_path / "again")
+    assert "warning" not in capsys.readouterr().out
 
 
 def without(path: Path, name: str) -> None:
@@ -130,6 +152,19 @@ def changed(file: Path, **changes: Any) -> Path:
         arrays: dict[str, Any] = dict(archive)
     np.savez(file, **arrays | changes)
     return file
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"analysis_z_mm": [-1.0]}, "z_mm: a depth must be a finite number above 0 mm"),
+        ({"analysis_z_range_mm": [700, 600]}, "z_range_mm: expected two depths in mm, near and far"),
+        ({"photon_budget": -1.0}, "photon_budget: expected photons, above 0"),
+    ],
+)
+def test_depths_and_budgets_that_cannot_be_are_refused(dataset, tmp_path: Path, changes, words) -> None:
+    file = changed(pcii.export_dataset(dataset, "events", tmp_path / "out") / "events.npz", **changes)
+    assert words in one_sentence(lambda: import_exported(file), file)
 
 
 def large_views(dataset: pcii.Dataset, root: Path) -> Path:

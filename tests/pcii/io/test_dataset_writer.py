@@ -51,11 +51,12 @@ def test_what_is_saved_is_opened(tmp_path: Path, sparse: bool) -> None:
     if sparse:
         counts = PhotonCounts.from_events(*(getattr(EVENTS, name) for name in "klijn"), GRID, cfa="GRBG")
     images = (Views(LIGHT, GRID), counts)
-    texts = {"title": "Mine", "licence": "CC0", "citation": "Me", "origin": "a camera"}
-    made = save_dataset(tmp_path / "d", images, TRUTH, z_mm=[540, 620], z_range_mm=(450, 750), **texts)
+    texts: dict[str, Any] = {"title": "Mine", "licence": "CC0", "citation": "Me", "origin": "a camera"}
+    told: dict[str, Any] = {"z_mm": [540, 620], "z_range_mm": (450, 750), "photon_budget": 10}
+    made = save_dataset(tmp_path / "d", images, TRUTH, **told, **texts)
     dataset = open_dataset(tmp_path / "d")
     assert dataset.manifest == made.manifest
-    assert (dataset.grid, dataset.cfa, dataset.budgets) == (GRID, "GRBG", (None,))
+    assert (dataset.grid, dataset.cfa, dataset.budgets) == (GRID, "GRBG", (10,))
     assert dataset.counts.is_sparse == sparse
     assert same_counts(dataset.counts, COUNTED)
     assert dataset.views is not None
@@ -202,6 +203,10 @@ SHUFFLED = replace(PHOTONS, j=PHOTONS.j[::-1].copy())
         (Views(BRIGHT, GRID), {}, r"view \(0, 0\) is too bright"),
         (COUNTED, {"z_mm": [0]}, "z_mm: a depth must be"),
         (COUNTED, {"z_mm": "near"}, "z_mm: expected depths"),
+        (COUNTED, {"z_mm": np.arange(1, 10_002)}, "z_mm: expected at most 10000 depths, got 10001"),
+        (COUNTED, {"photon_budget": 0}, "photon_budget: expected photons, above 0 and up to"),
+        (COUNTED, {"photon_budget": "many"}, "photon_budget: expected photons, above 0 .* got 'many'"),
+        (Views(LIGHT, GRID), {"photon_budget": 10}, "photon_budget: is of photon counts"),
         (COUNTED, {"z_range_mm": (750, 450)}, "z_range_mm: expected two depths"),
         (COUNTED, {"z_range_mm": (450,)}, "z_range_mm: expected two depths"),
         (COUNTED, {"z_range_mm": (0, np.nan)}, "z_range_mm: expected two depths"),
