@@ -14,22 +14,26 @@ from simgen.figures.picture_parts import (
     draw_depth,
     draw_objects,
     hide_frame,
+    named_width,
     new_figure,
     part_of_interest,
     save_figure,
 )
-from simgen.figures.thumbnails import Box, count_tiles, joined, radiance_tiles
+from simgen.figures.thumbnails import MOST_TILES, Box, count_tiles, joined, radiance_tiles
 
 MOST_BARS = 40
 MARGIN = 0.03
 """Around the objects, as a share of the picture's longer side."""
-PLACES: dict[str, Any] = {
-    "photons": (slice(0, 2), 0),
-    "depth": (0, 1),
-    "objects": (0, 2),
-    "full light": (1, 1),
-    "histogram": (1, 2),
-}
+HEAD_IN, TITLE_IN, GAP_IN, LABELS_IN = 0.65, 0.4, 0.3, 0.8
+"""Room for the lines above all panels, a panel's title, between columns, and for numbers beside a scale."""
+WIDEST_IN, HIGHEST_IN, LEAST_IN = 4.6, 4.2, 1.6
+"""Sides of a film's picture: at most, and at least that of a long and narrow one."""
+PHOTONS_IN = 12.0, 4.5
+"""Width of the photons of all views beside the other panels, at most, and of their column at least."""
+WIDE = 3.0
+"""Photons of views that together are so many times as wide as high stand above the other panels."""
+HISTOGRAM_IN = 7.0
+"""Width of the histogram with its numbers."""
 RADIANCE_VIEWS, RADIANCE_PX = 3, 256
 """Full-light views to a side of the sheet, and pixels to the longer side of each."""
 
@@ -42,17 +46,51 @@ def write_sheet(path: Path, out: Path) -> None:
     check_picture_path(out)
     dataset = open_dataset(path)
     counts = dataset.counts if dataset.has(COUNTS) else None
-    figure = new_figure(21.5, 10.6)
-    layout = figure.add_gridspec(2, 3, width_ratios=(2.1, 1, 1.84))
-    axes = {name: figure.add_subplot(layout[place]) for name, place in PLACES.items()}
     truth_box, view_box = _parts(dataset)
+    height, width = (part.stop - part.start for part in view_box)
+    rows, cols = (min(number, MOST_TILES) for number in (dataset.grid.rows, dataset.grid.cols))
+    size, places = layout(width / height, width * cols / (height * rows))
+    figure = new_figure(*size, layout=None)
+    axes = {name: figure.add_axes(place / np.array([*size, *size])) for name, place in places.items()}
+    for panel in axes.values():
+        panel.set_anchor("N")  # the titles of a row are at one height
     _draw_counts(axes["photons"], counts, view_box)
-    _draw_truth(figure, axes["depth"], axes["objects"], dataset, truth_box)
+    _draw_truth(axes["depth"], axes["objects"], dataset, truth_box)
     _draw_radiance(axes["full light"], dataset, view_box)
     _draw_histogram(axes["histogram"], counts)
     title = str(dataset.manifest.get("title") or dataset.name)
-    figure.suptitle("\n".join((title, *facts(dataset, counts))), fontsize=12, parse_math=False)
+    figure.suptitle("\n".join((title, *facts(dataset, counts))), y=1, va="top", fontsize=12, parse_math=False)
     save_figure(figure, out)
+
+
+def layout(film: float, views: float) -> tuple[tuple[float, float], dict[str, np.ndarray]]:
+    """Width and height of the sheet, and left, bottom, width and height (4,) of each panel, all in inches.
+
+    `film` is the width of the part of a film that is shown over its height, `views` the same of the photons
+    of all views together, which are beside the other panels, or above them if they are far wider than high.
+    """
+    seen = min(WIDEST_IN, HIGHEST_IN * film)
+    width, named = max(seen, LEAST_IN), max(seen * named_width(film), LEAST_IN)
+    height = max(min(HIGHEST_IN, WIDEST_IN / film), LEAST_IN)
+    second = width + LABELS_IN + GAP_IN
+    across = second + max(named, HISTOGRAM_IN)
+    down = 2 * (TITLE_IN + height) + LABELS_IN
+    if views > WIDE:
+        first, photons = 0.0, np.array([0, down, across, across / views])
+        size = across, down + across / views + TITLE_IN + HEAD_IN
+    else:
+        high = min(down - TITLE_IN, PHOTONS_IN[0] / views)
+        column = max(high * views, PHOTONS_IN[1])
+        first, photons = column + GAP_IN, np.array([0, down - TITLE_IN - high, column, high])
+        size = first + across, down + HEAD_IN
+    upper, second = down - TITLE_IN - height, first + second
+    return size, {
+        "photons": photons,
+        "depth": np.array([first, upper, width, height]),
+        "objects": np.array([second, upper, named, height]),
+        "full light": np.array([first, LABELS_IN, width, height]),
+        "histogram": np.array([second + LABELS_IN, LABELS_IN, HISTOGRAM_IN - LABELS_IN, height]),
+    }
 
 
 def _parts(dataset: Dataset) -> tuple[Box, Box]:
@@ -67,13 +105,13 @@ def _parts(dataset: Dataset) -> tuple[Box, Box]:
     return part_of_interest(mask, margin), part_of_interest(mask, margin + away)
 
 
-def _draw_truth(figure: Any, depth: Any, objects: Any, dataset: Dataset, box: Box) -> None:
+def _draw_truth(depth: Any, objects: Any, dataset: Dataset, box: Box) -> None:
     truth = dataset.truth
     if truth is None:
         _left_out(depth, "truth")
         _left_out(objects, "truth")
         return
-    draw_depth(figure, depth, truth.z_mm[box], truth.object_id[box] > 0)
+    draw_depth(depth, truth.z_mm[box], truth.object_id[box] > 0)
     draw_objects(objects, truth.object_id[box], truth.names)
 
 
@@ -117,7 +155,6 @@ def _draw_histogram(axes: Any, counts: PhotonCounts | None) -> None:
     axes.bar(np.arange(bars.size) * width, bars, width=0.85 * width, align="edge" if width > 1 else "center")
     axes.set_yscale("log")
     axes.set_ylim(0.5, 3 * pixels)
-    axes.set_box_aspect(0.6)
     axes.set_title("counts per pixel, all views")
     axes.set_xlabel("photons in a pixel" + ("" if width == 1 else f", in steps of {width}"))
     axes.set_ylabel("pixels")

@@ -4,7 +4,7 @@ import colorsys
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,7 +16,7 @@ EMPTY = "0.93"
 """Grey where no object is."""
 GOLDEN = 0.6180339887
 MARGIN = 0.42
-"""Room for names beside the picture, as a share of its width."""
+"""Room for names on either side of a picture, as a share of its longer side."""
 DOTS_PER_INCH = 110
 LEAST_DEPTH_MM = 1.0
 """The colours of a picture of depth span so much at least."""
@@ -48,12 +48,17 @@ def part_of_interest(mask: np.ndarray, margin_px: float) -> tuple[slice, slice]:
     return box[0], box[1]
 
 
-def new_figure(width_in: float, height_in: float) -> Any:
+def named_width(aspect: float) -> float:
+    """How many times as wide as a picture it is together with names, for its width over its height."""
+    return 1 + 2 * MARGIN * max(1.0, 1 / aspect)
+
+
+def new_figure(width_in: float, height_in: float, layout: Literal["compressed"] | None = "compressed") -> Any:
     """An empty Matplotlib figure that needs no display and no global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_in, height_in), layout="compressed", facecolor="white")
+    figure = Figure(figsize=(width_in, height_in), layout=layout, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -83,7 +88,7 @@ def frame_part(axes: Any, box: tuple[slice, slice]) -> None:
     axes.plot([left, right, right, left, left], [top, top, bottom, bottom, top], color="0.6", linewidth=0.8)
 
 
-def draw_depth(figure: Any, axes: Any, z_mm: np.ndarray, shown: np.ndarray) -> None:
+def draw_depth(axes: Any, z_mm: np.ndarray, shown: np.ndarray) -> None:
     """Planar depth (H, W) where `shown`, with a colour bar; near is bright."""
     axes.set_title("planar depth of the objects")
     hide_frame(axes)
@@ -94,7 +99,8 @@ def draw_depth(figure: Any, axes: Any, z_mm: np.ndarray, shown: np.ndarray) -> N
         middle, half = (z_mm[shown].max() + z_mm[shown].min()) / 2, np.ptp(z_mm[shown]) / 2
         half = max(half, LEAST_DEPTH_MM / 2)  # what is flat is no picture of rounding errors
         image.set_clim(middle - half, middle + half)
-        bar = figure.colorbar(image, ax=axes, label="z (mm)", shrink=0.85, pad=0.02)
+        scale = axes.inset_axes((1.03, 0.05, 0.05, 0.9))  # as high as the picture, whatever room there is
+        bar = axes.figure.colorbar(image, cax=scale, label="z (mm)")
         bar.ax.invert_yaxis()
     else:
         axes.text(0.5, 0.5, "no object in view", transform=axes.transAxes, ha="center")
@@ -109,6 +115,7 @@ def draw_objects(axes: Any, object_id: np.ndarray, names: Mapping[int, str]) -> 
     axes.set_title("objects")
     hide_frame(axes)
     height, width = object_id.shape
+    room = MARGIN * max(height, width)
     seen = [number for number in names if (object_id == number).any()]
     picture = np.full((height, width, 3), float(EMPTY))
     for place, number in enumerate(seen):
@@ -120,21 +127,21 @@ def draw_objects(axes: Any, object_id: np.ndarray, names: Mapping[int, str]) -> 
     for side, group in ((-1, by_column[:half]), (1, by_column[half:])):
         group = sorted(group, key=lambda number: anchors[number][0])
         rows = spread_out(np.array([anchors[number][0] for number in group], dtype=float), height)
-        x = width * 1.04 if side > 0 else -width * 0.04
+        x = width + 0.1 * room if side > 0 else -0.1 * room
         for number, row in zip(group, rows, strict=True):
             i, j = anchors[number]
             edge = width if side > 0 else 0
             axes.plot([j, edge, x], [i, row, row], color="0.25", linewidth=0.6, clip_on=False)
             axes.plot([j], [i], marker="o", markersize=2.2, color="0.1")
             axes.text(
-                x + side * width * 0.01,
+                x + side * 0.02 * room,
                 row,
                 names[number],
                 ha="left" if side > 0 else "right",
                 va="center",
                 fontsize=8,
             )
-    axes.set_xlim(-0.5 - MARGIN * width, width - 0.5 + MARGIN * width)
+    axes.set_xlim(-0.5 - room, width - 0.5 + room)
     axes.set_ylim(height - 0.5, -0.5)
 
 

@@ -17,6 +17,7 @@ from simgen.figures.picture_parts import (
     draw_objects,
     frame_part,
     hide_frame,
+    named_width,
     new_figure,
     part_of_interest,
     save_figure,
@@ -60,14 +61,15 @@ def write_preview(
     white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
     box = part_of_interest(things, MARGIN * max(things.shape))
     aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
-    figure = new_figure(PANEL_IN * (aspect * 3.84 + 0.2) + 0.5, PANEL_IN + 0.7)
-    axes = figure.subplots(1, 3, width_ratios=(1, 1, 1.84))
+    named = named_width(aspect)
+    figure = new_figure(PANEL_IN * (aspect * (2 + named) + 0.2) + 0.5, PANEL_IN + 0.7)
+    axes = figure.subplots(1, 3, width_ratios=(1, 1, named))
     axes[0].imshow(linear_to_srgb(picture / max(white, 1e-12)))
     axes[0].set_title("virtual centre")
     hide_frame(axes[0])
     if things.any() and box[0].stop - box[0].start < grid.height:
         frame_part(axes[0], box)
-    draw_depth(figure, axes[1], hits.z_mm[box], things[box])
+    draw_depth(axes[1], hits.z_mm[box], things[box])
     draw_objects(axes[2], hits.object_id[box], render_scene.names)
     figure.suptitle(recipe.title or target.scene.title, parse_math=False)
     save_figure(figure, out, dots_per_inch)

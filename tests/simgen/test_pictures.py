@@ -13,9 +13,12 @@ from pcii.base import command_line
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
 from pcii.io.dataset import open_dataset
+from pcii.io.dataset_writer import save_dataset
 from simgen.app import commands as cli
 from simgen.dataset.generation import generate
+from simgen.figures.contact_sheet import write_sheet
 from simgen.figures.picture_parts import draw_depth, draw_objects, new_figure, part_of_interest, spread_out
 from simgen.figures.thumbnails import count_tiles, evenly_chosen, joined, radiance_tiles
 from simgen.spec.recipe import Recipe
@@ -53,6 +56,35 @@ def test_a_sheet_of_a_dataset(small_dataset: Path, tmp_path: Path) -> None:
     out = tmp_path / "sheet.png"
     assert command_line.run(cli.app, ["sheet", str(small_dataset), "-o", str(out)]) == 0
     assert_shows_something(out)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [(6, 6, 64, 64), (6, 8, 48, 80), (1, 12, 32, 32), (12, 1, 32, 32), (2, 2, 160, 20), (2, 3, 12, 200)],
+)
+def test_a_sheets_panels_have_room_and_do_not_overlap(
+    shape: tuple[int, int, int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    films = grid(rows=shape[0], cols=shape[1], height=shape[2], width=shape[3])
+    ids = np.zeros(shape[2:], np.int16)
+    ids[2:-2, 2:-2] = 1
+    truth = Truth(np.where(ids > 0, np.linspace(500.0, 600, shape[3]), np.inf), ids, {1: "a long name of it"})
+    counts = PhotonCounts.from_dense(np.random.default_rng(0).poisson(0.3, shape), films, cfa="GRBG")
+    light = Views(np.random.default_rng(0).random((*shape, 3)).astype(np.float32), films)
+    save_dataset(tmp_path / "d", (counts, light), truth, z_mm=[540], title="Of any shape")
+    drawn: list[Any] = []
+    monkeypatch.setattr("simgen.figures.contact_sheet.save_figure", lambda figure, _: drawn.append(figure))
+    write_sheet(tmp_path / "d", tmp_path / "sheet.png")
+    (figure,) = drawn
+    figure.canvas.draw()
+    assert max(figure.get_size_inches()) < 35
+    for axes in figure.axes:
+        box = axes.get_window_extent()
+        assert max(box.width, box.height) > 1.5 * figure.dpi
+    boxes = [axes.get_tightbbox() for axes in figure.axes]  # with titles and scales
+    boxes.append(figure.texts[0].get_window_extent())
+    for number, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[number + 1 :])
 
 
 @pytest.mark.renders
@@ -118,9 +150,9 @@ def test_names_of_two_dozen_objects_do_not_overlap() -> None:
 def test_the_depth_of_a_flat_card_shows_no_rounding_errors() -> None:
     figure = new_figure(5, 5)
     flat, deep = figure.subplots(1, 2)
-    draw_depth(figure, flat, np.array([[540.0, 540.0001]]), np.array([[True, True]]))
+    draw_depth(flat, np.array([[540.0, 540.0001]]), np.array([[True, True]]))
     assert flat.images[0].get_clim() == pytest.approx((539.5, 540.5), abs=1e-3)
-    draw_depth(figure, deep, np.array([[540.0, 620.0, 3000.0]]), np.array([[True, True, False]]))
+    draw_depth(deep, np.array([[540.0, 620.0, 3000.0]]), np.array([[True, True, False]]))
     assert deep.images[0].get_clim() == (540, 620)
 
 
