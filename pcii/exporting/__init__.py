@@ -4,7 +4,7 @@ card_files           README.md and croissant.json of a dataset or collection, wr
 croissant_document   Datasets and collections as JSON-LD in the Croissant format 1.0 of MLCommons.
 dataset_card         The card of a dataset or collection: README.md for people, in Markdown.
 event_archive        Photon events, camera grid and truth in one NumPy archive.
-export_formats       The formats that a dataset can be written in, by name, and the folder that is
+export_formats       The formats that datasets can be written in, by name, and the folder that is
                      written.
 exr_parts            One OpenEXR file: a part for each view with its radiance and photons, and one with
                      the truth.

@@ -170,28 +170,29 @@ def export(
     """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.
 
     hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
-    events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view.
+    events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view. Of a
+    collection each dataset is written to a folder in the new one, named as its own.
 
     Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
         simgen export out/small --format hci -o out/hci/small
         simgen export out/paper --format saii --budget 300 -o out/paper-300
+        simgen export out/sweep --format events -o out/sweep-events
 
     Parameters
     ----------
     dataset
-        A dataset folder.
+        Folder of a dataset or of a collection.
     out
         Folder for the files: new or empty.
     budget
         Export the photons of this smaller, nested budget of the recipe.
     """
     from pcii.exporting.export_formats import export_dataset
-    from pcii.io.dataset import open_dataset
 
-    data = open_dataset(dataset)
-    folder = export_dataset(data if budget is None else data.at_budget(budget), format, out)
+    with Stages() as report:
+        folder = export_dataset(dataset, format, out, budget=budget, report=report)
     files = [file for file in folder.rglob("*") if file.is_file()]
     say(f"{folder}: {len(files)} files, {sum(file.stat().st_size for file in files) / 1e6:.1f} MB")
 

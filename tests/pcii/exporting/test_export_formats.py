@@ -11,14 +11,15 @@ import png
 import pytest
 from PIL import Image
 from rendered_planes import view, write_planes
-from stored_datasets import DENSE, GRID, IDS, Z_MM, make_dataset, one_sentence
+from stored_datasets import DENSE, GRID, IDS, Z_MM, flip_a_bit, largest_file, make_dataset, one_sentence
 from twins import unit_grid
 
 import pcii
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.exporting.export_formats import WRITERS, export_dataset
 from pcii.exporting.pixel_files import write_png
-from pcii.io.dataset_layout import COUNTS, RADIANCE, TRUTH, write_manifest
+from pcii.io.collection_layout import index_row, write_collection, write_index
+from pcii.io.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
 
@@ -183,6 +184,47 @@ def test_a_dataset_that_lacks_what_is_needed_is_refused_in_a_sentence(tmp_path, 
     data = make_dataset(tmp_path / "data", files=part)
     one_sentence(lambda: export_dataset(data, format, tmp_path / "out"), data)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def collection(tmp_path):
+    """Two datasets, by their seeds."""
+    root = tmp_path / "sweep"
+    root.mkdir()
+    rows = []
+    for seed in (1, 2):
+        recipe = {"scene": "two", "seed": seed, "photons": {"scope": "view", "budget": 10.0, "nested": []}}
+        path = make_dataset(root / f"seed_{seed}", recipe=recipe, identity=f"no. {seed}")
+        rows.append(index_row(path.name, {"seed": seed}, read_manifest(path), path / MANIFEST))
+    write_collection(root, {"fields": ["seed"]})
+    write_index(root, rows)
+    return root
+
+
+@pytest.mark.parametrize("format", WRITERS)
+def test_a_collection_is_exported_dataset_by_dataset(collection, tmp_path, format):
+    out = export_dataset(collection, format, tmp_path / "out", budget=10)
+    assert sorted(path.name for path in out.iterdir()) == ["seed_1", "seed_2"]
+    single = export_dataset(collection / "seed_2", format, tmp_path / "single" / "seed_2")
+    assert contents(out / "seed_2") == contents(single)
+    part = export_dataset(pcii.open_collection(collection).where(seed=2), format, tmp_path / "part")
+    assert contents(part) == contents(single.parent)
+
+
+def contents(root):
+    return {path.relative_to(root): path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
+def test_a_collection_is_exported_as_a_whole_or_not_at_all(collection, tmp_path):
+    one_sentence(lambda: export_dataset(collection, "events", collection / "out"), collection / "out")
+    damaged = largest_file(collection / "seed_2", COUNTS)
+    flip_a_bit(damaged, 80)
+    one_sentence(lambda: export_dataset(collection, "events", tmp_path / "out"), damaged)
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep"]
+    write_index(collection, [])
+    assert "no finished" in one_sentence(
+        lambda: export_dataset(collection, "hci", tmp_path / "o"), collection
+    )
 
 
 def test_an_unknown_format_is_refused(tmp_path):
