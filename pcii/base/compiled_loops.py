@@ -3,7 +3,7 @@
 Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
 longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
 that is not writable, so each loop is compiled once per machine. All loops together take half a minute, so
-commands report it (`progress`).
+it is reported (`progress`), by commands and in a line of a program that imports this package.
 
 Loops are shared among threads by ranges of their outermost index (`in_threads`). Numba's own parallel loops
 take twice as long to compile, and their OpenMP threads do not survive a fork.
@@ -93,12 +93,13 @@ class _CompilingListener(event.Listener):
         self.nested += 1
         if self.nested == 1:  # a nested compilation is part of the outer one
             self.loops += 1
-            report_compiling(self.loops, running=True)
+            module: str = event.data["dispatcher"].py_func.__module__  # type: ignore[index]
+            report_compiling(self.loops, running=True, own=module.startswith("pcii."))
 
     def on_end(self, event: event.Event) -> None:
         self.nested -= 1
         if self.nested == 0:
-            report_compiling(self.loops, running=False)
+            report_compiling(self.loops, running=False, own=False)
 
 
 event.register("numba:compile", _CompilingListener())

@@ -112,6 +112,8 @@ class Stages(AbstractContextManager["Stages"]):
 COMPILING = "compiling (once per machine)"
 _showing: list[Stages] = []
 """Active progress displays; compilation is reported to the last. Empty where `pcii` is used as a library."""
+_told: list[None] = []
+"""Not empty once this process has said that it compiles, without a display."""
 
 
 @contextmanager
@@ -124,10 +126,19 @@ def shown_by(stages: Stages) -> Iterator[None]:
         _showing.remove(stages)
 
 
-def report_compiling(loops: int, *, running: bool) -> None:
-    """Report to a running command that loop number `loops` is being compiled (`running`), or has been."""
-    for stages in _showing[-1:]:
-        stages.compiling(loops, running)
+def report_compiling(loops: int, *, running: bool, own: bool) -> None:
+    """Report to a running command that loop number `loops` is being compiled (`running`), or has been.
+
+    Where `pcii` is used as a library one line on standard error says so, once, if the loop is its `own`.
+    """
+    if _showing:
+        _showing[-1].compiling(loops, running)
+    elif own and not _told:
+        from multiprocessing import parent_process
+
+        _told.append(None)
+        if parent_process() is None:  # else each of many workers would say so
+            print(f"pcii: {COMPILING}, which takes up to a minute", file=sys.stderr, flush=True)
 
 
 _quiet: list[None] = []
