@@ -125,7 +125,7 @@ def depth_table(outcome: Outcome) -> Table:
     where = "the objects' pixels" if has_objects else "all pixels with a true depth"
     rows: list[tuple[str, str]] = []
     if depth["coverage"] is not None:
-        rows.append((f"share of {where} with an estimate", _percent(depth["coverage"])))
+        rows.append((f"share with an estimate, of {where}", _percent(depth["coverage"])))
         if depth["median_mm"] is not None:
             for name in ("median", "mean"):
                 key = {"median": "median", "mean": "mae"}[name]

@@ -17,6 +17,7 @@ from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.core.images import Views
 from pcii.core.truth import Truth
+from pcii.exporting.hci_layout import INFINITY_M
 from pcii.importing.camera_order import Optics
 from pcii.importing.image_folders import import_images
 from pcii.importing.light_encoding import Encoding
@@ -177,6 +178,6 @@ def _read_parameters(path: Path) -> _Parameters:
         focal_mm=above("intrinsics", "focal_length_mm"),
         baseline_mm=above("extrinsics", "baseline_mm"),
         pixel_mm=above("intrinsics", "sensor_size_mm") / max(width, height),
-        focus_mm=1000 * focus_m if focus_m > 0 else math.inf,
+        focus_mm=1000 * focus_m if 0 < focus_m < INFINITY_M else math.inf,
         disparities_px=ends,
     )

@@ -111,7 +111,8 @@ def test_cameras_that_files_tell_are_not_doubted(tmp_path: Path, capsys, format)
     noise = np.random.default_rng(1).poisson(0.1, (3, 3, 48, 48))  # nothing fits, by any cameras
     counts = pcii.PhotonCounts.from_dense(noise, unit_grid(3, 3, 48, 48))
     made = pcii.save_dataset(tmp_path / "made", (counts, pcii.Views(noise[..., None], counts.grid)))
-    imported(pcii.export_dataset(made, format, tmp_path / "out"), tmp_path / "again")
+    again = imported(pcii.export_dataset(made, format, tmp_path / "out"), tmp_path / "again")
+    assert again.grid == counts.grid
     assert "warning" not in capsys.readouterr().out
 
 
