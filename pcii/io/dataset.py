@@ -64,11 +64,12 @@ class Dataset(Brief):
 
     def _facts(self) -> dict[str, object]:
         parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
+        budgets = listed([budget or "exposure" for budget in self.budgets])
         return {
             "name": self.name,
             "shape": times(self.grid.shape_KLHW),
             "cfa": self.cfa,
-            "budgets": listed([budget or "exposure" for budget in self.budgets]),
+            "budgets": budgets if self.has(COUNTS) else None,
             "z_mm": listed(self.analysis.get("z_mm") or ()),
             "has": listed([name for name, part in parts.items() if self.has(part)]),
         }

@@ -82,6 +82,7 @@ def test_views_alone_keep_their_pattern(tmp_path: Path, cfa: str | None) -> None
     assert dataset.views.radiance.shape[4] == 1
     assert dataset.truth is None
     assert dataset.analysis == {}
+    assert "budgets" not in repr(dataset)
     with pytest.raises(InputError, match="no photon counts"):
         _ = dataset.counts
 
