@@ -79,8 +79,13 @@ def read_collection(root: Path) -> dict[str, Any]:
 
 def write_index(root: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """Write the index, atomically."""
+    write_bytes_safely(root / INDEX, index_bytes(rows))
+
+
+def index_bytes(rows: Iterable[Mapping[str, Any]]) -> bytes:
+    """The index of these rows as it is written."""
     lines = b"".join(json.dumps(row, allow_nan=False).encode() + b"\n" for row in rows)
-    write_bytes_safely(root / INDEX, lines + _seal(lines))
+    return lines + _seal(lines)
 
 
 def _seal(lines: bytes) -> bytes:

@@ -1,7 +1,7 @@
 """The folder of a collection that is being made: whose it is, and the index of what is finished."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from pcii.io.collection_layout import (
     COLLECTION,
     INDEX,
     check_manifest,
+    index_bytes,
     index_row,
     is_collection,
     read_collection,
@@ -47,9 +48,10 @@ def begin(sweep: Sweep, out: Path) -> None:
     ]
     if others and not is_collection(out):
         raise InputError(f"{out}: holds something else; name a new or empty folder")
-    with locked(out / COLLECTION, wait=True) as file:
-        if not file.read() or _ended_empty(out):
-            write_collection(out, document)
+    if _is_free(out):  # else nothing is written, not even for the lock: a finished one may be read-only
+        with locked(out / COLLECTION, wait=True):
+            if _is_free(out):
+                write_collection(out, document)
     known = read_collection(out)
     if any(known.get(name) != document[name] for name in ("fields", "recipe")):
         raise InputError(
@@ -63,8 +65,10 @@ def begin(sweep: Sweep, out: Path) -> None:
         )
 
 
-def _ended_empty(out: Path) -> bool:
-    """Whether work on a collection has ended, as its index tells, without a dataset, whole or begun."""
+def _is_free(out: Path) -> bool:
+    """Whether no collection was begun here, or work on it ended, as its index tells, without a dataset."""
+    if not is_collection(out) or not (out / COLLECTION).stat().st_size:
+        return True
     return (out / INDEX).is_file() and not any(entry.is_dir() for entry in os.scandir(out))
 
 
@@ -77,12 +81,24 @@ def row_of(sweep: Sweep, number: int, out: Path, manifest: Mapping[str, Any]) ->
 def write_whole_index(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> None:
     """Write the index of all finished datasets in the folder: these of the sweep by number, and others.
 
-    Others are those that the index listed before, and those that other processes have finished.
+    Others are those that the index listed before, and those that other processes have finished. Nothing is
+    written where that is there already, so that a folder that is read-only will do.
     """
-    with locked(out / COLLECTION, wait=True):
-        for left in (*out.glob(f".{INDEX}.*.tmp"), *out.glob(f".{COLLECTION}.*.tmp")):
-            left.unlink()  # of a process that was killed
-        write_index(out, _finished_rows(sweep, out, rows))
+    if _temporaries(out) or not _is_listed(out, _finished_rows(sweep, out, rows)):
+        with locked(out / COLLECTION, wait=True):
+            for left in _temporaries(out):
+                left.unlink()
+            write_index(out, _finished_rows(sweep, out, rows))
+
+
+def _temporaries(out: Path) -> list[Path]:
+    """Files that a process left which was killed."""
+    return [*out.glob(f".{INDEX}.*.tmp"), *out.glob(f".{COLLECTION}.*.tmp")]
+
+
+def _is_listed(out: Path, rows: Sequence[Row]) -> bool:
+    """Whether the index is that of these rows."""
+    return (out / INDEX).is_file() and (out / INDEX).read_bytes() == index_bytes(rows)
 
 
 def _finished_rows(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> list[Row]:
