@@ -61,18 +61,37 @@ def load_recipe(name_or_path: str | Path, overrides: Sequence[str] = ()) -> Reci
     return RecipeFile(*recipes.load_recipe(str(name_or_path), overrides))
 
 
-def generate(recipe: RecipeFile, out: str | Path, report: Report = silent) -> dict[str, Any]:
+def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> dict[str, Any]:
     """Make the dataset of a recipe in the folder `out`, or go on with it; its manifest.
 
-    What `simgen generate` does: an unfinished dataset of the same recipe is resumed, a finished one is
-    checked and left alone. `report(stage, done, total)` is called as the work goes on.
+    What `simgen generate` does: `recipe` is one that was loaded, a path, the name of one that ships, or that
+    of a scene, which the paper's cameras then see. An unfinished dataset of the same recipe is resumed, a
+    finished one is checked and left alone. `report(stage, done, total)` is called as the work goes on.
 
-    Raises `pcii.InputError` for a folder that holds something else, and for a recipe that this machine cannot
-    hold.
+    Raises `pcii.InputError` for a recipe that is missing or wrong, whose fields have several values, or that
+    this machine cannot hold, and for a folder that holds something else.
     """
-    manifest = generation.generate(recipe.recipe, recipe.folder, Path(out), report)
-    write_card(Path(out), recipe.recipe.publication.terms())
+    loaded = _loaded(recipe)
+    manifest = generation.generate(loaded.recipe, loaded.folder, Path(out), report)
+    write_card(Path(out), loaded.recipe.publication.terms())
     return manifest
+
+
+def _loaded(recipe: RecipeFile | str | Path) -> RecipeFile:
+    if isinstance(recipe, RecipeFile):
+        return recipe
+    if not isinstance(recipe, str | Path):
+        raise InputError(
+            "recipe: expected the name or path of a recipe, or what simgen.load_recipe gives, got a "
+            f"{type(recipe).__name__}"
+        )
+    sweep = load_sweep(str(recipe))
+    if sweep.axes:
+        fields = ", ".join(axis.field for axis in sweep.axes)
+        raise InputError(
+            f"{sweep.source}: several values of {fields} make datasets each: use simgen.generate_collection"
+        )
+    return RecipeFile(sweep.recipe(0), sweep.near)
 
 
 def generate_collection(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tiny import TINY_RECIPE
+from tiny import GRID_2_X_3, TINY_RECIPE
 
 import pcii
 import simgen
@@ -51,6 +51,21 @@ def test_photons_of_much_light_are_drawn_from_views_and_can_be_scored() -> None:
     assert truth.photons is None
     focus = pcii.segment(counts, [540, 620], method="brightness")
     assert pcii.score(focus, None, truth).planes
+
+
+def test_a_recipe_may_be_named_or_be_a_path(dataset: pcii.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "tiny.toml"
+    path.write_text(f'scene = "two_objects"\nseed = 3\n{GRID_2_X_3}[photons]\nbudget = 200\n')
+    named = simgen.generate(str(path), dataset.path)  # finished, and the same
+    assert named["identity"] == dataset.manifest["identity"]
+    with pytest.raises(pcii.InputError, match=r"recipe: there is no 'smal'; did you mean 'small'\?"):
+        simgen.generate("smal", tmp_path / "out")
+    with pytest.raises(pcii.InputError, match=r"^recipe: expected the name .*, got a SceneFile$"):
+        simgen.generate(simgen.load_scene("two_objects"), tmp_path / "out")  # type: ignore[arg-type]
+    path.write_text('scene = "two_objects"\nseed = [1, 2]')
+    with pytest.raises(pcii.InputError, match=r"tiny.toml: several values of seed .*generate_collection$"):
+        simgen.generate(path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_what_is_wrong_is_told_in_one_sentence() -> None:
