@@ -68,32 +68,42 @@ def pooled_estimate(sections: Sections, window_px: int, samples: np.ndarray | No
     Sums are divided, so all samples have the same weight; a window that no sample reaches is 0. `samples` are
     the `pooled_samples` of other sections with this coverage, which then are not found again.
     """
-    counts = _window_means(sections.counts, window_px)
+    mean = np.empty(sections.counts.shape)
+    for plane in range(len(mean)):
+        mean[plane] = pooled_plane(sections, plane, window_px, None if samples is None else samples[plane])
+    return mean
+
+
+def pooled_plane(
+    sections: Sections, plane: int, window_px: int, samples: np.ndarray | None = None
+) -> np.ndarray:
+    """One plane of `pooled_estimate`, (H, W, C) float64: all planes at once may take much memory."""
+    counts = _window_means(sections.counts[plane], window_px)
     if samples is None:
-        samples = pooled_samples(sections, window_px)
+        samples = _window_means(sections.coverage[plane], window_px)
     # The filter's running sums leave rounding errors where the window is empty.
     floor = 0.5 / window_px**2
     mean = np.zeros_like(counts)
-    np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
-    return mean
+    return np.divide(counts, samples, out=mean, where=(samples > floor) & (counts > floor))
 
 
 def pooled_samples(sections: Sections, window_px: int) -> np.ndarray:
     """Mean samples per voxel over square windows, (Z, H, W, C) float64."""
-    return _window_means(sections.coverage, window_px)
+    return np.stack([_window_means(plane, window_px) for plane in sections.coverage])
 
 
 def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
+    """Means (H, W, C) float64 over square windows; outside the film there is nothing."""
     from scipy.ndimage import uniform_filter
 
     from pcii.base.compiled_loops import in_threads
 
-    def of_planes(first: int, last: int) -> None:
-        planes = values[first:last].astype(np.float64)
-        uniform_filter(planes, window_px, means[first:last], "constant", axes=(1, 2))
+    def of_colours(first: int, last: int) -> None:
+        colours = means[..., first:last]
+        uniform_filter(colours, window_px, colours, "constant", axes=(0, 1))
 
-    means = np.empty(values.shape)
-    in_threads(of_planes, len(values))
+    means = values.astype(np.float64)
+    in_threads(of_colours, means.shape[-1])
     return means
 
 

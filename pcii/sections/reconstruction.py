@@ -6,7 +6,7 @@ raw Bayer colours never mix. Photon counts stay integers until that last divisio
 interpolated.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -126,12 +126,13 @@ def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sec
     return Sections(
         planes,
         np.concatenate([sections.counts, added.counts]),
-        partial(_joined_coverage, sections, added),
+        partial(_joined_coverage, sections, added.samples),
     )
 
 
-def _joined_coverage(first: Sections, second: Sections) -> np.ndarray:
-    return np.concatenate([first.coverage, second.coverage])
+def _joined_coverage(first: Sections, samples: np.ndarray | Callable[[], np.ndarray]) -> np.ndarray:
+    # Not from the sections of the added planes, which would be kept beside the joined ones.
+    return np.concatenate([first.coverage, samples if isinstance(samples, np.ndarray) else samples()])
 
 
 def _check(

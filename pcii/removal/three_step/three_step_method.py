@@ -29,7 +29,7 @@ from pcii.imaging.watershed_pieces import pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.variance_threshold import adaptive_threshold, cell_px_for, tolerance_px
 from pcii.sections.photon_statistics import (
-    pooled_estimate,
+    pooled_plane,
     section_window_px,
 )
 from pcii.sections.probe_planes import PROBE_STEPS_PX, with_probes
@@ -92,10 +92,10 @@ class ThreeStep:
         steps = {name: np.stack([maps[name] for maps in step1]) for name in step1[0]}
 
         window_px = section_window_px(sections)
-        pooled = pooled_estimate(sections, window_px)
-        edges = np.stack([_edges(plane, _samples(sections, p, window_px)) for p, plane in enumerate(pooled)])
+        edges = np.stack([_edges(sections, p, window_px) for p in range(len(planes))])
+        del sections  # whose probe planes take memory: the masks are of the requested ones
         smooth = _smoothed(edges)
-        fine = np.stack([self._bright(counts, pooled[p], sections, p, window_px) for p in range(count)])
+        fine = np.stack([self._bright(counts, requested, p, window_px) for p in range(count)])
         bright = _half_of_each_pixel(fine, self.subpixel)
         bright_at_any: np.ndarray = np.logical_or.reduce(bright)
         margin = int(LARGEST_BLUR_PX)
@@ -122,18 +122,16 @@ class ThreeStep:
     def _bright(
         self,
         counts: PhotonCounts,
-        pooled: np.ndarray,
         sections: Sections,
         plane: int,
         window_px: int,
     ) -> np.ndarray:
         """Step 2 on voxels M times finer, (H M, W M) bool; without it voxels with a photon near."""
         M = self.subpixel
-        samples = _samples(sections, plane, window_px)
         if M > 1:
-            finer = reconstruct(counts, sections.planes.take([plane]), subpixel=M)
-            window = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
-            pooled, samples = pooled_estimate(finer, window)[0], _samples(finer, 0, window)
+            sections, plane = reconstruct(counts, sections.planes.take([plane]), subpixel=M), 0
+            window_px = 2 * ((window_px * M - 1) // 2) + 1  # odd, and no wider than in pixels
+        pooled, samples = pooled_plane(sections, plane, window_px), _samples(sections, plane, window_px)
         if not self.boundary:
             return pooled.max(axis=-1) > 0
         return outlined(pooled, samples, SMALLEST_REGION_PX, M)[1]
@@ -144,8 +142,9 @@ def _samples(sections: Sections, plane: int, window: int) -> float:
     return window**2 * float(sections.coverage[plane].mean()) * sections.coverage.shape[-1]
 
 
-def _edges(pooled: np.ndarray, samples_per_window: float) -> np.ndarray:
-    return roberts_magnitude(brightness(pooled, samples_per_window)).astype(np.float32)
+def _edges(sections: Sections, plane: int, window_px: int) -> np.ndarray:
+    pooled = pooled_plane(sections, plane, window_px)
+    return roberts_magnitude(brightness(pooled, _samples(sections, plane, window_px))).astype(np.float32)
 
 
 def _smoothed(edges: np.ndarray) -> np.ndarray:
