@@ -42,6 +42,7 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
             facts.append((f"{name} of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
     if score.depth["median_mm"] is not None:
         facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
+        facts.append(("bias of depth", _bias(f"{score.depth['bias_mm']:+.2f} mm", score.depth["bias_mm"])))
         facts.append(("depths off by more than 1 px", _percent(score.depth["bad_1px"])))
     else:
         facts.append(("pixels with a depth", _percent(float((outcome.depth.confidence > 0).mean()))))
@@ -118,6 +119,10 @@ def _objects(row: Row) -> str:
     return row["object"] or "none at this plane"
 
 
+def _bias(value: str, error_mm: float) -> str:
+    return f"{value} (too {'far' if error_mm > 0 else 'near'})" if error_mm else value
+
+
 def depth_table(outcome: Outcome) -> Table:
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
@@ -131,6 +136,8 @@ def depth_table(outcome: Outcome) -> Table:
                 key = {"median": "median", "mean": "mae"}[name]
                 value = f"{depth[f'{key}_mm']:.2f} mm, {depth[f'{key}_px']:.2f} px of total disparity"
                 rows.append((f"{name} error of those", value))
+            value = f"{depth['bias_mm']:+.2f} mm, {depth['bias_px']:+.2f} px of total disparity"
+            rows.append(("bias, the median of their signed errors", _bias(value, depth["bias_mm"])))
         rows.append(("off by more than 1 px of total disparity, or no estimate", _percent(depth["bad_1px"])))
         rows.append(("off by more than 3 px of total disparity, or no estimate", _percent(depth["bad_3px"])))
     hci = depth["hci_objects"]

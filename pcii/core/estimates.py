@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-DEPTH_SHOWN = ("median_mm", "mae_mm", "median_px", "bad_1px", "bad_3px", "coverage", "ece")
+DEPTH_SHOWN = ("median_mm", "mae_mm", "median_px", "bias_mm", "bad_1px", "bad_3px", "coverage", "ece")
 """Scores of depth that a notebook shows."""
 
 

@@ -22,6 +22,7 @@ SHARES = {"iou", "precision", "recall", "f1", "boundary_f", "photon_precision", 
 SHARES |= {"claimed_share", "iou_oracle", "bad_1px", "bad_3px", "coverage", "answered"}
 SHARES |= {"badpix_001", "badpix_003", "badpix_007", "discontinuities", "fine_fattening", "fine_thinning"}
 SHARES |= {"ece", "share", "confidence", "correct"}
+SIGNED = {"bias_mm", "bias_px"}
 
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
@@ -184,7 +185,10 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         if isinstance(known[0], Mapping):
             means[name] = _means(known)
             continue
-        mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
+        if name in SIGNED:
+            mean = mean_interval(known)
+        else:
+            mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
         means[name] = mean.figures()
     return means
 

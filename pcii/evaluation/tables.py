@@ -19,6 +19,7 @@ COLUMNS = (
 )
 DEPTH_COLUMNS = (
     ("median, px", "median_px"),
+    ("bias, px", "bias_px"),
     ("bad_1px", "bad_1px"),
     ("bad_3px", "bad_3px"),
     ("BadPix(0.07)", "hci_objects", "badpix_007"),
@@ -193,7 +194,7 @@ def _depth(group: Mapping[str, Any]) -> Table:
             row["method"],
             budget_name(row["budget"]),
             str(row["seeds"]),
-            *(with_interval(mean[name], 2 if name == "median, px" else 3) for name in shown),
+            *(with_interval(mean[name], 2 if name.endswith(", px") else 3) for name in shown),
             with_interval(row["seconds"], 2),
         )
         for row, mean in zip(results, means, strict=True)

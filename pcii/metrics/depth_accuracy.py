@@ -38,10 +38,21 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     `hci` is over all pixels with a true depth, as in the benchmark; `hci_objects` over the objects' pixels,
     since a dark backdrop has no photons to estimate depth from.
     `mae_mm`, `median_mm`, `mae_px` and `median_px` are mean and median absolute errors of the pixels with an
-    estimate, in mm and in px of total disparity; `bad_1px` and `bad_3px` the shares with larger errors;
-    `coverage` the share with an estimate. All are None without a depth map, and where no true depth is known.
+    estimate, in mm and in px of total disparity; `bias_mm` and `bias_px` the medians of their signed errors,
+    above 0 where depths are too far; `bad_1px` and `bad_3px` the shares with larger errors; `coverage` that
+    with an estimate. All are None without a depth map, and where no true depth is known.
     """
-    keys = ("mae_mm", "median_mm", "bad_1px", "bad_3px", "coverage", "median_px", "mae_px")
+    keys = (
+        "mae_mm",
+        "median_mm",
+        "bad_1px",
+        "bad_3px",
+        "coverage",
+        "median_px",
+        "mae_px",
+        "bias_mm",
+        "bias_px",
+    )
     errors: dict[str, Any] = dict.fromkeys(keys)
     errors["hci"] = hci_errors(grid, depth, truth, None if truth is None else np.isfinite(truth.z_mm))
     on_object = None if truth is None else np.isfinite(truth.object_z_mm)
@@ -51,19 +62,22 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
         return errors
     estimate, true = depth.z_mm[on_object], truth.z_mm[on_object]
     answered = _answered(estimate)
-    error_mm = np.abs(estimate[answered] - true[answered])
-    error_px = np.full(estimate.shape, np.inf)
+    signed_mm = estimate[answered] - true[answered]
     estimated_px, true_px = (total_disparity_px(grid, z_mm[answered]) for z_mm in (estimate, true))
-    error_px[answered] = np.abs(estimated_px - true_px)
+    signed_px = true_px - estimated_px  # what is farther has less disparity
+    error_px = np.full(estimate.shape, np.inf)
+    error_px[answered] = np.abs(signed_px)
     has_answers = answered.any()
     return errors | {
-        "mae_mm": float(error_mm.mean()) if has_answers else None,
-        "median_mm": float(np.median(error_mm)) if has_answers else None,
+        "mae_mm": float(np.abs(signed_mm).mean()) if has_answers else None,
+        "median_mm": float(np.median(np.abs(signed_mm))) if has_answers else None,
         "bad_1px": float((error_px > 1).mean()),
         "bad_3px": float((error_px > 3).mean()),
         "coverage": float(answered.mean()),
         "median_px": float(np.median(error_px[answered])) if has_answers else None,
         "mae_px": float(error_px[answered].mean()) if has_answers else None,
+        "bias_mm": float(np.median(signed_mm)) if has_answers else None,
+        "bias_px": float(np.median(signed_px)) if has_answers else None,
     }
 
 

@@ -9,6 +9,7 @@ from twins import unit_grid
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import DepthMap
+from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
 from pcii.core.truth import Truth
 from pcii.metrics.depth_accuracy import calibration, depth_errors, fine_structures, hci_errors, near_edges
 
@@ -124,6 +125,19 @@ def test_all_pixels_and_those_of_objects_are_distinguished() -> None:
     assert [alike[key] for key in ("coverage", "median_mm", "bad_1px")] == [1.0, 0.0, 0.0]
 
 
+def test_bias_is_the_median_of_signed_errors_and_above_0_for_too_far() -> None:
+    wall_mm = np.full((40, 50), 0.5)
+    truth = Truth(wall_mm, np.ones(wall_mm.shape, dtype=int), {1: "wall"})
+    for error_px in (-0.5, 0.5):
+        total_px = total_disparity_px(GRID, wall_mm) - error_px
+        total_px[:15] += 2 * error_px  # fewer are off the other way, as far
+        depth = DepthMap(depth_of_total_disparity_mm(GRID, total_px), np.ones(wall_mm.shape))
+        found = depth_errors(GRID, depth, truth)
+        assert found["bias_px"] == pytest.approx(error_px)
+        assert found["median_px"] == pytest.approx(0.5)
+        assert np.sign(found["bias_mm"]) == np.sign(error_px)
+
+
 def test_depths_that_cannot_be_are_no_answers() -> None:
     z = np.full((40, 50), 0.5)
     for nonsense in (0.0, -1.0, np.inf, np.nan):
@@ -131,7 +145,7 @@ def test_depths_that_cannot_be_are_no_answers() -> None:
         found = depth_errors(GRID, depth, Truth(z, np.ones(z.shape, dtype=int), {1: "wall"}))
         assert found["coverage"] == found["hci"]["answered"] == 0.0
         assert found["bad_3px"] == found["hci"]["badpix_007"] == 1.0
-        assert found["mae_mm"] is found["median_px"] is None
+        assert found["mae_mm"] is found["median_px"] is found["bias_mm"] is None
 
 
 def calibrated(total_px: np.ndarray, confidence: np.ndarray, true_px: np.ndarray) -> dict[str, Any]:
