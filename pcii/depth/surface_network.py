@@ -19,17 +19,22 @@ if TYPE_CHECKING:
 WEIGHTS = Path(__file__).parent / "weights"
 MULTIPLE = 32
 """Blocks of a cell of the network's coarsest level, of which films are whole numbers."""
-BAND_VALUES = 1 << 22
-"""Blocks times planes whose last step is done at once."""
+BAND_VALUES = 1 << 20
+"""Blocks times planes whose last step is done at once, which takes 0.2 GB."""
 
 
 def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities (Z, h, w) of the planes and (h, w) of no surface, float32, for blocks of the inputs."""
+    import onnxruntime
+
     from pcii.base.compiled_loops import threads
 
     trunk, head = _sessions(threads())
+    options = onnxruntime.RunOptions()
+    # Else the memory of the widest step is kept as long as the process runs.
+    options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
     Z, h, w = inputs.evidence.shape
-    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, inputs._asdict()))
+    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, inputs._asdict(), options))
     nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
@@ -41,7 +46,7 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
         blocks = np.s_[:, first:last]
         parts = features[cells], cell_logit[cells], inputs.evidence[blocks], inputs.brightness[blocks]
         names = [argument.name for argument in head.get_inputs()]
-        (logit,) = head.run(None, dict(zip(names, parts, strict=True)))
+        (logit,) = head.run(None, dict(zip(names, parts, strict=True)), options)
         own = np.asarray(logit)[:, top - first : end - first]
         largest = np.maximum(own.max(axis=0), nothing[top:end])
         own = np.exp(own - largest)
