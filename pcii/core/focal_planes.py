@@ -5,7 +5,7 @@ take the planes. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,8 @@ class FocalPlanes(Brief):
     grid: CameraGrid
     z_mm: np.ndarray
     total_disparity_px: np.ndarray
+    rounding: float = 0.5
+    """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
@@ -89,7 +91,7 @@ class FocalPlanes(Brief):
 
     def take(self, which: slice | np.ndarray | Sequence[int]) -> "FocalPlanes":
         """The planes chosen by a slice, indices or a mask."""
-        return FocalPlanes(self.grid, self.z_mm[which], self.total_disparity_px[which])
+        return replace(self, z_mm=self.z_mm[which], total_disparity_px=self.total_disparity_px[which])
 
     def followed_by(self, total_disparity_px: Sequence[float]) -> "FocalPlanes":
         """These planes, followed by planes of the given total disparities in px."""
@@ -97,7 +99,7 @@ class FocalPlanes(Brief):
             return self
         others = FocalPlanes.at_total_disparity(self.grid, total_disparity_px)
         total = np.concatenate([self.total_disparity_px, others.total_disparity_px])
-        return FocalPlanes(self.grid, np.concatenate([self.z_mm, others.z_mm]), total)
+        return replace(self, z_mm=np.concatenate([self.z_mm, others.z_mm]), total_disparity_px=total)
 
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.z_mm.tolist())}
@@ -114,16 +116,19 @@ class FocalPlanes(Brief):
 
     @cached_property
     def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
-        """The shifts of rows (Z, K) and columns (Z, L) to the nearest whole pixel, floor(x + 1/2), int32."""
+        """The shifts of rows (Z, K) and columns (Z, L) to whole pixels, floor(x + `rounding`), int32."""
         rows, cols = self.nearest_shifts_px(1)
         return read_only(rows.astype(np.int32)), read_only(cols.astype(np.int32))
 
     def nearest_shifts_px(self, step_px: int) -> tuple[np.ndarray, np.ndarray]:
-        """The shifts of rows (Z, K) and columns (Z, L) to the nearest multiple of `step_px`, int64.
+        """The shifts of rows (Z, K) and columns (Z, L) to multiples of `step_px`, int64.
 
-        `floor(x + 1/2)` and not `round`, which rounds half to even and makes half-pixel shifts alternate.
+        They are the nearest for a `rounding` of 1/2: `floor(x + 1/2)` and not `round`, which rounds half to
+        even and makes half-pixel shifts alternate.
         """
-        rows, cols = (np.floor(exact / step_px + 0.5).astype(np.int64) for exact in self.exact_shifts_px)
+        rows, cols = (
+            np.floor(exact / step_px + self.rounding).astype(np.int64) for exact in self.exact_shifts_px
+        )
         return step_px * rows, step_px * cols
 
     def voxel_indices(self, subpixel: int = 1, step_px: int = 1) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.depth.network_inputs import NetworkInputs, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.depth.surface_network import MULTIPLE, network_posterior
@@ -49,14 +50,20 @@ class PosteriorDepth:
     """at a depth of which its own differs so little, in total disparity."""
     most_empty: float = 0.9
     """No surface is seen where the probability of none is higher."""
+    interpolation_blocks: float = 2.0
+    """Standard deviation of the window whose evidence places the depth of radiance between two planes."""
 
     def __call__(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         """Depth (H, W), and the posterior probability that it is within a plane, 1 px, of the truth."""
         data = _without_faults(data)
-        posterior, photons = self._posterior(data, z_range_mm)
+        posterior, evidence = self._posterior(data, z_range_mm)
         plane, confidence, total_px = posterior.most_probable()
-        detected = self._detected(data, posterior, photons, plane)
-        depth = np.where(detected, depth_of_total_disparity_mm(data.grid, total_px), np.nan)
+        if isinstance(data, Views):
+            z_mm = self._between_planes_mm(evidence.nats, posterior.planes, plane)
+        else:
+            z_mm = depth_of_total_disparity_mm(data.grid, total_px)
+        detected = self._detected(data, posterior, evidence.photons, plane)
+        depth = np.where(detected, z_mm, np.nan)
         maps = depth, np.where(detected, confidence, 0.0)
         return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
 
@@ -68,8 +75,8 @@ class PosteriorDepth:
         They are those where the depth map has an answer.
         """
         data = _without_faults(data)
-        posterior, photons = self._posterior(data, z_range_mm)
-        return posterior, self._detected(data, posterior, photons, posterior.most_probable()[0])
+        posterior, evidence = self._posterior(data, z_range_mm)
+        return posterior, self._detected(data, posterior, evidence.photons, posterior.most_probable()[0])
 
     def posterior(self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthPosterior:
         """The posterior of planes through the range."""
@@ -77,8 +84,8 @@ class PosteriorDepth:
 
     def _posterior(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
-    ) -> tuple[DepthPosterior, np.ndarray]:
-        """The posterior, and the photons (Z, h / 4, w / 4) of 4 x 4 blocks."""
+    ) -> tuple[DepthPosterior, TextureEvidence]:
+        """The posterior, and the evidence that it is made of."""
         planes = FocalPlanes.between(data.grid, *z_range_mm, self.step_px)
         block_px = self.block_px
         while len(planes) * data.grid.height * data.grid.width / block_px**2 > MOST_VALUES:
@@ -91,7 +98,7 @@ class PosteriorDepth:
         else:
             probability, nothing = network_posterior(self.network_inputs(evidence, planes, block_px))
         posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
-        return posterior, evidence.photons
+        return posterior, evidence
 
     def _detected(
         self, data: PhotonCounts | Views, posterior: DepthPosterior, photons: np.ndarray, plane: np.ndarray
@@ -102,6 +109,16 @@ class PosteriorDepth:
         agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
         surrounded = self._directions(agree & detected, plane, posterior) >= self.least_directions
         return detected & (agree | surrounded & (posterior.no_surface < 0.5))
+
+    def _between_planes_mm(self, nats: np.ndarray, planes: FocalPlanes, plane: np.ndarray) -> np.ndarray:
+        """Depth (h, w) at the top of the evidence (Z, h, w) around a `plane` (h, w).
+
+        In full light all probability is at one plane, so that its mean is that plane; the evidence is not.
+        """
+        from scipy.ndimage import gaussian_filter
+
+        smooth = gaussian_filter(nats, self.interpolation_blocks, axes=(1, 2))
+        return peak_depth_mm(planes, plane, neighbours_of(smooth, plane))
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""

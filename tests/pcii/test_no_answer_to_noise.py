@@ -21,10 +21,6 @@ LIGHT = [1e-3, 0.05, 1.0, 100.0, 1e4]
 HOT = 10_000
 MOST_FALSE = 1 / 1000  # what both methods promise of noise, as a share of pixels
 
-MOST_FALSE_AT_BORDERS = 5 / 1000
-"""In full light, where the film is hardly wider than the parallax: at its borders each block is seen by other
-cameras, which vignetting makes differ without noise."""
-
 
 def grid_of(views: tuple[int, int], size: tuple[int, int]) -> CameraGrid:
     rows, cols = views
@@ -95,11 +91,14 @@ def without_depth(kind: str, grid: CameraGrid) -> np.ndarray:
 @pytest.mark.parametrize("budget", BUDGETS)
 @pytest.mark.parametrize("kind", ["vignetting", "shading", "flicker", "hot"])
 def test_what_shows_no_depth_is_not_answered(kind, budget):
-    grid, rng = grid_of((5, 5), (96, 128)), np.random.default_rng(0)
+    # In full light the film is more than twice as wide as the parallax: at borders of a narrower one each
+    # block is seen by other cameras, whose vignetting differs without noise.
+    size = (192, 256) if budget is None else (96, 128)
+    grid, rng = grid_of((5, 5), size), np.random.default_rng(0)
     light = without_depth(kind, grid)
     if budget is None:
         depth = estimate_depth(Views(light[..., None].astype(np.float32), grid), RANGE_MM)
-        assert np.isfinite(depth.z_mm).mean() <= MOST_FALSE_AT_BORDERS
+        assert np.isfinite(depth.z_mm).mean() <= MOST_FALSE
         return
     film = rng.poisson(light * budget / (grid.height * grid.width))
     if kind == "hot":

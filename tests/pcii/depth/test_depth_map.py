@@ -119,7 +119,7 @@ def test_a_flat_film_has_no_depth(rate):
 def slanted_card(grid: CameraGrid, near: float, far: float, seed: int) -> PhotonCounts:
     """A textured card over the whole frame, of the disparity `far` at its left and `near` at its right."""
     rng = np.random.default_rng(seed)
-    texture = blocky_texture(rng, 2 * grid.height, 2 * grid.width)
+    texture = blocky_texture(rng, 2 * grid.height, 2 * grid.width).repeat(4, axis=0).repeat(4, axis=1)
     K, L, H, W = grid.shape_KLHW
     slope = (near - far) / (W - 1)
     rates = np.zeros((*grid.shape_KLHW, 3))
@@ -129,8 +129,9 @@ def slanted_card(grid: CameraGrid, near: float, far: float, seed: int) -> Photon
             # Column x of the virtual centre, of the disparity far + slope x, is seen at x - right disparity.
             x = (np.arange(W) + right * far) / (1 - right * slope)
             y = np.arange(H)[:, None] + down * (far + slope * x)
-            i = np.round(y + H / 2).astype(int)
-            j = np.broadcast_to(np.round(x + W / 2).astype(int), i.shape)
+            # To a quarter of a pixel: whole ones would be another disparity than the true one.
+            i = np.round(4 * (y + H / 2)).astype(int)
+            j = np.broadcast_to(np.round(4 * (x + W / 2)).astype(int), i.shape)
             rates[k, l] = texture[i, j]
     return PhotonCounts.from_dense(bayer_photons(0.1 * rates, "GRBG", seed), grid, cfa="GRBG")
 
