@@ -347,7 +347,7 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
     }
     for name, options in OPTIONS.items():
         table[f"reconstruct, photons{name}"] = ("reconstruct", _sections_of_counts(options))
-    for name, options in (OPTIONS | {", bilinear": {"shifts": "bilinear"}}).items():
+    for name, options in OPTIONS.items():
         table[f"reconstruct, radiance{name}"] = ("reconstruct", _sections_of_views(options))
     table["reconstruct_each"] = (
         "reconstruct_each",

@@ -64,7 +64,6 @@ def _plain_ways(views: Views) -> dict[str, Way]:
     images, grid = np.asarray(views.radiance)[..., 0], views.grid
     ways: dict[str, Way] = {
         "nearest": lambda: _estimate(views),
-        "bilinear": lambda: _estimate(views, shifts="bilinear"),
         "2 x 2 subpixels": lambda: _estimate(views, subpixel=2),
         "4 x 4 subpixels": lambda: _estimate(views, subpixel=4),
         "SciPy, bilinear": lambda: by_scipy(images, grid, PLANE_MM)[..., None],
@@ -79,7 +78,6 @@ def _plain_ways(views: Views) -> dict[str, Way]:
 def _bayer_ways(views: Views) -> dict[str, Way]:
     return {
         "nearest": lambda: _estimate(views),
-        "bilinear": lambda: _estimate(views, shifts="bilinear"),
         "2 x 2 subpixels": lambda: _estimate(views, subpixel=2),
         "4 x 4 subpixels": lambda: _estimate(views, subpixel=4),
         "even, then Laroche-Prescott": lambda: _estimate(views, shifts="even"),
@@ -158,17 +156,16 @@ def draw(figure: "Figure", measured: Measured) -> None:
 
 def reading(measured: Measured) -> str:
     """How to read it, with figures of the plane of 13.3 px."""
-    own, bilinear, peer = (
+    own, peer = (
         measured.one(ONE_COLOUR, name, disparity_px=SHOWN_PX).values
-        for name in ("nearest", "bilinear", "SciPy, bilinear")
+        for name in ("nearest", "SciPy, bilinear")
     )
     whole = measured.one(ONE_COLOUR, "nearest", disparity_px=13.0).values
     few, *_, many = (row.values["rmse_percent"].value for row in measured.of(BY_PHOTONS))
     return (
         "Does interpolation pay? Further left and further down is better: with 100 cameras the roundings"
         f" of nearest shifts cancel, so that they have an error of {own['rmse_percent'].value:.1f} % of the"
-        f" texture's contrast in {own['time_ms'].value:.1f} ms where bilinear ones have"
-        f" {bilinear['rmse_percent'].value:.1f} % in {bilinear['time_ms'].value:.1f} ms and SciPy"
+        f" texture's contrast in {own['time_ms'].value:.1f} ms where bilinear ones by SciPy have"
         f" {peer['rmse_percent'].value:.1f} % in {peer['time_ms'].value:.0f} ms; at a whole disparity,"
         f" where all round alike, nearest shifts are off by {whole['rmse_percent'].value:.0f} %. Sections"
         f" of photon counts have errors of {few:.0f} % down to {many:.0f} % as photons grow, beside which"

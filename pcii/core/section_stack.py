@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
-Normalisation = Literal["overlap", "views"]
-Shifts = Literal["nearest", "bilinear", "even"]
+Shifts = Literal["nearest", "even"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,7 +39,6 @@ class Sections(Brief):
     counts: np.ndarray
     samples: np.ndarray | Callable[[], np.ndarray]
     subpixel: int = 1
-    normalisation: Normalisation = "overlap"
     variance: np.ndarray | None = None
     cfa: str | None = None
 
@@ -82,7 +80,7 @@ class Sections(Brief):
 
     @cached_property
     def coverage(self) -> np.ndarray:
-        """Number of the samples that meet at each voxel, or sum of their shares: (Z, H, W, C)."""
+        """Number of the samples that meet at each voxel, (Z, H, W, C)."""
         coverage = self.samples if isinstance(self.samples, np.ndarray) else self.samples()
         if coverage.shape != self.counts.shape:
             raise InputError("coverage: must have the shape of counts")
@@ -93,12 +91,9 @@ class Sections(Brief):
         """Mean per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
 
         For photon counts it is the maximum-likelihood estimate of the photons per pixel and view;
-        Eq. 3 divides it further by the photon budget n. Under `normalisation` "overlap" the sum is
-        divided by the coverage, under "views" by R S, the number of cameras. A voxel that no
-        sample reaches is 0.
+        Eq. 3 divides it further by the photon budget n, and the sum by R S, the number of cameras, which
+        darkens borders; here it is divided by the coverage. A voxel that no sample reaches is 0.
         """
-        if self.normalisation == "views":
-            return read_only(self.counts / self.grid.view_count)
         mean = np.zeros(self.counts.shape, dtype=np.float64)
         np.divide(self.counts, self.coverage, out=mean, where=self.coverage > 0)
         return read_only(mean)
@@ -155,8 +150,6 @@ class Sections(Brief):
         images: list[tuple[np.ndarray, np.ndarray]] = []
         for plane in planes:
             sums, samples = self.counts[plane], self.coverage[plane]
-            if self.normalisation == "views":
-                samples = np.full_like(samples, self.grid.view_count)
             if kept is not None:
                 sums = sums * kept[plane][..., None]
             if self.cfa is not None:

@@ -1,10 +1,10 @@
 """Sections of dense images: whole rows of every view added to whole rows of the section.
 
-A view moves by whole pixels, so each of its rows is added to a row of the section in one run; bilinear
-shifts are up to four such moves of each view, with weights. For mosaics the moves are sorted into four
-groups by the parities of their shifts: within a group all samples of a voxel have one colour, and rows are
-added without regard to colours. Variances are sums of squared differences from the first sample, in
-double precision, whose relative error is 1e-6 where the mean is a million standard deviations.
+A view moves by whole pixels, so each of its rows is added to a row of the section in one run. For
+mosaics the moves are sorted into four groups by the parities of their shifts: within a group all samples of a
+voxel have one colour, and rows are added without regard to colours. Variances are sums of squared differences
+from the first sample, in double precision, whose relative error is 1e-6 where the mean is a million standard
+deviations.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Shifts
-from pcii.sections.image_moves import Moves, Running, axis_moves, groups_of, moves_of
+from pcii.sections.image_moves import Moves, Running, groups_of, moves_of, step_px
 from pcii.sections.recycled_memory import empty
 
 BATCH = 8
@@ -111,10 +111,10 @@ class _Plane:
     ) -> None:
         grid = data.grid
         cfa, C = colours_apart(data, shifts)
-        self.row_moves, self.col_moves = axis_moves(planes, plane, shifts)
+        self.row_px, self.col_px = (px[plane] for px in planes.nearest_shifts_px(step_px(shifts)))
         self.is_mosaic, self.with_variance = cfa is not None, variance
         self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
-        self.groups = groups_of(self.row_moves, self.col_moves, grid, cfa)
+        self.groups = groups_of(self.row_px, self.col_px, grid, cfa)
         self.sums = empty((grid.height, grid.width, C), dtype)
         self.variance = empty(self.sums.shape if variance else (0, grid.width, C), dtype)
 
@@ -145,7 +145,7 @@ class _Plane:
         return dense_kernels.merge_groups(self.sums, self.variance, self._running(), self.groups)
 
     def _moves(self, views: np.ndarray) -> Moves:
-        return moves_of(self.row_moves, self.col_moves, views, self.channels, self.is_mosaic)
+        return moves_of(self.row_px, self.col_px, views, self.channels, self.is_mosaic)
 
     def _running(self) -> Running:
         return Running(self.total, self.squares, self.first)

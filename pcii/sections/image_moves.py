@@ -1,32 +1,26 @@
-"""Whole-pixel moves of whole images: by how much each view moves, with what weight, in what order.
+"""Whole-pixel moves of whole images: by how much each view moves, in what order.
 
 The arguments of the compiled loops of `dense_kernels`, made without importing the compiler.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from pcii.core.bayer import colour_cells
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
 from pcii.core.section_stack import Shifts
 
 
 class Moves(NamedTuple):
     """Images in the order in which they are added, (M,) each, group after group; group g ends at `ends[g]`.
 
-    Move m adds image `source[m]`, moved by `row_shift[m]` rows and `col_shift[m]` columns times channels,
-    times `weight[m]`.
+    Move m adds image `source[m]`, moved by `row_shift[m]` rows and `col_shift[m]` columns times channels.
     """
 
     source: np.ndarray
     row_shift: np.ndarray
     col_shift: np.ndarray
-    weight: np.ndarray
     ends: np.ndarray
 
 
@@ -56,66 +50,30 @@ class Groups(NamedTuple):
     phases: np.ndarray
 
 
-@dataclass(frozen=True)
-class AxisMoves:
-    """Whole pixels by which each row (or column) of cameras is moved, int64, and the weights of the moves."""
-
-    px: np.ndarray
-    weight: np.ndarray
-
-
-def axis_moves(planes: FocalPlanes, plane: int, shifts: Shifts) -> tuple[list[AxisMoves], list[AxisMoves]]:
-    """Moves of the rows (K,) and of the columns (L,) of cameras: one, or two for bilinear shifts."""
-    if shifts != "bilinear":
-        nearest = planes.nearest_shifts_px(step_px(shifts))
-        rows, cols = ([AxisMoves(px[plane], np.ones(px[plane].size))] for px in nearest)
-        return rows, cols
-    axes = []
-    for shifts_px in planes.exact_shifts_px:
-        exact = shifts_px[plane]
-        px = np.floor(exact).astype(np.int64)
-        axes.append([AxisMoves(px, 1 - (exact - px)), AxisMoves(px + 1, exact - px)])
-    return axes[0], axes[1]
-
-
 def step_px(shifts: Shifts) -> int:
     """The number of pixels of which whole shifts are multiples."""
     return 2 if shifts == "even" else 1
 
 
 def moves_of(
-    row_moves: Sequence[AxisMoves],
-    col_moves: Sequence[AxisMoves],
-    views: np.ndarray,
-    channels: int,
-    is_mosaic: bool,
+    row_px: np.ndarray, col_px: np.ndarray, views: np.ndarray, channels: int, is_mosaic: bool
 ) -> Moves:
-    """All moves of these views (V,) with a weight above 0; images are numbered as `views` lists them."""
-    columns = col_moves[0].px.size
-    source, down, right, weight = [], [], [], []
-    for row, col in product(row_moves, col_moves):
-        share = row.weight[views // columns] * col.weight[views % columns]
-        used = np.flatnonzero(share)
-        source.append(used)
-        weight.append(share[used])
-        down.append(row.px[views[used] // columns])
-        right.append(col.px[views[used] % columns])
-    down, right = np.concatenate(down), np.concatenate(right)
+    """The moves of these views (V,), of which rows (K,) and columns (L,) of cameras move by whole pixels.
+
+    Images are numbered as `views` lists them.
+    """
+    down, right = row_px[views // col_px.size], col_px[views % col_px.size]
     group = 2 * (down % 2) + right % 2 if is_mosaic else np.zeros_like(down)
     # The images that move least cover most of a section, so they come first.
     order = np.lexsort((np.abs(down) + np.abs(right), group))
     ends = np.searchsorted(group[order], np.arange(4 if is_mosaic else 1), side="right")
-    source, weight = np.concatenate(source)[order], np.concatenate(weight)[order]
-    return Moves(source, down[order], right[order] * channels, weight, ends)
+    return Moves(order, down[order], right[order] * channels, ends)
 
 
-def groups_of(
-    row_moves: Sequence[AxisMoves], col_moves: Sequence[AxisMoves], grid: CameraGrid, cfa: str | None
-) -> Groups:
+def groups_of(row_px: np.ndarray, col_px: np.ndarray, grid: CameraGrid, cfa: str | None) -> Groups:
     """The groups of views that move by whole pixels, by parity of their shifts if `cfa` is a pattern."""
     by_row, by_col = (
-        _cameras_by_parity(moves[0].px, size)
-        for moves, size in ((row_moves, grid.height), (col_moves, grid.width))
+        _cameras_by_parity(px, size) for px, size in ((row_px, grid.height), (col_px, grid.width))
     )
     if cfa is None:
         return Groups(by_row, by_col, np.zeros((0, 2), np.int64))

@@ -18,9 +18,9 @@ from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Normalisation, Sections, Shifts
+from pcii.core.section_stack import Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
-from pcii.sections.image_moves import AxisMoves, axis_moves, step_px
+from pcii.sections.image_moves import step_px
 from pcii.sections.recycled_memory import empty
 
 DENSE_SHARE = 1 / 16
@@ -35,22 +35,18 @@ def reconstruct(
     z_mm: object,
     *,
     subpixel: int = 1,
-    normalisation: Normalisation = "overlap",
     shifts: Shifts = "nearest",
     variance: bool = False,
 ) -> Sections:
     """Sections of photon counts (Eq. 3) or radiance (Eq. 2) at the depths `z_mm`, or at `FocalPlanes`.
 
     Returns `Sections` with arrays (Z, H M, W M, C): M = `subpixel`, C = 3 for Bayer or colour data,
-    1 for monochrome. `normalisation` "overlap" divides by the samples that reach a voxel, "views"
-    by the number of cameras as the paper does, which darkens borders. `variance` adds the unbiased
-    variance of the samples at each voxel, 0 below two.
+    1 for monochrome. `variance` adds the unbiased variance of the samples at each voxel, 0 below two.
 
-    `shifts` are "nearest" (views move by whole pixels), "bilinear" (radiance only: each sample is shared
-    by the four nearest voxels; `coverage` is then the sum of the shares) or "even". With "even"
-    raw Bayer samples of all colours are added together, as the paper does, and the section is a
-    mosaic to be demosaiced: `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for
-    even shifts only, so views move by the nearest even number of pixels, up to 1 px off instead of 1/2.
+    `shifts` are "nearest" (views move by whole pixels) or "even". With "even" raw Bayer samples of all
+    colours are added together, as the paper does, and the section is a mosaic to be demosaiced:
+    `demosaic(sections.estimate[0, ..., 0], cfa=sections.cfa)`. That is right for even shifts only, so views
+    move by the nearest even number of pixels, up to 1 px off instead of 1/2.
 
     Raises `InputError` for a depth not above 0, a subpixel division below 1, options that do not go together,
     radiance that is not finite, too large to be added up or too faint for a variance, and counts too large
@@ -71,15 +67,12 @@ def reconstruct(
     >>> sections.counts[:, 0, 5:16, 0].tolist()
     [[0, 0, 0, 0, 0, 3, 0, 0, 0, 0, 0], [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]]
     """
-    _check(data, subpixel, normalisation, shifts, variance)
+    _check(data, subpixel, shifts)
     grid, planes, sample_variance = data.grid, planes_at(data.grid, z_mm), None
     cfa, channels = colours_apart(data, shifts)
     shape = (len(planes), grid.height * subpixel, grid.width * subpixel, channels)
     rows, cols = planes.voxel_indices(subpixel, step_px(shifts))
-    if shifts == "bilinear":
-        coverage_of = partial(_shared_coverage, planes, cfa, shape)
-    else:
-        coverage_of = partial(_coverage, planes, cfa, shape, rows, cols)
+    coverage_of = partial(_coverage, planes, cfa, shape, rows, cols)
     if isinstance(data, PhotonCounts):
         if subpixel == 1 and _as_images(data):
             sums = sum_counts(data, planes, shifts)
@@ -92,7 +85,7 @@ def reconstruct(
     else:
         sums, sample_variance = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
-    return Sections(planes, sums, coverage_of, subpixel, normalisation, sample_variance, mosaic)
+    return Sections(planes, sums, coverage_of, subpixel, sample_variance, mosaic)
 
 
 def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
@@ -135,24 +128,16 @@ def _joined_coverage(first: Sections, samples: np.ndarray | Callable[[], np.ndar
     return np.concatenate([first.coverage, samples if isinstance(samples, np.ndarray) else samples()])
 
 
-def _check(
-    data: PhotonCounts | Views, subpixel: int, normalisation: Normalisation, shifts: Shifts, variance: bool
-) -> None:
+def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts) -> None:
     check_data(data)
     if isinstance(subpixel, bool) or not isinstance(subpixel, int | np.integer) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
-    if normalisation not in ("overlap", "views"):
-        raise InputError(f"normalisation: use 'overlap' or 'views', not {normalisation!r}")
-    if shifts not in ("nearest", "bilinear", "even"):
-        raise InputError(f"shifts: use 'nearest', 'bilinear' or 'even', not {shifts!r}")
+    if shifts not in ("nearest", "even"):
+        raise InputError(f"shifts: use 'nearest' or 'even', not {shifts!r}")
     if shifts != "nearest" and subpixel > 1:
         raise InputError(f"shifts: {shifts!r} is for whole pixels (subpixel = 1)")
     if shifts == "even" and data.cfa is None:
         raise InputError("shifts: 'even' is for Bayer mosaics; these data have no pattern (cfa)")
-    if shifts == "bilinear" and isinstance(data, PhotonCounts):
-        raise InputError("shifts: photon counts are never interpolated; use 'nearest', or finer voxels")
-    if shifts == "bilinear" and variance:
-        raise InputError("variance: samples that are shared between voxels have none; use 'nearest' shifts")
 
 
 def _as_images(counts: PhotonCounts) -> bool:
@@ -202,18 +187,6 @@ def view_coverage(planes: FocalPlanes) -> np.ndarray:
     return _coverage(planes, None, shape, *planes.voxel_indices())[..., 0]
 
 
-def _shared_coverage(planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...]) -> np.ndarray:
-    """Sum of the shares of samples in each voxel (Z, H, W, C), float64: a product of rows and columns."""
-    coverage = np.zeros(shape)
-    for plane in range(len(planes)):
-        by_row, by_col = (
-            np.sum([_shares(move, size) for move in axis], axis=0)
-            for axis, size in zip(axis_moves(planes, plane, "bilinear"), shape[1:3], strict=True)
-        )
-        _add_product(coverage[plane], by_row, by_col, cfa)
-    return coverage
-
-
 def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, cfa: str | None) -> None:
     """Add products of values by row (2, H) and column (2, W) of each parity to a plane (H, W, C)."""
     cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
@@ -221,14 +194,6 @@ def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, c
         coverage[..., colour] += (by_row[a][:, None] * by_col[b]).astype(coverage.dtype, copy=False)
     if cfa is None:
         coverage[..., 1:] = coverage[..., :1]  # every pixel has all colours
-
-
-def _shares(move: AxisMoves, size: int) -> np.ndarray:
-    """Sum of shares of the samples of even and of odd pixels in each voxel row (or column), (2, size)."""
-    pixel = np.arange(size) - move.px[:, None]
-    inside = (pixel >= 0) & (pixel < size)
-    weight = np.where(inside, move.weight[:, None], 0)
-    return np.array([np.where(pixel % 2 == parity, weight, 0).sum(axis=0) for parity in (0, 1)])
 
 
 def _coverage(

@@ -27,7 +27,7 @@ def add_rows(running, images, moves, top, start, stop) -> int:
     """
     _, height, width = images.shape
     total, squares, first = running
-    source, row_shift, col_shift, weight, ends = moves
+    source, row_shift, col_shift, ends = moves
     begin = bad = 0
     for g in range(ends.size):
         if squares.size:
@@ -49,7 +49,7 @@ def add_rows(running, images, moves, top, start, stop) -> int:
                     low, high = max(0, shift), min(width, width + shift)
                     if 0 <= at < height and low < high:
                         values = images[source[n], at, low - shift : high - shift]
-                        _add(total[g, line, low:high], values, weight[n])
+                        _add(total[g, line, low:high], values)
         begin = ends[g]
     return bad
 
@@ -83,9 +83,9 @@ def _fill(first, values, shift, low, high) -> None:
 
 
 @helper
-def _add(total, values, weight) -> None:
+def _add(total, values) -> None:
     for x in range(total.size):
-        total[x] += weight * values[x]
+        total[x] += values[x]
 
 
 @helper

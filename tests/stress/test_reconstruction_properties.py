@@ -186,12 +186,10 @@ def test_samples_of_windows_are_those_of_fractions(seed: int, cell: int, window:
 # Sections
 
 
-@given(SEEDS, DEPTHS, st.integers(-800, 400), st.sampled_from(["nearest", "bilinear"]))
-def test_sections_scale_with_the_light(seed: int, z_mm: float, power: int, shifts) -> None:
+@given(SEEDS, DEPTHS, st.integers(-800, 400))
+def test_sections_scale_with_the_light(seed: int, z_mm: float, power: int) -> None:
     light = light_of(SMALL, seed)
-    plain, scaled = (
-        pcii.reconstruct(pcii.Views(light * unit, SMALL), z_mm, shifts=shifts) for unit in (1.0, 2.0**power)
-    )
+    plain, scaled = (pcii.reconstruct(pcii.Views(light * unit, SMALL), z_mm) for unit in (1.0, 2.0**power))
     np.testing.assert_array_equal(plain.counts * 2.0**power, scaled.counts)
     np.testing.assert_array_equal(plain.coverage, scaled.coverage)
 
@@ -208,13 +206,13 @@ def test_variance_does_not_change_with_what_is_added_to_all(seed, z_mm, added, s
     np.testing.assert_array_equal(plain, moved)
 
 
-@given(SEEDS, DEPTHS, st.sampled_from(["nearest", "bilinear"]), st.booleans())
-def test_means_lie_between_the_samples(seed: int, z_mm: float, shifts, single: bool) -> None:
+@given(SEEDS, DEPTHS, st.booleans())
+def test_means_lie_between_the_samples(seed: int, z_mm: float, single: bool) -> None:
     light = np.random.default_rng(seed).uniform(-5, 9, (*SMALL.shape_KLHW, 3))
     light = light.astype(np.float32 if single else np.float64)
-    sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm, shifts=shifts)
-    reached = sections.coverage > 1e-6
-    slack = 1e-4 if single or shifts == "bilinear" else 1e-12
+    sections = pcii.reconstruct(pcii.Views(light, SMALL), z_mm)
+    reached = sections.coverage > 0
+    slack = 1e-4 if single else 1e-12
     assert (sections.estimate[reached] >= light.min() - slack).all()
     assert (sections.estimate[reached] <= light.max() + slack).all()
 

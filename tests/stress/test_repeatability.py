@@ -20,7 +20,6 @@ GRID = pcii.CameraGrid(rows=3, cols=4, pitch_mm=(5.0, 4.0), focal_mm=50.0, pixel
 
 MODES: list[dict[str, Any]] = [
     {"variance": True},
-    {"shifts": "bilinear"},
     {"subpixel": 2, "variance": True},
 ]
 

@@ -149,55 +149,6 @@ def test_variance_of_counts_survives_a_mean_of_a_million_deviations() -> None:
 # Bilinear shifts
 
 
-@given(
-    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
-    pixels=st.tuples(st.integers(1, 7), st.integers(1, 7)),
-    pitch=st.tuples(st.sampled_from([0.25, 0.75, 1.5, 3.0]), st.sampled_from([0.25, 1.25, 2.0])),
-    cfa=patterns,
-    seed=st.integers(0, 999),
-)
-@at_least(150)
-def test_bilinear_shifts_share_each_sample_among_four_voxels(cameras, pixels, pitch, cfa, seed) -> None:
-    grid = unit_grid(*cameras, *pixels, pitch)
-    K, L, H, W = grid.shape_KLHW
-    images = np.random.default_rng(seed).integers(0, 50, (K, L, H, W, 1)).astype(np.float32)
-    C = 3 if cfa else 1
-    sums, shares = np.zeros((H + 99, W + 99, C)), np.zeros((H + 99, W + 99, C))
-    for k, l, i, j in np.ndindex(K, L, H, W):
-        row, col = i + (k - (K - 1) / 2) * pitch[1], j + (l - (L - 1) / 2) * pitch[0]
-        top, left = int(np.floor(row)), int(np.floor(col))
-        for a, b in np.ndindex(2, 2):
-            share = abs(1 - a - (row - top)) * abs(1 - b - (col - left))
-            voxel = (top + a, left + b, colour_of(i, j, cfa))  # pixels outside the section go to the rest
-            sums[voxel] += share * images[k, l, i, j, 0]
-            shares[voxel] += share
-    for views in (images, Reader(images)):
-        sections = reconstruct(Views(views, grid, cfa), 1.0, shifts="bilinear")
-        np.testing.assert_allclose(sections.counts[0], sums[:H, :W], rtol=1e-6, atol=1e-6)
-        np.testing.assert_allclose(sections.coverage[0], shares[:H, :W], rtol=1e-12, atol=1e-12)
-    whole = unit_grid(*cameras, *pixels, (2.0, 4.0))  # an even shift, of each camera of an odd or even grid
-    for z in (1.0, 0.5):
-        near, shared = (
-            reconstruct(Views(images, whole, cfa), z, shifts=shifts) for shifts in ("nearest", "bilinear")
-        )
-        np.testing.assert_array_equal(near.counts, shared.counts)
-        np.testing.assert_array_equal(near.coverage, shared.coverage)
-
-
-def test_a_slope_is_exact_with_bilinear_shifts_only() -> None:
-    # The plane's brightness rises evenly: what lies between two pixels is their weighted mean.
-    grid = unit_grid(4, 6, 30, 40, (1.0, 1.3))  # half pixels to the side, which rounding makes whole ones
-    i, j = np.mgrid[:30, :40]
-    views = np.array(
-        [[2.0 * (i + (k - 1.5) * 1.3) + 5.0 * (j + l - 2.5) for l in range(6)] for k in range(4)]
-    )
-    sections = reconstruct(Views(views[..., None], grid), 1.0, shifts="bilinear")
-    inner = (0, slice(5, 25), slice(5, 35), 0)
-    np.testing.assert_allclose(sections.estimate[inner], (2.0 * i + 5.0 * j)[inner[1:3]], rtol=1e-12)
-    nearest = reconstruct(Views(views[..., None], grid), 1.0)
-    assert np.abs(nearest.estimate[inner] - (2.0 * i + 5.0 * j)[inner[1:3]]).max() > 0.1
-
-
 # Even shifts: the paper's order
 
 
@@ -241,9 +192,8 @@ def test_the_papers_order_finds_the_colours_of_a_plane() -> None:
 
 
 CLASHES = [
-    ({"shifts": "cubic"}, "shifts: use 'nearest', 'bilinear' or 'even'"),
+    ({"shifts": "cubic"}, "shifts: use 'nearest' or 'even'"),
     ({"shifts": "even", "subpixel": 2}, "shifts: 'even' is for whole pixels"),
-    ({"shifts": "bilinear", "variance": True}, "variance: samples that are shared"),
 ]
 
 
@@ -254,11 +204,9 @@ def test_options_that_do_not_go_together_are_refused(options, words) -> None:
         reconstruct(Views(np.ones((2, 2, 4, 4, 1)), grid, "GRBG"), 1.0, **options)
 
 
-def test_neither_counts_are_interpolated_nor_colourless_data_demosaiced() -> None:
+def test_colourless_data_are_not_demosaiced() -> None:
     grid = unit_grid(2, 2, 4, 4)
     counts = PhotonCounts.from_dense(np.ones((2, 2, 4, 4), dtype=np.int64), grid)
-    with pytest.raises(InputError, match="photon counts are never interpolated"):
-        reconstruct(counts, 1.0, shifts="bilinear")
     with pytest.raises(InputError, match="'even' is for Bayer mosaics"):
         reconstruct(counts, 1.0, shifts="even")
 

@@ -178,22 +178,11 @@ def test_the_largest_counts_of_a_dtype_add_up_exactly(dtype):
     assert set(np.unique(sections.estimate)) <= {0.0, float(most)}
 
 
-@pytest.mark.parametrize("cfa", ["GRBG", None])
-def test_views_normalisation_divides_by_the_number_of_cameras(cfa):
-    grid = unit_grid(2, 3, 6, 6, pitch_mm=(1.0, 1.0))
-    counts = photons(random_counts(grid, seed=2), grid, cfa)
-    paper = reconstruct(counts, 1.0, normalisation="views")
-    np.testing.assert_array_equal(paper.estimate, paper.counts / 6)
-    assert cfa is None or paper.coverage.max() < 6  # no voxel has one colour from all cameras here
-
-
-def test_views_normalisation_darkens_the_border_and_overlap_does_not():
+def test_a_voxel_is_divided_by_the_samples_that_reach_it():
     grid = unit_grid(2, 3, 6, 6, pitch_mm=(2.0, 2.0))
-    counts = photons(np.full(grid.shape_KLHW, 3), grid)
-    paper, ours = (reconstruct(counts, 1.0, normalisation=name).estimate[0] for name in ("views", "overlap"))
-    assert set(ours.ravel()) == {3.0}
-    assert paper[3, 3, 0] == 3.0
-    assert paper[0, 0, 0] == 3.0 * 2 / 6  # only cameras (0, 0) and (0, 1) reach the corner
+    sections = reconstruct(photons(np.full(grid.shape_KLHW, 3), grid), 1.0)
+    assert set(sections.estimate.ravel()) == {3.0}
+    assert sections.coverage[0, 0, 0] == 2  # only cameras (0, 0) and (0, 1) reach the corner
 
 
 def test_a_streamed_stack_is_the_stack():
@@ -239,13 +228,6 @@ def test_a_subpixel_division_that_cannot_be_is_refused(bad):
 def test_a_subpixel_division_may_come_from_an_array():
     counts = photons(np.ones((1, 1, 2, 2), dtype=int), unit_grid(1, 1, 2, 2))
     assert reconstruct(counts, 1.0, subpixel=np.arange(3)[2]).counts.shape == (1, 4, 4, 1)
-
-
-def test_an_unknown_normalisation_is_refused():
-    grid = unit_grid(1, 1, 2, 2)
-    unknown: Any = "sum"
-    with pytest.raises(InputError, match=r"^normalisation: use 'overlap' or 'views'"):
-        reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), 1.0, normalisation=unknown)
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
