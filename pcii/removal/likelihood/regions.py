@@ -57,18 +57,19 @@ class Planes:
     """Which of the searched depths count as which plane.
 
     `nearest` (Z,) is the plane (P,) that each searched spread is closest to, `away_px` (Z,) how far in px of
-    total spread. Within `near_px` a depth is the plane's, within `far_px` still in its focus.
+    total spread. Within `far_px` a depth is in the plane's focus; the plane's own it is if it is `sure` (Z,)
+    bool, so near it and so far from others that none of them can be meant.
     """
 
     spread_px: np.ndarray
     nearest: np.ndarray
     away_px: np.ndarray
-    near_px: float
+    sure: np.ndarray
     far_px: float
 
     def close_to(self, plane: int) -> np.ndarray:
-        """Which searched depths are the plane's, (Z,) bool."""
-        return (self.nearest == plane) & (self.away_px <= self.near_px)
+        """Which searched depths are the plane's own, (Z,) bool."""
+        return (self.nearest == plane) & self.sure
 
     def within(self, plane: int) -> np.ndarray:
         """Which are in its focus, (Z,) bool."""
@@ -114,15 +115,13 @@ def settled(plane: np.ndarray, bright: np.ndarray, focus: FocusEvidence, planes:
     plane = plane.copy()
     for _ in range(ROUNDS):
         pieces = [
-            (int(piece.sum()), int(own), box, piece)
+            (int(own), box, piece)
             for own in np.unique(plane[bright])
             for box, piece in _pieces(bright & (plane == own))
         ]
-        size = np.zeros(plane.shape, np.int64)
-        for cells, _, box, piece in pieces:
-            size[box][piece] = cells
-        pieces.sort(key=lambda found: found[0])
-        moved = [_join(plane, bright, size, focus, planes, own, box, piece) for _, own, box, piece in pieces]
+        # A piece that another plane explains better goes first: what is right about it may be smaller.
+        pieces.sort(key=lambda found: _own_gain(plane, bright, focus, planes, *found)[0])
+        moved = [_join(plane, bright, focus, planes, *found) for found in pieces]
         if not any(moved):
             break
     return plane
@@ -131,25 +130,38 @@ def settled(plane: np.ndarray, bright: np.ndarray, focus: FocusEvidence, planes:
 def _join(
     plane: np.ndarray,
     bright: np.ndarray,
-    size: np.ndarray,
     focus: FocusEvidence,
     planes: Planes,
     own: int,
     box: tuple[slice, slice],
     piece: np.ndarray,
 ) -> bool:
-    """Give a piece to the larger neighbour it borders on most, unless it gains enough by its own plane."""
-    ring = dilated(piece, 1) & ~piece & bright[box] & (size[box] > piece.sum()) & (plane[box] != own)
-    if not ring.any():
+    """Give a piece to the plane it borders on most, unless it gains enough by its own."""
+    gain, border, other = _own_gain(plane, bright, focus, planes, own, box, piece)
+    if border == 0 or (piece.sum() >= OWN_OPINION_CELLS and gain >= OUTLINE_NATS * border + SURE_NATS):
         return False
+    plane[box][piece] = other
+    return True
+
+
+def _own_gain(
+    plane: np.ndarray,
+    bright: np.ndarray,
+    focus: FocusEvidence,
+    planes: Planes,
+    own: int,
+    box: tuple[slice, slice],
+    piece: np.ndarray,
+) -> tuple[float, int, int]:
+    """Nats that a piece gains by its own plane over the one it borders on most; on how many cells; which."""
+    ring = dilated(piece, 1) & ~piece & bright[box] & (plane[box] != own)
+    if not ring.any():
+        return np.inf, 0, own
     names, numbers = np.unique(plane[box][ring], return_counts=True)
     other = int(names[np.argmax(numbers)])
     evidence = _evidence(focus, box, piece, bright)
     gain = evidence[_depths(planes, own)].max() - evidence[_depths(planes, other)].max()
-    if piece.sum() >= OWN_OPINION_CELLS and gain >= OUTLINE_NATS * int(ring.sum()) + SURE_NATS:
-        return False
-    plane[box][piece] = other
-    return True
+    return float(gain), int(ring.sum()), other
 
 
 def _depths(planes: Planes, plane: int) -> np.ndarray:

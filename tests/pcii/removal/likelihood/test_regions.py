@@ -5,6 +5,7 @@ from twins import even_light, paper_grid, unit_grid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.evidence.focus_likelihood import FocusEvidence, focus_evidence
 from pcii.evidence.half_agreement import Halves, Products, halves_of
+from pcii.removal.likelihood.likelihood_method import searched_planes
 from pcii.removal.likelihood.regions import (
     Planes,
     bright_cells,
@@ -23,7 +24,7 @@ PLANES = Planes(
     spread_px=SPREAD_PX,
     nearest=np.array([0, 0, 0, 1, 1]),
     away_px=np.array([10.5, 0.0, 10.5, 0.0, 20.0]),
-    near_px=4.5,
+    sure=np.array([False, True, False, True, False]),
     far_px=10.0,
 )
 FIRST, BETWEEN, SECOND = 1, 2, 3
@@ -131,6 +132,36 @@ def test_a_weak_piece_joins_its_neighbour():
     result = settled(plane, large | small, focus, PLANES)
     assert (result[large | small] == 0).all()
     assert (plane[small] == 1).all()  # what was given is left as it was
+
+
+def test_a_weak_piece_joins_a_smaller_one_that_is_sure():
+    weak, sure = box(5, 5, 12, 12), box(5, 17, 9, 3)
+    focus = focus_with((FIRST, weak, 3.0), (SECOND, sure, 300.0))
+    result = settled(np.where(sure, 1, 0), weak | sure, focus, PLANES)
+    assert (result[weak | sure] == 1).all()
+
+
+def test_a_piece_is_what_explains_it_better_though_only_a_speck_beside_it_shows_that_plane():
+    mistaken, speck = box(5, 5, 12, 12), box(5, 17, 4, 4)
+    focus = focus_with((FIRST, mistaken, 300.0), (SECOND, mistaken, 400.0), (SECOND, speck, 30.0))
+    result = settled(np.where(speck, 1, 0), mistaken | speck, focus, PLANES)
+    assert (result[mistaken | speck] == 1).all()
+
+
+@pytest.mark.parametrize(("spread_px", "stays"), [(26.0, True), (28.6, True), (30.0, False)])
+def test_what_shows_best_midway_between_planes_is_no_reason_to_part_a_thing(spread_px, stays):
+    # Planes at 28.6 and 34 px of total spread: what shows best at 30 px may be at 32, nearer the other.
+    thing, rim = box(5, 5, 12, 12), box(5, 17, 9, 3)
+    planes = searched_planes(np.array([28.6, 34.0]))
+    gain = np.zeros((planes.spread_px.size, *SHAPE), np.float32)
+    shown = int(np.argmin(np.abs(planes.spread_px - spread_px)))
+    for depth, where in ((shown, rim), (int(np.argmin(np.abs(planes.spread_px - 34.0))), thing)):
+        gain[depth][where] = 10.0
+    searched = FocalPlanes.at_total_disparity(SEARCHED.grid, planes.spread_px)
+    focus = FocusEvidence(searched, gain, np.zeros((len(gain), 1, *SHAPE), np.float32))
+    result = settled(np.where(rim, 0, 1), thing | rim, focus, planes)
+    assert (result[rim] == (0 if stays else 1)).all()
+    assert (result[thing] == 1).all()
 
 
 def test_a_strong_piece_stays():
@@ -258,7 +289,7 @@ def test_noise_alone_is_never_sure(photons_per_px):
     # a plane's. Five films are at most 55 trials, of which e^-10 is not one.
     size, spread_px = 256, np.arange(60.0, 140.0, 2.0)
     away = np.abs(spread_px - 100)
-    planes = Planes(spread_px, np.zeros(away.size, np.int64), away, near_px=4.5, far_px=10.0)
+    planes = Planes(spread_px, np.zeros(away.size, np.int64), away, sure=away <= 4.5, far_px=10.0)
     everything = np.ones((size // 4, size // 4), dtype=bool)
     grid = paper_grid(size, size)
     for seed in range(5):
