@@ -189,19 +189,25 @@ def works(tmp_path: Path) -> list[str]:
     return [sys.executable, str(tmp_path / "works.py")]
 
 
-@pytest.mark.parametrize("bars", ["--bars", "--no-bars"])
-def test_compiling_is_told_once_per_machine(works: list[str], bars: str, tmp_path: Path) -> None:
+def said_twice(command: list[str], tmp_path: Path, output: str) -> list[str]:
+    """Standard error of two runs of a command with a cache of loops, empty at first; both print `output`."""
     said = []
     for _ in range(2):
         process = subprocess.run(
-            [*works, "work", bars],
+            command,
             env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
             capture_output=True,
             text=True,
             check=True,
         )
-        assert process.stdout == "8\n"
+        assert process.stdout == output
         said.append(process.stderr)
+    return said
+
+
+@pytest.mark.parametrize("bars", ["--bars", "--no-bars"])
+def test_compiling_is_told_once_per_machine(works: list[str], bars: str, tmp_path: Path) -> None:
+    said = said_twice([*works, "work", bars], tmp_path, output="8\n")
     assert said == ["compiling (once per machine)\n", ""]
 
 
@@ -231,16 +237,6 @@ def test_a_program_that_imports_the_package_is_told_once_that_loops_are_compiled
     works: list[str], tmp_path: Path
 ) -> None:
     (tmp_path / "program.py").write_text(AS_LIBRARY)
-    said = []
-    for _ in range(2):
-        process = subprocess.run(
-            [sys.executable, str(tmp_path / "program.py")],
-            env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert process.stdout == ""
-        said.append(process.stderr)
+    said = said_twice([sys.executable, str(tmp_path / "program.py")], tmp_path, output="")
     line = "pcii: compiling (once per machine), which takes up to a minute\n"
     assert said == [f"now the package\n{line}", "now the package\n"]

@@ -186,7 +186,7 @@ def checked(
 ) -> tuple[tuple[float, ...], str | None]:
     """Depths at which things are sharpest, and a warning with what mends it, or None.
 
-    Cameras that the source tells itself are not doubted, nor are depths searched if it tells those too.
+    Cameras that the source itself specifies are not questioned; if it specifies depths, none are searched.
     """
     if imported.z_mm:
         return (), None

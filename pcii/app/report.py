@@ -59,7 +59,7 @@ def _content(outcome: Outcome, asked_px: float | None, report: Report) -> dict[s
         "photons": dataset.counts.total if dataset.has_counts else None,
         "has_radiance": dataset.views is not None,
         "has_truth": truth is not None,
-        "has_objects": truth is not None and bool((truth.object_id > 0).any()),
+        "has_objects": truth is not None and truth.has_objects,
         "is_paper": _is_paper(outcome),
         "paper_table1": PAPER_TABLE_1,
         "facts": key_facts(outcome),

@@ -202,7 +202,7 @@ def depth_error_mm(outcome: Outcome, crop: Crop) -> tuple[np.ndarray, float]:
 
 def _true_depth_words(truth: Truth) -> str:
     """What a picture of `Truth.object_z_mm` shows."""
-    return "true depth of the objects" if (truth.object_id > 0).any() else "true depth"
+    return "true depth of the objects" if truth.has_objects else "true depth"
 
 
 def _section_images(sections: Sections, crop: Crop, smoothing_px: float) -> list[np.ndarray]:
@@ -238,7 +238,7 @@ def _interesting_part(grid: CameraGrid, truth: Truth | None, focus: Sequence[Seg
 
     Without methods it is the whole image.
     """
-    if truth is not None and (truth.object_id > 0).any():
+    if truth is not None and truth.has_objects:
         return truth.object_id > 0
     if not focus:
         return np.ones((grid.height, grid.width), dtype=bool)

@@ -163,7 +163,7 @@ def _readings(outcome: Outcome) -> list[tuple[str, str]]:
     if truth is not None:
         readings += [("truth", "true depth"), ("error", "error")]
     readings.append(("confidence", "confidence"))
-    if truth is not None and (truth.object_id > 0).any():
+    if truth is not None and truth.has_objects:
         readings.append(("object", "object"))
     in_section = ("counts", "photons in the section")
     return [*readings, in_section if outcome.dataset.has_counts else ("light", "light, share of the most")]

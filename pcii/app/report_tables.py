@@ -126,8 +126,9 @@ def _bias(value: str, error_mm: float) -> str:
 def depth_table(outcome: Outcome) -> Table:
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
-    has_objects = truth is not None and bool((truth.object_id > 0).any())
-    where = "the objects' pixels" if has_objects else "all pixels with a true depth"
+    where = (
+        "the objects' pixels" if truth is not None and truth.has_objects else "all pixels with a true depth"
+    )
     rows: list[tuple[str, str]] = []
     if depth["coverage"] is not None:
         rows.append((f"share with an estimate, of {where}", _percent(depth["coverage"])))

@@ -3,7 +3,8 @@
 Modules of loops are imported where a loop is about to run and not with the package: importing Numba takes
 longer than the rest of the package. Compiled code is cached beside these files, or in the user's cache where
 that is not writable, so each loop is compiled once per machine. All loops together take half a minute, so
-it is reported (`progress`), by commands and in a line of a program that imports this package.
+it is announced (`progress`): as a stage of a command, and in one line where another program imports this
+package.
 
 Loops are shared among threads by ranges of their outermost index (`in_threads`). Numba's own parallel loops
 take twice as long to compile, and their OpenMP threads do not survive a fork.

@@ -9,7 +9,7 @@ from pcii.base.jobs import AGAIN_S, Done, Job, attempt
 from pcii.base.progress import Report, silent
 
 MOST_WORKERS = 1024
-"""More are taken for a slip: no machine has so many cores."""
+"""More are rejected as a typing error: no machine has so many cores."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Crew:
             raise InputError("resource: workers of a cluster have such; give its scheduler too")
 
     def run(self, job: Job, pieces: Sequence[int], report: Report = silent) -> Generator[Done]:
-        """Do these pieces and yield each when it is done; `report` is told while a cluster has no workers.
+        """Do these pieces and yield each when it is done; `report` is called while a cluster has no workers.
 
         Raises what is no fault of a single piece, such as a full disk, `InputError` if there is no such
         cluster, and ConnectionError if its scheduler ends meanwhile.

@@ -49,7 +49,7 @@ def run_on_cluster(
         except (OSError, ValueError) as fault:
             raise InputError(f"scheduler: none answers at {address} ({fault})") from None
         installed = f"{type(job).__name__}-{uuid4().hex}"
-        with _loss_said(client, address), client, _on_all_workers(client, job, installed):
+        with _loss_reported(client, address), client, _on_all_workers(client, job, installed):
             wanted = None if resource is None else {resource: 1}
             command = f"dask worker {address} --nthreads 1{f' --resources {resource}=1' if resource else ''}"
             ahead, running, ended = deque(pieces), dict[Any, int](), SimpleQueue[Any]()
@@ -106,8 +106,8 @@ def _without_messages_of_dask() -> Iterator[None]:
 
 
 @contextmanager
-def _loss_said(client: Any, address: str) -> Iterator[None]:
-    """Say in one sentence that the scheduler is gone, whatever Dask raises of that within the block."""
+def _loss_reported(client: Any, address: str) -> Iterator[None]:
+    """Raise one ConnectionResetError for the various exceptions that Dask raises when its scheduler ends."""
     from distributed import CancelledError
     from distributed.comm.core import CommClosedError
 
@@ -126,7 +126,7 @@ def _loss_said(client: Any, address: str) -> Iterator[None]:
 
 def _has_workers(client: Any, resource: str | None) -> bool:
     """Whether the cluster has workers, with this resource if it is given."""
-    # Not client.scheduler_info(), which tells of some workers alone in some versions.
+    # Not client.scheduler_info(), which lists only a few of the workers in some versions.
     workers = client.sync(client.scheduler.identity)["workers"].values()
     return any(resource is None or resource in worker["resources"] for worker in workers)
 

@@ -112,8 +112,8 @@ class Stages(AbstractContextManager["Stages"]):
 COMPILING = "compiling (once per machine)"
 _showing: list[Stages] = []
 """Active progress displays; compilation is reported to the last. Empty where `pcii` is used as a library."""
-_told: list[None] = []
-"""Not empty once this process has said that it compiles, without a display."""
+_announced: list[None] = []
+"""Not empty once this process, without a display, has announced that loops are compiled."""
 
 
 @contextmanager
@@ -133,10 +133,10 @@ def report_compiling(loops: int, *, running: bool, own: bool) -> None:
     """
     if _showing:
         _showing[-1].compiling(loops, running)
-    elif own and not _told:
+    elif own and not _announced:
         from multiprocessing import parent_process
 
-        _told.append(None)
+        _announced.append(None)
         if parent_process() is None:  # else each of many workers would say so
             print(f"pcii: {COMPILING}, which takes up to a minute", file=sys.stderr, flush=True)
 

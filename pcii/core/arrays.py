@@ -12,7 +12,7 @@ LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 LARGEST_TOTAL = (1 << 63) - 1
 MOST_DEPTHS = 10_000
-"""More that are typed or stored are taken for a slip."""
+"""Longer lists, typed or stored, are rejected as errors: no stack has so many sections."""
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

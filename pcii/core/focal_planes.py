@@ -135,8 +135,8 @@ class FocalPlanes(Brief):
         """Voxel rows (Z, K, H) and columns (Z, L, W), int32, to which pixels of each camera belong.
 
         With `subpixel` = 1 every camera moves by a multiple of `step_px` pixels; with M > 1 the centre of
-        pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M). Pixels that fall outside the section
-        have an index below 0, or not below its size.
+        pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M), 1/2 being the `rounding`. Pixels that
+        fall outside the section have an index below 0, or not below its size.
         """
         height, width = self.grid.height, self.grid.width
         if subpixel == 1:
@@ -145,7 +145,7 @@ class FocalPlanes(Brief):
         else:
             rows, cols = self.exact_shifts_px
             indices = (
-                np.floor((np.arange(size) + 0.5 + shifts[..., None]) * subpixel)
+                np.floor((np.arange(size) + self.rounding + shifts[..., None]) * subpixel)
                 for size, shifts in ((height, rows), (width, cols))
             )
         # Far outside the section indices may exceed 32 bits.

@@ -81,10 +81,14 @@ class Truth(Brief):
         return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
 
     @property
+    def has_objects(self) -> bool:
+        """Whether a pixel shows an object."""
+        return bool((self.object_id > 0).any())
+
+    @property
     def object_z_mm(self) -> np.ndarray:
         """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
-        on_object = self.object_id > 0
-        return np.where(on_object, self.z_mm, np.inf) if on_object.any() else self.z_mm
+        return np.where(self.object_id > 0, self.z_mm, np.inf) if self.has_objects else self.z_mm
 
     def plot(
         self,
@@ -101,7 +105,7 @@ class Truth(Brief):
         from pcii.figures.panels import several_axes
 
         panels = several_axes(axes, 2, self.z_mm.shape)
-        title = "true depth of the objects" if (self.object_id > 0).any() else "true depth"
+        title = "true depth of the objects" if self.has_objects else "true depth"
         draw_depth(panels[0], self.object_z_mm, None, z_range_mm, title)
         draw_objects(panels[1], self.object_id, self.names)
         return panels

@@ -187,8 +187,10 @@ def _means(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             continue
         if name in SIGNED:
             mean = mean_interval(known)
+        elif name in SHARES:
+            mean = mean_interval(known, (0.0, 1.0))
         else:
-            mean = mean_interval(known, (0.0, 1.0)) if name in SHARES else positive_mean_interval(known)
+            mean = positive_mean_interval(known)
         means[name] = mean.figures()
     return means
 

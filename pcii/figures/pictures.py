@@ -72,8 +72,8 @@ def depth_image(
 ) -> np.ndarray:
     """Depth in viridis from near (bright) to far (dark), 8-bit RGB (H, W, 3); black where not finite.
 
-    With `confidence` (H, W), from 0 to 1, colours are the greyer the less sure a depth is: were they darker,
-    what is far could not be told from what is unsure, and both not from black.
+    With `confidence` (H, W), from 0 to 1, colours are the greyer the less sure a depth is: darker ones would
+    look like those of far depths, or like black.
     """
     from matplotlib import colormaps
 

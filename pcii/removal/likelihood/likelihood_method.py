@@ -5,8 +5,8 @@
    edges.
 2. Each cell of 4 px takes the requested plane that has most of it, and every change costs (`best_labels`).
 3. Connected pieces of what is bright are judged as wholes: a piece without evidence of its own joins its
-   neighbour (what shows best midway between planes speaks for neither), and one that a depth far from every
-   plane explains surely better is defocused.
+   neighbour (evidence that is largest midway between two planes counts for neither), and one that a depth far
+   from every plane explains surely better is defocused.
    (`pcii.removal.likelihood.regions`)
 4. Where pieces of several planes touch they are compared photon by photon: what does each of their depths
    predict of it that the others do not? (`duel`)
@@ -66,8 +66,9 @@ FOCUS_PX = 10.0
 """A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
 seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 MISPLACED_PX = 1.0 + SEARCH_STEP_PX / 2
-"""A surface may show best at a searched depth so far from its own: cameras move by whole pixels, so that
-those at either end are half a pixel off, and depths are searched in steps."""
+"""Largest distance, in px of total spread, between a surface and the searched depth at which its evidence is
+largest: 1 px, since the whole-pixel shifts of the cameras at both ends are half a pixel off, and half a step
+of the search."""
 STEP_NATS = 0.05
 OUTLINE_CELLS = 3
 """Between things that layers told apart a border is theirs; outlines are drawn this near to the dark."""
@@ -138,7 +139,7 @@ def searched_planes(own_spread_px: np.ndarray) -> Planes:
     spread = np.sort(np.concatenate([own_spread_px, between[apart >= SEARCH_STEP_PX / 2]]))
     away = np.abs(spread[:, None] - own_spread_px[None])
     nearest, away_px = np.argmin(away, axis=1), away.min(axis=1)
-    # What is midway between planes may be either's, but where a plane is it speaks for itself.
+    # A depth midway between planes may be of a surface at either; that of a plane is its own.
     alone = (away <= away_px[:, None] + 2 * MISPLACED_PX).sum(axis=1) == 1
     sure = (away_px <= NEAR_PX) & (alone | (away_px == 0))
     return Planes(spread, nearest, away_px, sure, FOCUS_PX)

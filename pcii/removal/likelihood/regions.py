@@ -6,6 +6,7 @@ its neighbour's; a region that some depth far from every plane explains surely b
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,7 +59,7 @@ class Planes:
 
     `nearest` (Z,) is the plane (P,) that each searched spread is closest to, `away_px` (Z,) how far in px of
     total spread. Within `far_px` a depth is in the plane's focus; the plane's own it is if it is `sure` (Z,)
-    bool, so near it and so far from others that none of them can be meant.
+    bool: so near it, and so far from all others, that a surface which shows best there is none of theirs.
     """
 
     spread_px: np.ndarray
@@ -110,62 +111,56 @@ def _typical_around(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     return np.exp(np.divide(logarithm, share, where=some, out=np.full(where.shape, np.inf)))
 
 
+class _Piece(NamedTuple):
+    """Connected bright cells of a plane, bool within `box`, and their `_evidence` (Z,)."""
+
+    own: int
+    box: tuple[slice, slice]
+    cells: np.ndarray
+    evidence: np.ndarray
+
+
 def settled(plane: np.ndarray, bright: np.ndarray, focus: FocusEvidence, planes: Planes) -> np.ndarray:
     """The planes (h, w) of cells, -1 for none, after pieces without evidence of their own joined others."""
     plane = plane.copy()
     for _ in range(ROUNDS):
         pieces = [
-            (int(own), box, piece)
+            _Piece(int(own), box, cells, _evidence(focus, box, cells, bright))
             for own in np.unique(plane[bright])
-            for box, piece in _pieces(bright & (plane == own))
+            for box, cells in _pieces(bright & (plane == own))
         ]
         # A piece that another plane explains better goes first: what is right about it may be smaller.
-        pieces.sort(key=lambda found: _own_gain(plane, bright, focus, planes, *found)[0])
-        moved = [_join(plane, bright, focus, planes, *found) for found in pieces]
+        pieces.sort(key=lambda piece: _own_gain(plane, bright, planes, piece)[0])
+        moved = [_join(plane, bright, planes, piece) for piece in pieces]
         if not any(moved):
             break
     return plane
 
 
-def _join(
-    plane: np.ndarray,
-    bright: np.ndarray,
-    focus: FocusEvidence,
-    planes: Planes,
-    own: int,
-    box: tuple[slice, slice],
-    piece: np.ndarray,
-) -> bool:
+def _join(plane: np.ndarray, bright: np.ndarray, planes: Planes, piece: _Piece) -> bool:
     """Give a piece to the plane it borders on most, unless it gains enough by its own."""
-    gain, border, other = _own_gain(plane, bright, focus, planes, own, box, piece)
-    if border == 0 or (piece.sum() >= OWN_OPINION_CELLS and gain >= OUTLINE_NATS * border + SURE_NATS):
+    gain, border, other = _own_gain(plane, bright, planes, piece)
+    has_opinion = piece.cells.sum() >= OWN_OPINION_CELLS
+    if border == 0 or (has_opinion and gain >= OUTLINE_NATS * border + SURE_NATS):
         return False
-    plane[box][piece] = other
+    plane[piece.box][piece.cells] = other
     return True
 
 
-def _own_gain(
-    plane: np.ndarray,
-    bright: np.ndarray,
-    focus: FocusEvidence,
-    planes: Planes,
-    own: int,
-    box: tuple[slice, slice],
-    piece: np.ndarray,
-) -> tuple[float, int, int]:
+def _own_gain(plane: np.ndarray, bright: np.ndarray, planes: Planes, piece: _Piece) -> tuple[float, int, int]:
     """Nats that a piece gains by its own plane over the one it borders on most; on how many cells; which."""
-    ring = dilated(piece, 1) & ~piece & bright[box] & (plane[box] != own)
+    box = piece.box
+    ring = dilated(piece.cells, 1) & ~piece.cells & bright[box] & (plane[box] != piece.own)
     if not ring.any():
-        return np.inf, 0, own
+        return np.inf, 0, piece.own
     names, numbers = np.unique(plane[box][ring], return_counts=True)
     other = int(names[np.argmax(numbers)])
-    evidence = _evidence(focus, box, piece, bright)
-    gain = evidence[_depths(planes, own)].max() - evidence[_depths(planes, other)].max()
-    return float(gain), int(ring.sum()), other
+    own_nats, other_nats = (piece.evidence[_depths(planes, each)].max() for each in (piece.own, other))
+    return float(own_nats - other_nats), int(ring.sum()), other
 
 
 def _depths(planes: Planes, plane: int) -> np.ndarray:
-    """The searched depths that speak for a plane; for none (-1), those in the focus of no plane."""
+    """The searched depths whose evidence is of a plane; for none (-1), those in the focus of no plane."""
     return planes.close_to(plane) if plane >= 0 else planes.away_px > planes.far_px
 
 
