@@ -14,7 +14,7 @@ from matplotlib import pyplot as plt
 
 import pcii
 from pcii.figures.pictures import to_srgb8, white_level
-from pcii.metrics.scoring import object_masks
+from pcii.metrics.true_masks import TrueFocus
 
 WINDOW = np.s_[330:700, 180:850]
 
@@ -26,7 +26,7 @@ def main(dataset: Path) -> None:
         raise SystemExit(f"{dataset}: has no truth")
     z_mm = data.analysis["z_mm"]
     focus = pcii.segment(data.counts, z_mm, method="three-step")
-    truth = object_masks(data.grid, data.truth, focus.z_mm)
+    truth = TrueFocus(data.grid, data.truth, focus.z_mm).by_object
     steps = focus.steps
     estimate = focus.sections.estimate
     white = white_level(estimate[0], (slice(None), slice(None)))

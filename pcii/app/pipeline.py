@@ -32,6 +32,8 @@ class Outcome:
     focus: tuple[Segmented, ...]
     depth: DepthMap
     score: Score
+    z_range_mm: tuple[float, float]
+    """Nearest and farthest depth that was searched."""
     timings_s: dict[str, float] = field(default_factory=dict)
     kept: tuple[str, ...] = ()
     """Steps whose results are those of an earlier run; `timings_s` is how long they took then."""
@@ -54,15 +56,18 @@ def analyse(
     counts and radiance, and for an unknown method or one of which there are no counts.
     """
     seconds: dict[str, float] = {}
-    planes, z_range = planes_of(dataset, z_mm), depth_range_of(dataset, z_mm)
+    planes = planes_of(dataset, z_mm)
+    z_range_mm = depth_range_of(dataset, planes)
     has_counts = dataset.has_counts or dataset.views is None or bool(methods)
-    chosen = tuple(dict.fromkeys(methods or (DEFAULT_METHODS if has_counts else ())))
+    chosen = methods or (DEFAULT_METHODS if has_counts else ())
+    # Unknown names are reported before any work.
+    removals = {method: find_method(method) for method in chosen}
     counts = dataset.counts if has_counts else None
     seen = dataset.counts_or_views if counts is None else counts
-    find_depth_method(depth_method, seen)  # an unknown name is reported before any work
+    find_depth_method(depth_method, seen)
     if counts is not None:
         check_depth_counts(counts)
-    total = 4 + len(chosen)
+    total = 4 + len(removals)
     done = 0
 
     def finished(name: str, result: tuple[Made, float]) -> Made:
@@ -81,20 +86,22 @@ def analyse(
     else:
         sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
     focus: list[Segmented] = []
-    steps.begin(chosen)
+    steps.begin(removals)
     # Depth needs nothing of the other steps, and most of its time leaves the interpreter to them.
     with ThreadPoolExecutor(1) as beside:
-        map_depth = partial(estimate_depth, seen, z_range, method=depth_method)
-        mapped = beside.submit(steps.depth, depth_method, z_range, map_depth)
-        for method in chosen:
+        map_depth = partial(estimate_depth, seen, z_range_mm, method=depth_method)
+        mapped = beside.submit(steps.depth, depth_method, z_range_mm, map_depth)
+        for method, remove_by in removals.items():
             assert counts is not None
-            remove = partial(find_method(method), counts, sections)
+            remove = partial(remove_by, counts, sections)
             focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
         depth = finished(DEPTH_STEP, mapped.result())
     scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
     result = finished("score", timed(lambda: scored(dataset=dataset.name)))
     kept = tuple(step for step in seconds if step in steps.kept())
-    return Outcome(dataset, full_light, sections, tuple(focus), depth, result, seconds, kept, depth_method)
+    return Outcome(
+        dataset, full_light, sections, tuple(focus), depth, result, z_range_mm, seconds, kept, depth_method
+    )
 
 
 def full_light_sections(dataset: Dataset, planes: FocalPlanes, report: Report = silent) -> Sections | None:

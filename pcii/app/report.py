@@ -10,22 +10,13 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import (
-    Crop,
-    crop_of,
-    depth_error_mm,
-    depth_panels,
-    figure6,
-    figure7,
-    smoothing_of,
-)
+from pcii.app.report_figures import Crop, Shown, depth_panels, figure6, figure7
 from pcii.app.report_origin import origin
 from pcii.app.report_slider import slider
 from pcii.app.report_tables import depth_table, key_facts, score_table, table1
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.pages import page
-from pcii.io.suggested_depths import depth_range_of
 
 PAPER_SCENE, PAPER_PLANES_MM = "two_objects", [540.0, 620.0]
 PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
@@ -47,11 +38,8 @@ def write_report(
 
 
 def _content(outcome: Outcome, asked_px: float | None, report: Report) -> dict[str, Any]:
-    dataset = outcome.dataset
-    manifest, crop = dataset.manifest, crop_of(outcome)
-    z_mm = outcome.sections.z_mm.tolist()
-    truth = dataset.truth
-    smoothing_px = smoothing_of(outcome, crop, asked_px)
+    dataset, shown = outcome.dataset, Shown.of(outcome, asked_px)
+    manifest, truth, crop = dataset.manifest, dataset.truth, shown.crop
     return {
         "title": manifest.get("title") or dataset.name,
         "grid": dataset.grid,
@@ -69,14 +57,14 @@ def _content(outcome: Outcome, asked_px: float | None, report: Report) -> dict[s
             "height": crop.height_px,
             "is_coarse": max(crop.width_px, crop.height_px) < COARSE_PX,
         },
-        "smoothing_px": smoothing_px,
-        "slider": slider(outcome, crop, smoothing_px, report),
-        "figure6": figure6(outcome, crop, smoothing_px),
-        "figure7": figure7(outcome, crop, smoothing_px),
-        "depth": depth_panels(outcome, crop),
+        "smoothing_px": shown.smoothing_px,
+        "slider": slider(shown, report),
+        "figure6": figure6(shown),
+        "figure7": figure7(shown),
+        "depth": depth_panels(shown),
         "has_depths": bool(np.isfinite(outcome.depth.z_mm).any()),
-        "depth_range": [f"{z:g}" for z in depth_range_of(dataset, z_mm)],
-        "error_limit": f"{depth_error_mm(outcome, crop)[1]:g}" if truth is not None else None,
+        "depth_range": [f"{z:g}" for z in outcome.z_range_mm],
+        "error_limit": f"{shown.error_mm[1]:g}" if truth is not None else None,
         "depth_table": depth_table(outcome),
         "table1": table1(outcome),
         "scores": score_table(outcome),

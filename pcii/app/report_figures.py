@@ -3,8 +3,9 @@
 All show the same part of the frame, the `Crop`, so that a place in one is the same place in all others.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,11 +14,11 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.estimates import Segmented
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
+from pcii.core.view_figures import middle_camera
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import block_sums, encoded, filled_means, smoothed, smoothing_for
 from pcii.imaging.bright_regions import box_around
-from pcii.io.suggested_depths import depth_range_of
-from pcii.metrics.true_masks import object_masks, pixel_masks
+from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.demosaicing import demosaic
 
 LONGEST_PX = 640
@@ -61,24 +62,76 @@ class Crop:
         return block_sums(image[self.rows, self.cols], self.step_px)
 
 
-def crop_of(outcome: Outcome) -> Crop:
-    """The objects with a margin, or what was found in focus; else the whole frame."""
-    dataset = outcome.dataset
-    box = box_around(_interesting_part(dataset.grid, dataset.truth, outcome.focus))
-    longest = max(side.stop - side.start for side in box)
-    return Crop(*box, -(-longest // LONGEST_PX))
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What a report shows: results, a part of the frame, how photons are smoothed; pictures are made once.
 
-
-def smoothing_of(outcome: Outcome, crop: Crop, asked_px: float | None) -> float:
-    """Standard deviation in pixels of the Gaussian with which photons of sections are shown, 0 for none.
-
-    If nothing is asked for it follows from the photons.
+    `smoothing_px` is the standard deviation in pixels of the Gaussian with which photons of sections are
+    shown, 0 for none.
     """
-    if not outcome.dataset.has_counts:
-        return 0.0
-    if asked_px is not None:
-        return asked_px
-    return smoothing_for([counts[crop.rows, crop.cols] for counts in outcome.sections.counts])
+
+    outcome: Outcome
+    crop: Crop
+    smoothing_px: float
+
+    @classmethod
+    def of(cls, outcome: Outcome, smoothing_px: float | None = None) -> "Shown":
+        """The objects with a margin, or what was found in focus, else the whole frame.
+
+        Without `smoothing_px` it follows from the photons.
+        """
+        dataset = outcome.dataset
+        box = box_around(_interesting_part(dataset.grid, dataset.truth, outcome.focus))
+        longest = max(side.stop - side.start for side in box)
+        if not dataset.has_counts:
+            smoothing_px = 0.0
+        elif smoothing_px is None:
+            smoothing_px = smoothing_for([counts[box] for counts in outcome.sections.counts])
+        return cls(outcome, Crop(*box, -(-longest // LONGEST_PX)), smoothing_px)
+
+    @cached_property
+    def true(self) -> TrueFocus | None:
+        """What is truly in focus at the planes of the analysis."""
+        dataset = self.outcome.dataset
+        return (
+            None
+            if dataset.truth is None
+            else TrueFocus(dataset.grid, dataset.truth, self.outcome.sections.z_mm)
+        )
+
+    @cached_property
+    def sections(self) -> list[np.ndarray]:
+        """Pictures of the sections of the analysis."""
+        return section_images(self.outcome.sections, self.crop, self.smoothing_px)
+
+    @cached_property
+    def true_depth(self) -> Panel | None:
+        """The true depth of the objects."""
+        truth = self.outcome.dataset.truth
+        if truth is None:
+            return None
+        words = "true depth of the objects" if truth.has_objects else "true depth"
+        return _drawing(self.depth_image(truth.object_z_mm), words)
+
+    def depth_image(self, z_mm: np.ndarray, confidence: np.ndarray | None = None) -> np.ndarray:
+        """Depth (H, W) in the colours of the range that was searched."""
+        sure = None if confidence is None else self.crop.middles(confidence)
+        return picture.depth_image(self.crop.middles(z_mm), *self.outcome.z_range_mm, sure)
+
+    @cached_property
+    def error_mm(self) -> tuple[np.ndarray, float]:
+        """Estimated less true depth of the objects (h, w) in mm, NaN without either; where colours saturate.
+
+        Most errors, `SATURATED` of them, are within that limit, which is rounded to two digits.
+        """
+        truth = self.outcome.dataset.truth
+        assert truth is not None
+        found, true = self.crop.middles(self.outcome.depth.z_mm), self.crop.middles(truth.object_z_mm)
+        both = np.isfinite(found) & np.isfinite(true)
+        error = np.full(found.shape, np.nan)
+        error[both] = found[both] - true[both]
+        limit = float(np.quantile(np.abs(error[both]), SATURATED)) if both.any() else 1.0
+        return error, float(f"{max(limit, 1e-3):.1e}")
 
 
 def smoothing_words(smoothing_px: float) -> str:
@@ -101,124 +154,107 @@ def block_estimate(
     return filled_means(sums, samples), samples
 
 
-def figure6(outcome: Outcome, crop: Crop, smoothing_px: float) -> list[Panel]:
-    """Panels of Figure 6: central view raw and demosaiced, sections, photons of one view, truth."""
-    dataset = outcome.dataset
-    k, l = dataset.grid.rows // 2, dataset.grid.cols // 2
-    letters = iter([*"abcdefghijklmnopqrstuvwxyz"] + [f"{n}" for n in range(27, 1000)])
-    panels: list[Panel] = []
-    if dataset.views is not None:
-        view = dataset.views.view(k, l).astype(np.float64)
-        is_mosaic = dataset.views.cfa is not None
-        colour = demosaic(view[..., 0], cfa=dataset.cfa) if is_mosaic else view
-        raw, colour = (_reduced(image, crop) for image in (view, colour))
-        white = picture.white_level(colour)
-        name = f"view ({k}, {l}) at full light"
-        panels.append(_photo(picture.to_srgb8(raw, white), f"({next(letters)}) {name}{', raw' * is_mosaic}"))
-        if is_mosaic:
-            image = picture.to_srgb8(colour, white)
-            panels.append(_photo(image, f"({next(letters)}) the same, demosaiced (Eqs. 4–6)"))
-    if outcome.full_light is not None:
-        panels += _section_panels(outcome.full_light, crop, "full light", letters, 0.0)
-    if dataset.has_counts:
-        per_view = dataset.counts.total / dataset.grid.view_count
-        light = f"{per_view:.0f} photons per view"
-        panels += _section_panels(outcome.sections, crop, light, letters, smoothing_px)
-        counts = dataset.counts.view(k, l)
-        shown = crop.sums(counts[..., None])
-        image = picture.to_srgb8(shown, max(1.0, picture.white_level(shown)))
-        caption = f"({next(letters)}) view ({k}, {l}) at the photon budget: {counts.sum()} photons"
-        panels.append(_drawing(image, caption))
-    if dataset.truth is not None:
-        near, far = depth_range_of(dataset, outcome.sections.z_mm.tolist())
-        image = picture.depth_image(crop.middles(dataset.truth.object_z_mm), near, far)
-        panels.append(
-            _drawing(
-                image, f"({next(letters)}) {_true_depth_words(dataset.truth)} (colour scale under Depth)"
-            )
-        )
-    return panels
-
-
-def figure7(outcome: Outcome, crop: Crop, smoothing_px: float) -> list[list[Panel]]:
-    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison.
-
-    Without truth all are in one row.
-    """
-    truth, grid, z_mm = outcome.dataset.truth, outcome.dataset.grid, outcome.sections.z_mm
-    by_object = object_masks(grid, truth, z_mm) if truth else None
-    by_pixel = pixel_masks(grid, truth, z_mm) if truth else None
-    sections = _section_images(outcome.sections, crop, smoothing_px)
-    rows: list[list[Panel]] = []
-    for focus in outcome.focus:
-        for plane, z in enumerate(z_mm):
-            kept = crop.middles(focus.in_focus[plane])
-            image = sections[plane] * kept[..., None]
-            empty = "" if focus.in_focus[plane].any() else ", nothing is kept"
-            words = f"after removal{empty or smoothing_words(smoothing_px)}"
-            panels = [_photo(image, f"{focus.method}, {z:g} mm: {words}")]
-            if by_object is not None and by_pixel is not None:
-                true = crop.middles(by_object[plane])
-                image = picture.mask_image(true)
-                image[true & ~crop.middles(by_pixel[plane])] = 130
-                panels.append(_drawing(image, f"truth at {z:g} mm"))
-                panels.append(_drawing(picture.agreement_image(kept, true), f"comparison at {z:g} mm"))
-            rows.append(panels)
-    return rows if truth else [[panel for row in rows for panel in row]]
-
-
-def depth_panels(outcome: Outcome, crop: Crop) -> list[Panel]:
-    """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
-    truth, depth = outcome.dataset.truth, outcome.depth
-    near, far = depth_range_of(outcome.dataset, outcome.sections.z_mm.tolist())
-    found, sure = crop.middles(depth.z_mm), crop.middles(depth.confidence)
-    image = picture.depth_image(found, near, far, sure)
-    panels = [_drawing(image, "estimated depth, greyer where less sure, black where unknown")]
-    if truth is not None:
-        true = crop.middles(truth.object_z_mm)
-        panels.append(_drawing(picture.depth_image(true, near, far), _true_depth_words(truth)))
-        error, limit = depth_error_mm(outcome, crop)
-        image = picture.error_image(error, limit)
-        image[np.isfinite(true) & np.isnan(error)] = 110
-        panels.append(_drawing(image, "estimated less true depth"))
-    panels.append(_drawing(picture.to_srgb8(sure**2.2, 1.0), "confidence, from 0 (black) to 1 (white)"))
-    return panels
-
-
-def depth_error_mm(outcome: Outcome, crop: Crop) -> tuple[np.ndarray, float]:
-    """Estimated less true depth of the objects (h, w), NaN without either, and where colours saturate, in mm.
-
-    Most errors, `SATURATED` of them, are within that limit, which is rounded to two digits.
-    """
-    truth = outcome.dataset.truth
-    assert truth is not None
-    found, true = crop.middles(outcome.depth.z_mm), crop.middles(truth.object_z_mm)
-    both = np.isfinite(found) & np.isfinite(true)
-    error = np.full(found.shape, np.nan)
-    error[both] = found[both] - true[both]
-    limit = float(np.quantile(np.abs(error[both]), SATURATED)) if both.any() else 1.0
-    return error, float(f"{max(limit, 1e-3):.1e}")
-
-
-def _true_depth_words(truth: Truth) -> str:
-    """What a picture of `Truth.object_z_mm` shows."""
-    return "true depth of the objects" if truth.has_objects else "true depth"
-
-
-def _section_images(sections: Sections, crop: Crop, smoothing_px: float) -> list[np.ndarray]:
+def section_images(sections: Sections, crop: Crop, smoothing_px: float = 0.0) -> list[np.ndarray]:
+    """Pictures of sections, all at the same exposure."""
     planes = range(len(sections.z_mm))
     return encoded([block_estimate(sections, plane, crop, smoothing_px) for plane in planes])
 
 
-def _section_panels(
-    sections: Sections, crop: Crop, light: str, letters: Iterator[str], smoothing_px: float
-) -> list[Panel]:
-    equation = "Eq. 2" if sections.counts.dtype.kind == "f" else "Eq. 3"
-    images, words = _section_images(sections, crop, smoothing_px), smoothing_words(smoothing_px)
+def figure6(shown: Shown) -> list[Panel]:
+    """Panels of Figure 6: central view raw and demosaiced, sections, photons of one view, truth."""
+    panels = _view_panels(shown)
+    outcome = shown.outcome
+    if outcome.full_light is not None:
+        images = section_images(outcome.full_light, shown.crop)
+        panels += _section_panels(outcome.full_light, images, "full light", "")
+    if outcome.dataset.has_counts:
+        per_view = outcome.dataset.counts.total / outcome.dataset.grid.view_count
+        light, words = f"{per_view:.0f} photons per view", smoothing_words(shown.smoothing_px)
+        panels += _section_panels(outcome.sections, shown.sections, light, words)
+        panels.append(_photon_panel(shown))
+    if shown.true_depth is not None:
+        words = f"{shown.true_depth['caption']} (colour scale under Depth)"
+        panels.append(shown.true_depth | {"caption": words})
+    letters = [*"abcdefghijklmnopqrstuvwxyz"] + [f"{n}" for n in range(27, 1000)]
     return [
-        _photo(image, f"({next(letters)}) section at {z:g} mm, {light} ({equation}){words}")
+        panel | {"caption": f"({letter}) {panel['caption']}"}
+        for letter, panel in zip(letters, panels, strict=False)
+    ]
+
+
+def _view_panels(shown: Shown) -> list[Panel]:
+    """The central view at full light, and demosaiced if it is a mosaic."""
+    views = shown.outcome.dataset.views
+    if views is None:
+        return []
+    k, l = middle_camera(views.grid)
+    name = f"view ({k}, {l}) at full light"
+    view = views.view(k, l).astype(np.float64)
+    if views.cfa is None:
+        view = _reduced(view, shown.crop)
+        return [_photo(picture.to_srgb8(view, picture.white_level(view)), name)]
+    colour = _reduced(demosaic(view[..., 0], cfa=views.cfa), shown.crop)
+    white = picture.white_level(colour)
+    return [
+        _photo(picture.to_srgb8(_reduced(view, shown.crop), white), f"{name}, raw"),
+        _photo(picture.to_srgb8(colour, white), "the same, demosaiced (Eqs. 4–6)"),
+    ]
+
+
+def _section_panels(sections: Sections, images: Sequence[np.ndarray], light: str, words: str) -> list[Panel]:
+    equation = "Eq. 2" if sections.counts.dtype.kind == "f" else "Eq. 3"
+    return [
+        _photo(image, f"section at {z:g} mm, {light} ({equation}){words}")
         for z, image in zip(sections.z_mm, images, strict=True)
     ]
+
+
+def _photon_panel(shown: Shown) -> Panel:
+    """The photons of the central view."""
+    counts = shown.outcome.dataset.counts
+    k, l = middle_camera(counts.grid)
+    view = counts.view(k, l)
+    photons = shown.crop.sums(view[..., None])
+    image = picture.to_srgb8(photons, max(1.0, picture.white_level(photons)))
+    return _drawing(image, f"view ({k}, {l}) at the photon budget: {view.sum()} photons")
+
+
+def figure7(shown: Shown) -> list[list[Panel]]:
+    """Panels of Figure 7 for each method and plane: section after removal, truth, comparison.
+
+    Without truth all are in one row.
+    """
+    crop, true = shown.crop, shown.true
+    rows: list[list[Panel]] = []
+    for focus in shown.outcome.focus:
+        for plane, z in enumerate(focus.z_mm):
+            kept = crop.middles(focus.in_focus[plane])
+            image = shown.sections[plane] * kept[..., None]
+            empty = "" if focus.in_focus[plane].any() else ", nothing is kept"
+            words = f"after removal{empty or smoothing_words(shown.smoothing_px)}"
+            panels = [_photo(image, f"{focus.method}, {z:g} mm: {words}")]
+            if true is not None:
+                mask = crop.middles(true.by_object[plane])
+                image = picture.mask_image(mask)
+                image[mask & ~crop.middles(true.by_pixel[plane])] = 130
+                panels.append(_drawing(image, f"truth at {z:g} mm"))
+                panels.append(_drawing(picture.agreement_image(kept, mask), f"comparison at {z:g} mm"))
+            rows.append(panels)
+    return rows if true else [[panel for row in rows for panel in row]]
+
+
+def depth_panels(shown: Shown) -> list[Panel]:
+    """The depth map, and beside it the truth and the error if there is a truth; the confidence."""
+    truth, depth, crop = shown.outcome.dataset.truth, shown.outcome.depth, shown.crop
+    image = shown.depth_image(depth.z_mm, depth.confidence)
+    panels = [_drawing(image, "estimated depth, greyer where less sure, black where unknown")]
+    if truth is not None and shown.true_depth is not None:
+        error, limit = shown.error_mm
+        image = picture.error_image(error, limit)
+        image[np.isfinite(crop.middles(truth.object_z_mm)) & np.isnan(error)] = 110
+        panels += [shown.true_depth, _drawing(image, "estimated less true depth")]
+    sure = picture.to_srgb8(crop.middles(depth.confidence) ** 2.2, 1.0)
+    return [*panels, _drawing(sure, "confidence, from 0 (black) to 1 (white)")]
 
 
 def _reduced(image: np.ndarray, crop: Crop) -> np.ndarray:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, block_estimate, smoothing_words
+from pcii.app.report_figures import Crop, Shown, block_estimate, smoothing_words
 from pcii.base.progress import Report
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
@@ -21,8 +21,6 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import encoded
-from pcii.io.suggested_depths import depth_range_of
-from pcii.metrics.true_masks import object_masks
 from pcii.sections.reconstruction import reconstruct
 
 MOST_PLANES = 20
@@ -44,8 +42,7 @@ def slider_planes(outcome: Outcome) -> tuple[FocalPlanes, dict[int, int]]:
     """
     grid, own = outcome.dataset.grid, outcome.sections.z_mm
     chosen = np.unique(np.linspace(0, len(own) - 1, MOST_PLANES).round().astype(int))
-    range_mm = depth_range_of(outcome.dataset, own.tolist())
-    near, far = min(range_mm[0], own.min()), max(range_mm[1], own.max())
+    near, far = min(outcome.z_range_mm[0], own.min()), max(outcome.z_range_mm[1], own.max())
     own_px = total_disparity_px(grid, own[chosen])
     span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))
     depths = {float(own[index]): int(index) for index in chosen}
@@ -60,11 +57,12 @@ def slider_planes(outcome: Outcome) -> tuple[FocalPlanes, dict[int, int]]:
     return planes, {number: depths[z] for number, z in enumerate(z_mm) if depths[z] >= 0}
 
 
-def slider(outcome: Outcome, crop: Crop, smoothing_px: float, report: Report) -> dict[str, Any]:
+def slider(shown: Shown, report: Report) -> dict[str, Any]:
     """Content of the slider: depths, pictures by light, masks by points, maps to read out.
 
     Photons are shown smoothed, and as they are too.
     """
+    outcome, crop = shown.outcome, shown.crop
     dataset = outcome.dataset
     planes, own = slider_planes(outcome)
     blocks = replace(crop, step_px=int(np.ceil(np.sqrt(crop.height_px * crop.width_px / MOST_BLOCKS))))
@@ -76,16 +74,16 @@ def slider(outcome: Outcome, crop: Crop, smoothing_px: float, report: Report) ->
     lights: list[dict[str, Any]] = []
     read: list[np.ndarray] = []
     for number, (label, source) in enumerate(sources):
-        ways = dict.fromkeys((smoothing_px, 0.0) if isinstance(source, PhotonCounts) else (0.0,))
-        shown: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {way: [] for way in ways}
+        ways = dict.fromkeys((shown.smoothing_px, 0.0) if isinstance(source, PhotonCounts) else (0.0,))
+        seen: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {way: [] for way in ways}
         for done, (sections, plane) in enumerate(_each(source, planes), start=1):
-            for way, estimates in shown.items():
+            for way, estimates in seen.items():
                 estimates.append(block_estimate(sections, plane, crop, way))
             if number == 0:
                 read.append(_read_values(sections, plane, blocks))
             report(f"pictures of {label}", done, len(planes))
-        for way, estimates in shown.items():
-            words = smoothing_words(way) or " as they are" * (len(shown) > 1)
+        for way, estimates in seen.items():
+            words = smoothing_words(way) or " as they are" * (len(seen) > 1)
             images = [picture.photo_uri(image) for image in encoded(estimates)]
             lights.append({"label": f"{label}{words}", "images": images})
     maps = _maps(outcome, blocks)
@@ -94,7 +92,7 @@ def slider(outcome: Outcome, crop: Crop, smoothing_px: float, report: Report) ->
         "z_mm": [f"{z:g}" for z in planes.z_mm],
         "own": sorted(own),
         "lights": lights,
-        "points": _points(outcome, crop, own),
+        "points": _points(shown, own),
         "crop": blocks,
         "readings": _readings(outcome),
         "resolution": _resolution(outcome, blocks, step_mm),
@@ -113,23 +111,20 @@ def _each(source: PhotonCounts | Views, planes: FocalPlanes) -> Iterator[tuple[S
             yield sections, plane
 
 
-def _points(outcome: Outcome, crop: Crop, own: dict[int, int]) -> list[dict[str, Any]]:
+def _points(shown: Shown, own: dict[int, int]) -> list[dict[str, Any]]:
     """For each method and the truth: masks at each plane, and their comparison with the truth."""
-    truth = outcome.dataset.truth
-    true = None if truth is None else object_masks(outcome.dataset.grid, truth, outcome.sections.z_mm)
-    points: list[dict[str, Any]] = []
-    for focus in outcome.focus:
+    crop, points = shown.crop, list[dict[str, Any]]()
+    true: dict[int, np.ndarray] = {}
+    if shown.true is not None:
+        true = {here: crop.middles(shown.true.by_object[there]) for here, there in own.items()}
+    for focus in shown.outcome.focus:
         kept = {here: crop.middles(focus.in_focus[there]) for here, there in own.items()}
-        compared: dict[int, str] = {}
-        if true is not None:
-            compared = {
-                here: picture.data_uri(picture.agreement_image(mask, crop.middles(true[own[here]])))
-                for here, mask in kept.items()
-            }
+        compared = {
+            here: picture.data_uri(picture.agreement_image(kept[here], mask)) for here, mask in true.items()
+        }
         points.append({"label": f"kept by {focus.method}", "kept": _masks(kept), "compared": compared})
-    if true is not None and true.any():
-        masks = {here: crop.middles(true[there]) for here, there in own.items()}
-        points.append({"label": "in focus in truth", "kept": _masks(masks), "compared": {}})
+    if shown.true is not None and shown.true.by_object.any():
+        points.append({"label": "in focus in truth", "kept": _masks(true), "compared": {}})
     return points
 
 

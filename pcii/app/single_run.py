@@ -11,8 +11,6 @@ from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.depth.methods import DEFAULT_METHOD
 from pcii.io.dataset import Dataset
-from pcii.io.suggested_depths import planes_of
-from pcii.removal.methods import find_method
 
 
 def run(
@@ -31,9 +29,6 @@ def run(
 
     Raises `InputError` if `out` is no folder for results of this dataset, and as `analyse` does.
     """
-    for method in methods or ():  # an unknown name is reported before any work, and no folder is made
-        find_method(method)
-    planes_of(dataset, z_mm)
     most_px = max(dataset.grid.height, dataset.grid.width)
     if smoothing_px is not None and not 0 <= smoothing_px <= most_px:
         raise InputError(

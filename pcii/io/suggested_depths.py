@@ -46,12 +46,17 @@ def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
         )
 
 
-def depth_range_of(dataset: Dataset, z_mm: Sequence[float] | None = None) -> tuple[float, float]:
-    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths."""
+def depth_range_of(
+    dataset: Dataset, z_mm: Sequence[float] | FocalPlanes | None = None
+) -> tuple[float, float]:
+    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths.
+
+    The planes are `z_mm`, or those that `planes_of` finds at these depths.
+    """
     suggested = dataset.analysis.get("z_range_mm")
     if suggested:
         near, far = float(suggested[0]), float(suggested[1])
         _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
         return near, far
-    z = planes_of(dataset, z_mm).z_mm
+    z = (z_mm if isinstance(z_mm, FocalPlanes) else planes_of(dataset, z_mm)).z_mm
     return 0.8 * float(z.min()), 1.25 * float(z.max())

@@ -5,14 +5,14 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px
-from pcii.core.truth import PhotonTruth, Truth
+from pcii.core.truth import PhotonTruth
 from pcii.imaging.mask_outlines import boundary_f
-from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, objects_by_plane
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, Kind, TrueFocus
+
+Row = dict[str, float | None]
 
 
-def mask_agreement(
-    claimed: np.ndarray, true: np.ndarray | None, true_share: np.ndarray | None = None
-) -> dict[str, float | None]:
+def mask_agreement(claimed: np.ndarray, true: np.ndarray | None, true_share: np.ndarray | None = None) -> Row:
     """IoU, precision, recall, F1 and boundary F of two masks (H, W).
 
     `true_share` (H, W) is the true share of each pixel's area, where that is known. Two empty masks have an
@@ -35,27 +35,32 @@ def mask_agreement(
     }
 
 
-def photon_agreement(focus: Segmented, truth: Truth | None, plane: int, kind: str) -> dict[str, float | None]:
-    """Precision and recall of the photons that a method keeps, by the origin of each photon.
+def photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> dict[Kind, Row]:
+    """Precision and recall of the photons that a method keeps, by the origin of each, by kind of truth.
 
     A photon is kept if `photon_in_focus` has its event or, without that, if the voxel of the section that it
-    is projected to is in the mask. It is rightly kept if its object belongs to the plane (`kind` "object"),
-    or if its first hit is in focus there ("pixel"). Photons projected outside the section do not count.
-    Raises `InputError` if `photon_in_focus` has another number of events than the truth.
+    is projected to is in the mask. It is rightly kept if its object belongs to the plane ("object"), or if
+    its first hit is in focus there ("pixel"). Photons projected outside the section do not count. Raises
+    `InputError` if `photon_in_focus` has another number of events than the truth.
     """
-    if truth is None or truth.photons is None:
-        return {"photon_precision": None, "photon_recall": None}
-    grid, photons, z0 = focus.sections.grid, truth.photons, focus.z_mm[plane]
+    unknown: Row = {"photon_precision": None, "photon_recall": None}
+    if true is None or true.truth.photons is None:
+        return {"object": unknown, "pixel": unknown}
+    photons = true.truth.photons
     row, col, inside = focus.sections.planes.project(photons, plane)
     if focus.photon_in_focus is None:
         kept = focus.in_focus[plane][row[inside], col[inside]]
     else:
         kept = _by_photon(focus.photon_in_focus[plane], photons)[inside]
-    if kind == "object":
-        objects = [n for n, p in objects_by_plane(grid, truth, focus.z_mm).items() if p == plane]
-        right = np.isin(photons.object_id[inside], objects)
-    else:
-        right = blur_half_extent_px(grid, photons.z_mm[inside], z0) <= FOCUS_TOLERANCE_PX
+    objects = [number for number, own in true.plane_of.items() if own == plane]
+    blur_px = blur_half_extent_px(true.grid, photons.z_mm[inside], focus.z_mm[plane])
+    return {
+        "object": _shares(kept, np.isin(photons.object_id[inside], objects)),
+        "pixel": _shares(kept, blur_px <= FOCUS_TOLERANCE_PX),
+    }
+
+
+def _shares(kept: np.ndarray, right: np.ndarray) -> Row:
     both = int(np.count_nonzero(kept & right))
     return {
         "photon_precision": both / int(kept.sum()) if kept.any() else None,

@@ -5,7 +5,7 @@ rate that camera (k, l) sees is that of the virtual centre moved by u (a_l, b_k)
 d_x / u and b_k likewise. The Fisher information of u is then N (<a^2> <g_x^2> + <b^2> <g_y^2>).
 """
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
-from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, object_masks, objects_by_plane, pixel_masks
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus
 
 TEXTURE_SIGMA_PX = 0.5
 """Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels
@@ -26,7 +26,7 @@ AWAY_FROM_EDGES_PX = 4
 included."""
 
 
-def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"] = "pixel") -> Segmented:
+def oracle(sections: Sections, truth: Truth, *, kind: Kind = "pixel") -> Segmented:
     """In-focus masks (Z, H, W) of a method that knows each pixel's true depth and nothing else.
 
     A pixel belongs to the plane of `sections` that is nearest in disparity. For the truth by "pixel" it
@@ -38,11 +38,8 @@ def oracle(sections: Sections, truth: Truth, *, kind: Literal["object", "pixel"]
         raise InputError(f"kind: use 'object' or 'pixel', not {kind!r}")
     if sections.counts.shape[1:3] != truth.z_mm.shape:
         raise InputError(f"truth: its maps are {truth.z_mm.shape}, the sections {sections.counts.shape[1:3]}")
-    z_mm = sections.z_mm
-    blur = np.stack([blur_half_extent_px(sections.grid, truth.z_mm, z) for z in z_mm])
-    nearest = np.argmin(blur, axis=0) == np.arange(z_mm.size)[:, None, None]
-    shown = truth.object_id > 0 if kind == "object" else blur <= FOCUS_TOLERANCE_PX
-    return Segmented(nearest & shown, "oracle", sections)
+    true = TrueFocus(sections.grid, truth, sections.z_mm)
+    return Segmented(true.oracle(kind), "oracle", sections)
 
 
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
@@ -100,24 +97,13 @@ def log_gradient_squared(
     return float((per_rate * across**2).sum() / light), float((per_rate * down**2).sum() / light)
 
 
-def plane_bounds(focus: Segmented, truth: Truth) -> list[dict[str, Any]]:
-    """For each row of the score's planes the IoU of `oracle`."""
-    grid, z_mm = focus.sections.grid, focus.z_mm
-    true = {"object": object_masks(grid, truth, z_mm), "pixel": pixel_masks(grid, truth, z_mm)}
-    oracles = {
-        "object": oracle(focus.sections, truth, kind="object").in_focus,
-        "pixel": oracle(focus.sections, truth, kind="pixel").in_focus,
+def plane_bounds(true: TrueFocus) -> dict[tuple[int, Kind], float]:
+    """IoU of `oracle` at each plane, by the plane's number and kind of truth."""
+    return {
+        (plane, kind): _iou(claimed, mask)
+        for kind in KINDS
+        for plane, (claimed, mask) in enumerate(zip(true.oracle(kind), true.masks(kind), strict=True))
     }
-    return [
-        {
-            "z_mm": float(depth),
-            "method": focus.method,
-            "truth": kind,
-            "iou_oracle": _iou(oracles[kind][plane], true[kind][plane]),
-        }
-        for plane, depth in enumerate(z_mm)
-        for kind in true
-    ]
 
 
 def object_bounds(
@@ -130,9 +116,13 @@ def object_bounds(
     the photon section. `depth_sigma_px` is None without full light, texture or photons.
     """
     rows: list[dict[str, Any]] = []
+    planes, lit_planes = (
+        {} if each is None else TrueFocus(each.grid, truth, each.z_mm).plane_of
+        for each in (sections, full_light)
+    )
     for number, name in sorted(truth.names.items()):
-        photons = _photons(number, truth, sections)
-        gradient = None if full_light is None else _texture(number, truth, full_light)
+        photons = _photons(number, truth, sections, planes.get(number))
+        gradient = None if full_light is None else _texture(number, truth, full_light, lit_planes.get(number))
         sigma = None
         if full_light is not None and gradient is not None and photons is not None:
             sigma = depth_bound_px(full_light.grid, photons, gradient)
@@ -147,19 +137,19 @@ def object_bounds(
     return rows
 
 
-def _photons(number: int, truth: Truth, sections: Sections | None) -> int | None:
+def _photons(number: int, truth: Truth, sections: Sections | None, plane: int | None) -> int | None:
     if truth.photons is not None:
         return int(np.count_nonzero(truth.photons.object_id == number))
     if sections is None:
         return None
-    plane = objects_by_plane(sections.grid, truth, sections.z_mm).get(number)
     return 0 if plane is None else int(sections.counts[plane][truth.object_id == number].sum())
 
 
-def _texture(number: int, truth: Truth, full_light: Sections) -> tuple[float, float] | None:
+def _texture(
+    number: int, truth: Truth, full_light: Sections, plane: int | None
+) -> tuple[float, float] | None:
     from scipy.ndimage import binary_erosion
 
-    plane = objects_by_plane(full_light.grid, truth, full_light.z_mm).get(number)
     if plane is None:
         return None
     blur = blur_half_extent_px(full_light.grid, truth.z_mm, full_light.z_mm[plane])

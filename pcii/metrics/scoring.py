@@ -1,6 +1,7 @@
 """Scores of masks, depth and entropies against the truth."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from pcii.imaging.mask_outlines import object_share
 from pcii.metrics.agreement import mask_agreement, photon_agreement
 from pcii.metrics.bounds import object_bounds, plane_bounds
 from pcii.metrics.depth_accuracy import depth_errors
-from pcii.metrics.true_masks import object_masks, objects_by_plane, pixel_masks
+from pcii.metrics.true_masks import KINDS, Kind, TrueFocus
 from pcii.sections.photon_statistics import (
     entropy_bits,
     pooled_estimate,
@@ -73,35 +74,45 @@ def score(
                 raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shape}")
         if depth is not None and grid is None:
             raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
-    # Methods usually share their sections, which are then pooled once.
-    distinct = {id(each.sections): each.sections for each in methods}
-    pooled_by_id = {key: pooled_estimate(each, section_window_px(each)) for key, each in distinct.items()}
-    pooled = [pooled_by_id[id(each.sections)] for each in methods]
-    rows = [
-        row
-        for each, sections in zip(methods, pooled, strict=True)
-        for row in _plane_rows(each, sections, truth)
-    ]
-    objects = _object_rows(methods[0], pooled[0], truth) if methods and truth is not None else []
+    # Methods usually share their sections: what follows from these and the truth alone is made once.
+    seen = {id(each.sections): _Seen.of(each.sections, truth) for each in methods}
+    rows = [row for each in methods for row in _plane_rows(each, seen[id(each.sections)])]
     bounds: dict[str, Any] = {"planes": [], "objects": []}
+    objects: list[dict[str, Any]] = []
     if truth is not None:
-        bounds["planes"] = [row for each in methods for row in plane_bounds(each, truth)]
+        if methods:
+            objects = _object_rows(methods[0], seen[id(methods[0].sections)].pooled, truth)
+        bounds["planes"] = [row for each in methods for row in _oracle_rows(each, seen[id(each.sections)])]
         bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
     return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds)
 
 
-def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> list[dict[str, Any]]:
-    grid, z_mm = focus.sections.grid, focus.z_mm
-    before, after = _section_entropies(focus, pooled)
-    kinds: list[tuple[str, np.ndarray | None]] = [("object", None), ("pixel", None)]
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """Pooled estimates (Z, H, W, C) of sections, what is truly in focus in them, and IoUs of the oracle."""
+
+    pooled: np.ndarray
+    true: TrueFocus | None
+    oracle: Mapping[tuple[int, Kind], float]
+
+    @classmethod
+    def of(cls, sections: Sections, truth: Truth | None) -> "_Seen":
+        true = None if truth is None else TrueFocus(sections.grid, truth, sections.z_mm)
+        pooled = pooled_estimate(sections, section_window_px(sections))
+        return cls(pooled, true, {} if true is None else plane_bounds(true))
+
+
+def _plane_rows(focus: Segmented, seen: _Seen) -> list[dict[str, Any]]:
+    before, after = _section_entropies(focus, seen.pooled)
+    true = seen.true
     names: dict[int, list[str]] = {}
-    if truth is not None:
-        kinds = [("object", object_masks(grid, truth, z_mm)), ("pixel", pixel_masks(grid, truth, z_mm))]
-        for number, plane in objects_by_plane(grid, truth, z_mm).items():
-            names.setdefault(plane, []).append(truth.names[number])
+    if true is not None:
+        for number, plane in true.plane_of.items():
+            names.setdefault(plane, []).append(true.truth.names[number])
     rows: list[dict[str, Any]] = []
-    for plane, depth in enumerate(z_mm):
-        for kind, masks in kinds:
+    for plane, depth in enumerate(focus.z_mm):
+        photons = photon_agreement(focus, true, plane)
+        for kind in KINDS:
             objects = ", ".join(names.get(plane, [])) if kind == "object" else ""
             rows.append(
                 {
@@ -109,8 +120,8 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> li
                     "method": focus.method,
                     "object": objects or None,
                     "truth": kind,
-                    **_plane_agreement(focus.in_focus[plane], None if masks is None else masks[plane], truth),
-                    **photon_agreement(focus, truth, plane, kind),
+                    **_plane_agreement(focus.in_focus[plane], true, plane, kind),
+                    **photons[kind],
                     "entropy_before": before[plane],
                     "entropy_after": after[plane],
                     "claimed_share": float(focus.in_focus[plane].mean()),
@@ -119,12 +130,23 @@ def _plane_rows(focus: Segmented, pooled: np.ndarray, truth: Truth | None) -> li
     return rows
 
 
+def _oracle_rows(focus: Segmented, seen: _Seen) -> list[dict[str, Any]]:
+    """For each row of a method's planes the IoU of `bounds.oracle`."""
+    return [
+        {"z_mm": float(z), "method": focus.method, "truth": kind, "iou_oracle": seen.oracle[plane, kind]}
+        for plane, z in enumerate(focus.z_mm)
+        for kind in KINDS
+    ]
+
+
 def _plane_agreement(
-    claimed: np.ndarray, true: np.ndarray | None, truth: Truth | None
+    claimed: np.ndarray, true: TrueFocus | None, plane: int, kind: Kind
 ) -> dict[str, float | None]:
-    if true is None or truth is None or truth.coverage is None:
-        return mask_agreement(claimed, true)
-    return mask_agreement(claimed, true, object_share(true, truth.object_id, truth.coverage))
+    if true is None:
+        return mask_agreement(claimed, None)
+    mask, coverage = true.masks(kind)[plane], true.truth.coverage
+    share = None if coverage is None else object_share(mask, true.truth.object_id, coverage)
+    return mask_agreement(claimed, mask, share)
 
 
 def _section_entropies(focus: Segmented, pooled: np.ndarray) -> tuple[list[float], list[float]]:

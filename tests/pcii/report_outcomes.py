@@ -15,6 +15,7 @@ from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
 from pcii.io.dataset_writer import save_dataset
+from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.scoring import score
 from pcii.sections.reconstruction import reconstruct
 
@@ -41,7 +42,8 @@ def outcome_of(
     depth = DepthMap(FOUND, np.where(np.isfinite(FOUND), 0.75, 0.0))
     result = score(focus, depth, truth, grid=dataset.grid, dataset=dataset.name)
     full_light = None if dataset.views is None else reconstruct(dataset.views, z_mm)
-    return Outcome(dataset, full_light, sections, focus, depth, result, {"depth": 1.0})
+    z_range_mm = depth_range_of(dataset)
+    return Outcome(dataset, full_light, sections, focus, depth, result, z_range_mm, {"depth": 1.0})
 
 
 def page_of(outcome: Outcome, folder: Path, **options: Any) -> str:

@@ -13,7 +13,7 @@ from plain_scenes import built, card, grid, sphere
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
-from pcii.metrics.scoring import pixel_masks
+from pcii.metrics.true_masks import pixel_masks
 from simgen.cameras.rig import as_rig, centre_camera
 from simgen.renderer import backend, mitsuba_camera
 from simgen.truth import visibility

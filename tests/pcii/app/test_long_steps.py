@@ -86,7 +86,7 @@ def test_results_of_two_runs_are_not_taken_for_those_of_one(
 ) -> None:
     out, others = tmp_path / "out", {"z_mm": (500.0, 700.0)}
     run(dataset, out)
-    interrupted(dataset, out, monkeypatch, at="find_method", **others)
+    interrupted(dataset, out, monkeypatch, at="removal_step", **others)
     with pytest.raises(InputError, match=r"segmented_brightness.zarr, segmented_variance.zarr: older than"):
         single_run.Results(out, dataset).load_segmented()
     interrupted(dataset, out, monkeypatch, at="score", **others)

@@ -2,6 +2,7 @@
 
 import html
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from report_outcomes import COUNTS, FOUND, GRID, IDS, LIGHT, TRUTH, decoded, out
 
 from pcii.app import report_origin
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, block_estimate, crop_of, depth_error_mm, encoded
+from pcii.app.report_figures import Crop, Shown, block_estimate, encoded
 from pcii.app.report_slider import MOST_PLANES, slider, slider_planes
 from pcii.base.progress import silent
 from pcii.core.camera_grid import CameraGrid
@@ -36,8 +37,7 @@ def full(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
 
 
 def test_the_slider_reads_out_what_the_results_say(full: Outcome) -> None:
-    crop = Crop(slice(3, 40), slice(5, 48), 2)
-    shown = slider(full, crop, 0.0, silent)
+    shown = slider(Shown(full, Crop(slice(3, 40), slice(5, 48), 2), 0.0), silent)
     blocks = shown["crop"]
     assert (blocks.step_px, blocks.rows.start, blocks.cols.start) == (1, 3, 5)
     maps = {each["name"]: each for each in shown["maps"]}
@@ -59,7 +59,7 @@ def test_blocks_of_pixels_are_read_out_where_there_are_many(
     full: Outcome, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("pcii.app.report_slider.MOST_BLOCKS", 250)
-    shown = slider(full, crop_of(full), 0.0, silent)
+    shown = slider(Shown.of(full, 0.0), silent)
     blocks, estimate = shown["crop"], shown["maps"][0]
     assert blocks.step_px == 3
     rows, cols = np.minimum(np.arange(0, 40, 3) + 1, 39), np.arange(0, 48, 3) + 1
@@ -124,7 +124,7 @@ def test_radiance_alone_has_light_to_read_out(tmp_path: Path) -> None:
     words = words_of(page_of(outcome, tmp_path))
     assert "light, share of the most" in words
     assert "photons in the section" not in words
-    shown = slider(outcome, crop_of(outcome), 0.0, silent)
+    shown = slider(Shown.of(outcome, 0.0), silent)
     light = np.stack([decoded(each, shown["crop"]) for each in shown["planes"]])
     means = np.stack([reconstruct(LIGHT, float(z)).estimate[0].mean(axis=-1) for z in shown["z_mm"]])
     np.testing.assert_allclose(light, means / means.max(), atol=2e-5)
@@ -139,7 +139,7 @@ def test_only_the_papers_scene_has_the_papers_numbers(tmp_path: Path) -> None:
     assert "Entropy of the objects" in words
     manifest = read_manifest(tmp_path / "d") | {"recipe": {"scene": "two_objects", "seed": 1}}
     write_manifest(tmp_path / "d", manifest)
-    paper = Outcome(open_dataset(tmp_path / "d"), *list(vars(outcome).values())[1:])
+    paper = replace(outcome, dataset=open_dataset(tmp_path / "d"))
     words = words_of(page_of(paper, tmp_path))
     assert all(title in words for title in titles)
 
@@ -180,8 +180,7 @@ def test_how_it_was_made(full: Outcome, tmp_path: Path, monkeypatch: pytest.Monk
     manifest = read_manifest(full.dataset.path)
     write_manifest(tmp_path, manifest | {"skipped": skipped, "versions": {"mitsuba": "3.9.1"}, "files": {}})
     monkeypatch.setattr(report_origin, "_of_analysis", lambda *_: [])
-    dataset = open_dataset(tmp_path)
-    rows = report_origin.origin(Outcome(dataset, *list(vars(full).values())[1:]), None)
+    rows = report_origin.origin(replace(full, dataset=open_dataset(tmp_path)), None)
     assert rows["skipped"].rows == (
         ("a <b>", "no need", "2.5 MB before compression"),
         ("rays", "none asked", "1,200 rays"),
@@ -244,7 +243,7 @@ def test_few_bright_voxels_do_not_set_the_exposure() -> None:
 
 
 def test_errors_of_depth_and_their_scale(full: Outcome) -> None:
-    error, limit = depth_error_mm(full, crop_of(full))
+    error, limit = Shown.of(full).error_mm
     expected = np.where(IDS > 0, np.broadcast_to(np.linspace(-3, 5, 48), IDS.shape), np.nan)
     np.testing.assert_allclose(error, expected, atol=1e-9)
     inside = np.abs(error[np.isfinite(error)]) <= limit

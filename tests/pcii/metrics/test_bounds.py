@@ -18,6 +18,7 @@ from pcii.metrics.bounds import (
     oracle,
     plane_bounds,
 )
+from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
 
 GRID = unit_grid(5, 5, 1, 8)  # total disparity 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
@@ -50,10 +51,9 @@ def test_by_object_the_oracle_claims_every_pixel_of_an_object_at_its_nearest_pla
 def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
     z = np.array([[4 / 40, 4 / 39, 4 / 38, 4 / 31, np.inf, np.inf, np.inf, np.inf]])
     true = Truth(z, np.array([[1, 1, 1, 1, 0, 0, 0, 0]]), {1: "long"})
-    rows = plane_bounds(oracle(sections(), true), true)
-    iou = {(row["z_mm"], row["truth"]): row["iou_oracle"] for row in rows}
+    iou = plane_bounds(TrueFocus(GRID, true, Z))
     # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
-    assert iou == {(0.1, "object"): 3 / 4, (0.1, "pixel"): 1.0, (Z[1], "object"): 0.0, (Z[1], "pixel"): 1.0}
+    assert iou == {(0, "object"): 3 / 4, (0, "pixel"): 1.0, (1, "object"): 0.0, (1, "pixel"): 1.0}
 
 
 def test_oracle_refuses_what_it_cannot_compare() -> None:

@@ -9,7 +9,9 @@ from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.geometry import blur_half_extent_px
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import PhotonTruth, Truth
-from pcii.metrics.scoring import mask_agreement, object_masks, objects_by_plane, pixel_masks, score
+from pcii.metrics.agreement import mask_agreement
+from pcii.metrics.scoring import score
+from pcii.metrics.true_masks import TrueFocus, pixel_masks
 from pcii.sections.reconstruction import reconstruct
 
 GRID = paper_grid(24, 32)
@@ -67,8 +69,8 @@ def test_outlines_may_be_two_pixels_apart_and_no_more() -> None:
 
 
 def test_objects_belong_to_the_closest_plane() -> None:
-    assert objects_by_plane(GRID, truth(), Z) == {1: 0, 2: 1}
-    masks = object_masks(GRID, truth(), Z)
+    assert TrueFocus(GRID, truth(), Z).plane_of == {1: 0, 2: 1}
+    masks = TrueFocus(GRID, truth(), Z).by_object
     assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
 
 
@@ -81,7 +83,7 @@ def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
 
 
 def test_a_perfect_answer_scores_one() -> None:
-    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(*depth_of(truth())), truth())
+    result = score(segmented(TrueFocus(GRID, truth(), Z).by_object), DepthMap(*depth_of(truth())), truth())
     for row in result.planes:
         assert row["iou"] == row["precision"] == row["recall"] == row["boundary_f"] == 1.0
     assert [row["object"] for row in result.planes if row["truth"] == "object"] == ["near", "far"]
@@ -99,7 +101,7 @@ def depth_of(true: Truth) -> tuple[np.ndarray, np.ndarray]:
 def test_a_missing_answer_is_bad_and_never_good() -> None:
     z, confidence = depth_of(truth())
     z[4:10, 4:10] = np.nan  # 36 of 100 object pixels
-    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    result = score(segmented(TrueFocus(GRID, truth(), Z).by_object), DepthMap(z, confidence), truth())
     assert result.depth["coverage"] == 0.64
     assert result.depth["bad_1px"] == result.depth["bad_3px"] == 0.36
     assert result.depth["mae_mm"] == 0.0
@@ -110,7 +112,7 @@ def test_depth_errors_are_in_px_of_total_disparity() -> None:
     # At 541 mm the total disparity is 118.15 px and 1 mm is 0.22 px: 9 mm is 1.9 px, 20 mm 4.2 px.
     z[4:10, 4:7] += 9.0
     z[4:10, 7:10] += 20.0
-    result = score(segmented(object_masks(GRID, truth(), Z)), DepthMap(z, confidence), truth())
+    result = score(segmented(TrueFocus(GRID, truth(), Z).by_object), DepthMap(z, confidence), truth())
     assert result.depth["bad_1px"] == 0.36
     assert result.depth["bad_3px"] == 0.18
     assert result.depth["mae_mm"] == pytest.approx((18 * 9 + 18 * 20) / 100)
@@ -151,7 +153,7 @@ def test_without_truth_everything_unknown_is_none() -> None:
 def test_removal_lowers_the_entropy_of_the_section() -> None:
     rng = np.random.default_rng(2)
     counts = PhotonCounts.from_dense(rng.poisson(0.5, GRID.shape_KLHW), GRID)
-    masks = object_masks(GRID, truth(), Z)
+    masks = TrueFocus(GRID, truth(), Z).by_object
     result = score(Segmented(masks, "by hand", reconstruct(counts, Z)), None, truth())
     for row in result.planes:
         assert row["entropy_after"] < row["entropy_before"]

@@ -11,7 +11,7 @@ from tiny import TINY_RECIPE
 from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import TRUTH
-from pcii.metrics.scoring import pixel_masks
+from pcii.metrics.true_masks import pixel_masks
 from simgen.base.strict_models import validate
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe
