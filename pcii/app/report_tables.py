@@ -3,13 +3,13 @@
 A column or row of which nothing is known is left out.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.summary import object_planes
-from pcii.evaluation.tables import Table
+from pcii.evaluation.tables import METHOD, Column, Table, tabulated
 
 Row = Mapping[str, Any]
 NUMBERS = (
@@ -59,22 +59,27 @@ def table1(outcome: Outcome) -> dict[str, Any] | None:
     if truth is None or all(bits is None for row in objects for bits in row["entropy"].values()):
         return None
     halves = entropy_half_widths(outcome.dataset.counts, outcome.sections, truth)
-    rows: list[dict[str, Any]] = []
-    for row, half in zip(objects, halves or [{}] * len(objects), strict=True):
-        if None in row["entropy"].values():  # not seen
-            continue
-        lowest = min(row["entropy"].values())
-        cells = [
-            {
-                "text": f"{bits:.3f}" + (f" ± {half[z]:.3f}" if z in half else ""),
-                "lowest": bits == lowest and len(row["entropy"]) > 1,
-            }
-            for z, bits in row["entropy"].items()
-        ]
-        rows.append({"name": row["name"], "cells": cells})
-    depths = [f"{z} mm" for z in objects[0]["entropy"]]
-    holds = table1_holds(objects, outcome.score.planes)
-    return {"depths": depths, "rows": rows, "has_intervals": bool(halves), "holds": holds}
+    seen = [
+        (row["name"], row["entropy"], half)
+        for row, half in zip(objects, halves or [{}] * len(objects), strict=True)
+        if None not in row["entropy"].values()
+    ]
+    columns: list[Column] = [("object", lambda entry: entry[0])]
+    lowest: dict[str, set[int]] = {}
+    depths = list(objects[0]["entropy"])
+    for z in depths:
+        columns.append((f"{z} mm", lambda entry, z=z: _with_half_width(entry[1][z], entry[2].get(z))))
+        least = {number for number, (_, bits, _) in enumerate(seen) if bits[z] == min(bits.values())}
+        lowest[f"{z} mm"] = least if len(depths) > 1 else set()
+    return {
+        "table": tabulated("Entropy of the objects", columns, seen, best=lowest),
+        "has_intervals": bool(halves),
+        "holds": table1_holds(objects, outcome.score.planes),
+    }
+
+
+def _with_half_width(bits: float, half: float | None) -> str:
+    return f"{bits:.3f}" if half is None else f"{bits:.3f} ± {half:.3f}"
 
 
 def table1_holds(objects: Sequence[Row], planes: Sequence[Row]) -> bool | None:
@@ -93,15 +98,11 @@ def score_table(outcome: Outcome) -> Table:
     planes = outcome.score.planes
     oracles = outcome.score.bounds["planes"] or [{"iou_oracle": None}] * len(planes)
     rows = [{**row, "iou_oracle": bound["iou_oracle"]} for row, bound in zip(planes, oracles, strict=True)]
-    columns: list[tuple[str, Callable[[Row], str]]] = [
-        ("plane", lambda row: f"{row['z_mm']:g} mm"),
-        ("method", lambda row: row["method"]),
-    ]
+    columns: list[Column] = [("plane", lambda row: f"{row['z_mm']:g} mm"), METHOD]
     if outcome.dataset.truth is None:
         rows = [row for row in rows if row["truth"] == "object"]
     else:
-        columns.append(("truth", lambda row: row["truth"]))
-        columns.append(("objects", _objects))
+        columns += [("truth", lambda row: row["truth"]), ("objects", _objects)]
     words = len(columns)
     columns += [
         (title, lambda row, key=key: _number(row[key]))
@@ -109,8 +110,7 @@ def score_table(outcome: Outcome) -> Table:
         if any(row[key] is not None for row in rows)
     ]
     columns.append(("claimed share", lambda row: _percent(row["claimed_share"], 2)))
-    cells = tuple(tuple(of(row) for _, of in columns) for row in rows)
-    return Table("Scores of the masks", tuple(title for title, _ in columns), cells, words)
+    return tabulated("Scores of the masks", columns, rows, words)
 
 
 def _objects(row: Row) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.evaluation.rows import Budget, Cells, Measure, by_light
-from pcii.evaluation.tables import P_COLUMNS, Table, budget_name, p_cells, with_interval
+from pcii.evaluation.tables import METHOD, P_VALUES, PHOTONS, Column, Table, tabulated, with_interval
 
 FEWEST_SCENES = 2
 """One scene has no spread over scenes."""
@@ -59,20 +59,30 @@ def pooled_tables(evaluation: Mapping[str, Any]) -> list[Table]:
 
 
 def _pooled(evaluation: Mapping[str, Any], measure: str, title: str, name: str) -> Table:
-    rows: list[tuple[str, ...]] = []
-    best: set[tuple[int, int]] = set()
-    for entry in evaluation.get("pooled", ()):
-        for row in entry["methods"] if entry["measure"] == measure else ():
-            if row["rank"] == 1 < entry["methods"][-1]["rank"]:
-                best |= {(len(rows), column) for column in (0, 3)}
-            tested = ("–",) * 3
-            if row["difference"] is not None:
-                tested = (with_interval(row["difference"]), *p_cells(row))
-            numbers = (str(entry["scenes"]), str(entry["datasets"]))
-            lead = (row["method"], budget_name(entry["budget"]), str(row["rank"]), with_interval(row["mean"]))
-            rows.append((*lead, *tested, *numbers))
-    header = ("method", "photons", "rank", f"mean {name}", "minus that of the best", *P_COLUMNS)
-    return Table(title, (*header, "scenes", "datasets"), tuple(rows), best=frozenset(best))
+    pools = [pool for pool in evaluation.get("pooled", ()) if pool["measure"] == measure]
+    entries = [
+        {name: pool[name] for name in ("budget", "scenes", "datasets")} | method
+        for pool in pools
+        for method in pool["methods"]
+    ]
+    last = [pool["methods"][-1]["rank"] for pool in pools for _ in pool["methods"]]
+    first = {number for number, entry in enumerate(entries) if entry["rank"] == 1 < last[number]}
+
+    def if_compared(column: Column) -> Column:
+        return column[0], lambda entry: "–" if entry["difference"] is None else column[1](entry)
+
+    mean = f"mean {name}"
+    columns: list[Column] = [
+        METHOD,
+        PHOTONS,
+        ("rank", lambda entry: str(entry["rank"])),
+        (mean, lambda entry: with_interval(entry["mean"])),
+        ("minus that of the best", lambda entry: with_interval(entry["difference"])),
+        *map(if_compared, P_VALUES),
+        ("scenes", lambda entry: str(entry["scenes"])),
+        ("datasets", lambda entry: str(entry["datasets"])),
+    ]
+    return tabulated(title, columns, entries, best={"method": first, mean: first})
 
 
 def _of_scene(

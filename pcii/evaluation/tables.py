@@ -1,6 +1,6 @@
 """Tables of an evaluation as text, the same for HTML and Markdown."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,8 +8,13 @@ from pcii.base.plain_text import in_markdown
 from pcii.evaluation.rows import by_light
 from pcii.io.dataset import FULL_LIGHT, Budget
 
-COLUMNS = (
-    ("IoU", "object", "iou"),
+Entry = Mapping[str, Any]
+Column = tuple[str, Callable[[Any], str]]
+"""The name of a column, and what an entry says in it."""
+
+IOU = ("IoU", "object", "iou")
+MEANS = (
+    IOU,
     ("IoU, pixels", "pixel", "iou"),
     ("oracle IoU, pixels", "pixel", "iou_oracle"),
     ("boundary F", "object", "boundary_f"),
@@ -17,19 +22,22 @@ COLUMNS = (
     ("photon precision", "object", "photon_precision"),
     ("photon recall", "object", "photon_recall"),
 )
-DEPTH_COLUMNS = (
-    ("median, px", "median_px"),
-    ("bias, px", "bias_px"),
-    ("bad_1px", "bad_1px"),
-    ("bad_3px", "bad_3px"),
-    ("BadPix(0.07)", "hci_objects", "badpix_007"),
-    ("BadPix(0.07), all pixels", "hci", "badpix_007"),
-    ("answered", "coverage"),
-    ("ECE", "ece"),
+"""What is shown of a result of removal: names of columns, and where their means are."""
+BAD_1PX = ("bad_1px", "depth", "bad_1px")
+OF_OBJECTS = ("BadPix(0.07)", "depth", "hci_objects", "badpix_007")
+OF_ALL_PIXELS = ("BadPix(0.07), all pixels", "depth", "hci", "badpix_007")
+"""It stands for that of objects where surfaces have no names, as in other people's data."""
+DEPTH_MEANS = (
+    ("median, px", "depth", "median_px"),
+    ("bias, px", "depth", "bias_px"),
+    BAD_1PX,
+    ("bad_3px", "depth", "bad_3px"),
+    OF_OBJECTS,
+    OF_ALL_PIXELS,
+    ("answered", "depth", "coverage"),
+    ("ECE", "depth", "ece"),
 )
-ALL_PIXELS = "BadPix(0.07), all pixels"
-"""The column that stands for those of objects where surfaces have no names, as in other people's data."""
-P_COLUMNS = ("p", "least p possible")
+"""The same of a result of depth."""
 EXPOSURE = "by exposure"
 """Name of the photon budget of datasets whose recipe has an exposure instead."""
 
@@ -48,66 +56,18 @@ class Table:
     best: frozenset[tuple[int, int]] = frozenset()
 
 
-def tables_of(group: Mapping[str, Any]) -> list[Table]:
-    """The tables of one group, without empty ones."""
-    tables = [_removal(group), _depth(group), _bounds(group)]
-    tables += [_paired(group, "iou", "IoU"), _paired(group, "bad_1px", "bad_1px"), _table1(group)]
-    return [table for table in tables if table.rows]
-
-
-def overviews(groups: Sequence[Mapping[str, Any]]) -> list[Table]:
-    """`overview` and `depth_overview`, without empty ones."""
-    return [table for table in (overview(groups), depth_overview(groups)) if table.rows]
-
-
-def overview(groups: Sequence[Mapping[str, Any]]) -> Table:
-    """Mean object IoU of every group and method by photon budget; labels of groups differ."""
-    return _by_budget(groups, "IoU by photon budget", "object", "iou", 1)
-
-
-def depth_overview(groups: Sequence[Mapping[str, Any]]) -> Table:
-    """Share of errors of depth above 1 px of every group and method by photon budget."""
-    return _by_budget(groups, "Errors of depth above 1 px by photon budget", "depth", "bad_1px", -1)
-
-
-def p_cells(entry: Mapping[str, Any]) -> tuple[str, str]:
-    """A p-value and the smallest that is possible, as text."""
-    sampled = "" if entry["exact"] else " (sampled)"
-    return f"{entry['p']:.2g}{sampled}", f"{entry['least_p']:.2g}"
-
-
-def _best(contests: Sequence[object], figures: Sequence[Mapping[str, Any] | None], sign: int) -> set[int]:
-    """Numbers of the figures with the best mean of their contest, where another one is worse."""
-    entered: dict[object, list[tuple[float, int]]] = {}
-    for number, (contest, figure) in enumerate(zip(contests, figures, strict=True)):
-        if figure is not None:
-            entered.setdefault(contest, []).append((sign * figure["mean"], number))
-    decided = [own for own in entered.values() if min(own)[0] < max(own)[0]]
-    return {number for own in decided for value, number in own if value == max(own)[0]}
-
-
-def _by_budget(groups: Sequence[Mapping[str, Any]], title: str, part: str, measure: str, sign: int) -> Table:
-    budgets: dict[Budget, None] = {}
-    cells: dict[tuple[str, str], dict[Budget, Any]] = {}
-    for group in groups:
-        for row in group["results"]:
-            if part in row:
-                budgets[row["budget"]] = None
-                mean = row[part].get(measure)
-                cells.setdefault((group["label"], row["method"]), {})[row["budget"]] = mean
-    order = sorted(budgets, key=by_light)
-    scenes, means = [scene for scene, _ in cells], list(cells.values())
-    rows = [
-        (*names, *(with_interval(by_budget.get(budget)) for budget in order))
-        for names, by_budget in cells.items()
-    ]
-    best = {
-        (number, column)
-        for column, budget in enumerate(order, start=2)
-        for number in _best(scenes, [by_budget.get(budget) for by_budget in means], sign)
-    }
-    header = ("scene", "method", *map(budget_name, order))
-    return Table(title, header, tuple(rows), words=2, best=frozenset(best))
+def tabulated(
+    title: str,
+    columns: Sequence[Column],
+    entries: Sequence[Any],
+    words: int = 1,
+    best: Mapping[str, set[int]] | None = None,
+) -> Table:
+    """A row for each entry; of `best` the numbers of the rows that stand out in the columns of its names."""
+    names = tuple(name for name, _ in columns)
+    rows = tuple(tuple(of(entry) for _, of in columns) for entry in entries)
+    cells = {(row, names.index(name)) for name, numbers in (best or {}).items() for row in numbers}
+    return Table(title, names, rows, words, frozenset(cells))
 
 
 def markdown(table: Table) -> str:
@@ -119,7 +79,7 @@ def markdown(table: Table) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
 
 
-def with_interval(mean: Mapping[str, Any] | None, digits: int = 3) -> str:
+def with_interval(mean: Entry | None, digits: int = 3) -> str:
     """A mean with its interval as text, a dash for None.
 
     >>> with_interval({"mean": 0.912, "interval": [0.905, 0.919]})
@@ -152,110 +112,155 @@ def light_name(budget: Budget) -> str:
     return budget_name(budget) if budget == FULL_LIGHT else f"{budget_name(budget)} photons"
 
 
-def _removal(group: Mapping[str, Any]) -> Table:
-    results = [row for row in group["results"] if "object" in row]
-    shown = [column for column in COLUMNS if any(row[column[1]].get(column[2]) for row in results)]
-    depths = sorted({plane["z_mm"] for row in results for plane in row["planes"]})
-    rows = []
-    for row in results:
-        planes = {plane["z_mm"]: plane["object"].get("iou") for plane in row["planes"]}
-        cells = [with_interval(planes.get(z)) for z in depths] if len(depths) > 1 else []
-        means = [with_interval(row[kind].get(name)) for _, kind, name in shown]
-        lead = (row["method"], budget_name(row["budget"]), str(row["seeds"]))
-        rows.append((*lead, *cells, *means, with_interval(row["seconds"], 2)))
-    planes = [f"IoU, {z:g} mm" for z in depths] if len(depths) > 1 else []
-    names = [name for name, _, _ in shown]
-    header = ("method", "photons", "seeds", *planes, *names, "seconds")
-    best = _best_rows(results, [row["object"].get("iou") for row in results], 1, header, "IoU")
-    return Table("Removal of defocused points", header, tuple(rows), best=best)
+METHOD: Column = ("method", lambda entry: entry["method"])
+PHOTONS: Column = ("photons", lambda entry: budget_name(entry["budget"]))
+P_VALUES: tuple[Column, ...] = (
+    ("p", lambda entry: f"{entry['p']:.2g}{'' if entry['exact'] else ' (sampled)'}"),
+    ("least p possible", lambda entry: f"{entry['least_p']:.2g}"),
+)
 
 
-def _best_rows(
-    results: Sequence[Mapping[str, Any]],
-    figures: Sequence[Mapping[str, Any] | None],
-    sign: int,
-    header: Sequence[str],
-    name: str,
-) -> frozenset[tuple[int, int]]:
-    """The method and the figure, in the column `name`, of the rows that are best at their budget."""
-    columns = [0, *(number for number, column in enumerate(header) if column == name)]
-    numbers = _best([row["budget"] for row in results], figures, sign)
-    return frozenset((number, column) for number in numbers for column in columns)
+def tables_of(group: Entry) -> list[Table]:
+    """The tables of one group, without empty ones."""
+    tables = [_removal(group), _depth(group), _bounds(group)]
+    tables += [_paired(group, "iou", "IoU"), _paired(group, "bad_1px", "bad_1px"), _table1(group)]
+    return [table for table in tables if table.rows]
 
 
-def _depth(group: Mapping[str, Any]) -> Table:
-    results = [row for row in group["results"] if "depth" in row]
-    means = [{name: _mean(row["depth"], *path) for name, *path in DEPTH_COLUMNS} for row in results]
-    shown = [name for name, *_ in DEPTH_COLUMNS if any(mean[name] for mean in means)]
-    if "BadPix(0.07)" in shown and ALL_PIXELS in shown:
-        shown.remove(ALL_PIXELS)
-    rows = tuple(
-        (
-            row["method"],
-            budget_name(row["budget"]),
-            str(row["seeds"]),
-            *(with_interval(mean[name], 2 if name.endswith(", px") else 3) for name in shown),
-            with_interval(row["seconds"], 2),
-        )
-        for row, mean in zip(results, means, strict=True)
-    )
-    header = ("method", "photons", "seeds", *shown, "seconds")
-    best = _best_rows(results, [mean["bad_1px"] for mean in means], -1, header, "bad_1px")
-    return Table("Depth", header, rows, best=best)
+def overviews(groups: Sequence[Entry]) -> list[Table]:
+    """`overview` and `depth_overview`, without empty ones."""
+    return [table for table in (overview(groups), depth_overview(groups)) if table.rows]
 
 
-def _mean(scores: Mapping[str, Any], *path: str) -> Mapping[str, Any] | None:
-    """A mean by its name, or by the names of the mappings that it is in; None if it is not there."""
-    found: Any = scores
+def overview(groups: Sequence[Entry]) -> Table:
+    """Mean object IoU of every group and method by photon budget; labels of groups differ."""
+    return _by_budget(groups, "IoU by photon budget", IOU[1:], 1)
+
+
+def depth_overview(groups: Sequence[Entry]) -> Table:
+    """Share of errors of depth above 1 px of every group and method by photon budget."""
+    return _by_budget(groups, "Errors of depth above 1 px by photon budget", BAD_1PX[1:], -1)
+
+
+def _mean(entry: Entry, *path: str) -> Entry | None:
+    """A mean by the names of the mappings that it is in; None if it is not there."""
+    found: Any = entry
     for name in path:
         found = None if found is None else found.get(name)
     return found
 
 
-def _bounds(group: Mapping[str, Any]) -> Table:
+def _mean_column(name: str, path: Sequence[str]) -> Column:
+    digits = 2 if name.endswith(", px") else 3
+    return name, lambda entry: with_interval(_mean(entry, *path), digits)
+
+
+def _mean_columns(means: Sequence[tuple[str, ...]], results: Sequence[Entry]) -> list[Column]:
+    """Columns of the means that a result has."""
+    return [_mean_column(name, path) for name, *path in means if any(_mean(row, *path) for row in results)]
+
+
+def _best(figures: Sequence[tuple[object, Entry | None]], sign: int) -> set[int]:
+    """Numbers of the figures with the best mean of their contest, where another one is worse."""
+    entered: dict[object, list[tuple[float, int]]] = {}
+    for number, (contest, figure) in enumerate(figures):
+        if figure is not None:
+            entered.setdefault(contest, []).append((sign * figure["mean"], number))
+    decided = [own for own in entered.values() if min(own)[0] < max(own)[0]]
+    return {number for own in decided for value, number in own if value == max(own)[0]}
+
+
+def _by_budget(groups: Sequence[Entry], title: str, path: Sequence[str], sign: int) -> Table:
+    cells: dict[tuple[str, str], dict[Budget, Entry | None]] = {}
+    for group in groups:
+        for row in group["results"]:
+            if path[0] in row:
+                cells.setdefault((group["label"], row["method"]), {})[row["budget"]] = _mean(row, *path)
+    budgets: set[Budget] = {budget for by_budget in cells.values() for budget in by_budget}
+    columns: list[Column] = [("scene", lambda entry: entry[0][0]), ("method", lambda entry: entry[0][1])]
+    best: dict[str, set[int]] = {}
+    for budget in sorted(budgets, key=by_light):
+        name = budget_name(budget)
+        columns.append((name, lambda entry, budget=budget: with_interval(entry[1].get(budget))))
+        best[name] = _best([(scene, means.get(budget)) for (scene, _), means in cells.items()], sign)
+    return tabulated(title, columns, list(cells.items()), words=2, best=best)
+
+
+def _results(
+    title: str, results: Sequence[Entry], columns: Sequence[Column], decisive: Sequence[str], sign: int
+) -> Table:
+    """Results by method and budget; the best of a budget by the `decisive` mean stand out."""
+    name, *path = decisive
+    lead: list[Column] = [METHOD, PHOTONS, ("seeds", lambda row: str(row["seeds"]))]
+    seconds: Column = ("seconds", lambda row: with_interval(row["seconds"], 2))
+    rows = _best([(row["budget"], _mean(row, *path)) for row in results], sign)
+    best = {"method": rows, name: rows} if rows else {}
+    return tabulated(title, [*lead, *columns, seconds], results, best=best)
+
+
+def _removal(group: Entry) -> Table:
+    results = [row for row in group["results"] if "object" in row]
+    depths = sorted({plane["z_mm"] for row in results for plane in row["planes"]})
+
+    def at_plane(z_mm: float) -> Column:
+        def iou(row: Entry) -> str:
+            planes = {plane["z_mm"]: plane["object"].get("iou") for plane in row["planes"]}
+            return with_interval(planes.get(z_mm))
+
+        return f"IoU, {z_mm:g} mm", iou
+
+    columns = [at_plane(z) for z in depths] if len(depths) > 1 else []
+    columns += _mean_columns(MEANS, results)
+    return _results("Removal of defocused points", results, columns, IOU, 1)
+
+
+def _depth(group: Entry) -> Table:
+    results = [row for row in group["results"] if "depth" in row]
+    columns = dict(_mean_columns(DEPTH_MEANS, results))
+    if OF_OBJECTS[0] in columns:
+        columns.pop(OF_ALL_PIXELS[0], None)
+    return _results("Depth", results, list(columns.items()), BAD_1PX, -1)
+
+
+def _bounds(group: Entry) -> Table:
     """Bounds of each object and budget; they are the same for all methods that saw the same photons."""
-    cells = {
-        (bound["name"], row["budget"]): (bound["photons"], bound["depth_sigma_px"])
+    bounds = {
+        (bound["name"], row["budget"]): bound | {"budget": row["budget"]}
         for row in group["results"]
         for bound in row.get("bounds", {}).get("objects", ())
         if bound["depth_sigma_px"] is not None
     }
-    rows = tuple(
-        (name, budget_name(budget), with_interval(photons, 0), with_interval(sigma))
-        for (name, budget), (photons, sigma) in cells.items()
-    )
-    header = ("object", "photons", "photons of the object", "standard deviation, px")
-    return Table("Least error of an object's depth (Cramér-Rao bound)", header, rows)
+    columns: list[Column] = [
+        ("object", lambda bound: bound["name"]),
+        PHOTONS,
+        ("photons of the object", lambda bound: with_interval(bound["photons"], 0)),
+        ("standard deviation, px", lambda bound: with_interval(bound["depth_sigma_px"])),
+    ]
+    title = "Least error of an object's depth (Cramér-Rao bound)"
+    return tabulated(title, columns, list(bounds.values()))
 
 
-def _paired(group: Mapping[str, Any], measure: str, name: str) -> Table:
-    rows = tuple(
-        (
-            " minus ".join(entry["methods"]),
-            budget_name(entry["budget"]),
-            str(entry["difference"]["n"]),
-            with_interval(entry["difference"]),
-            *p_cells(entry),
-        )
-        for entry in group["paired"]
-        if entry["measure"] == measure
-    )
-    header = ("methods", "photons", "seeds", f"difference of {name}", *P_COLUMNS)
+def _paired(group: Entry, measure: str, name: str) -> Table:
+    columns: list[Column] = [
+        ("methods", lambda pair: " minus ".join(pair["methods"])),
+        PHOTONS,
+        ("seeds", lambda pair: str(pair["difference"]["n"])),
+        (f"difference of {name}", lambda pair: with_interval(pair["difference"])),
+        *P_VALUES,
+    ]
     kind = "methods" if measure == "iou" else "methods of depth"
-    return Table(f"Pairs of {kind} on the same datasets", header, rows)
+    pairs = [pair for pair in group["paired"] if pair["measure"] == measure]
+    return tabulated(f"Pairs of {kind} on the same datasets", columns, pairs)
 
 
-def _table1(group: Mapping[str, Any]) -> Table:
-    rows = tuple(
-        (
-            entry["object"],
-            f"{entry['own_z_mm']:g} mm",
-            budget_name(entry["budget"]),
-            f"{entry['lowest_at_own']} of {entry['seeds']}",
-            f"{entry['smallest_gap_bits']:.3f}",
-            f"{entry['mean_gap_bits']:.3f}",
-        )
-        for entry in group["table1"]
-    )
-    header = ("object", "plane", "photons", "lowest at its plane", "smallest gap, bits", "mean gap, bits")
-    return Table("Entropy of the objects (Table 1 of Muniraj et al. 2017)", header, rows, words=2)
+def _table1(group: Entry) -> Table:
+    columns: list[Column] = [
+        ("object", lambda entry: entry["object"]),
+        ("plane", lambda entry: f"{entry['own_z_mm']:g} mm"),
+        PHOTONS,
+        ("lowest at its plane", lambda entry: f"{entry['lowest_at_own']} of {entry['seeds']}"),
+        ("smallest gap, bits", lambda entry: f"{entry['smallest_gap_bits']:.3f}"),
+        ("mean gap, bits", lambda entry: f"{entry['mean_gap_bits']:.3f}"),
+    ]
+    title = "Entropy of the objects (Table 1 of Muniraj et al. 2017)"
+    return tabulated(title, columns, group["table1"], words=2)
