@@ -16,7 +16,14 @@ from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.core.view_figures import middle_camera
 from pcii.figures import pictures as picture
-from pcii.figures.exposure import block_sums, encoded, filled_means, smoothed, smoothing_for
+from pcii.figures.exposure import (
+    block_sums,
+    encoded,
+    filled_means,
+    photon_picture,
+    smoothed,
+    smoothing_for,
+)
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.demosaicing import demosaic
@@ -214,8 +221,7 @@ def _photon_panel(shown: Shown) -> Panel:
     counts = shown.outcome.dataset.counts
     k, l = middle_camera(counts.grid)
     view = counts.view(k, l)
-    photons = shown.crop.sums(view[..., None])
-    image = picture.to_srgb8(photons, max(1.0, picture.white_level(photons)))
+    image = photon_picture(view[shown.crop.rows, shown.crop.cols], shown.crop.step_px)
     return _drawing(image, f"view ({k}, {l}) at the photon budget: {view.sum()} photons")
 
 

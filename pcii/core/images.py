@@ -11,7 +11,7 @@ from pcii.core.array_labels import VIEWS_LABELS
 from pcii.core.arrays import check_unmasked, read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
-from pcii.core.view_figures import chosen_camera, draw_light, light_thumbnail, middle_camera
+from pcii.core.view_figures import chosen_camera, draw_view, light_picture, middle_camera, view_thumbnail
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
@@ -73,7 +73,8 @@ class Views(Brief):
     def _thumbnails(self) -> dict[str, str]:
         k, l = middle_camera(self.grid)
         try:
-            return {f"view ({k}, {l})": light_thumbnail(self.view(k, l), self.cfa)}
+            picture = light_picture(self.view(k, l), self.cfa)
+            return {f"view ({k}, {l})": view_thumbnail(picture, self.grid)}
         except (InputError, OSError):  # no number, or no file: the rest can still be shown
             return {}
 
@@ -97,12 +98,13 @@ class Views(Brief):
         default those of a new figure. Raises `InputError` for a camera outside the grid, or NaN or infinity.
         """
         camera = chosen_camera(self.grid, view)
-        if camera is None:
-            light = np.zeros(self.radiance.shape[2:])
+        if camera is not None:
+            light, title = self.view(*camera), f"view {camera}"
+        else:
+            light, title = np.zeros(self.radiance.shape[2:]), "mean of all views"
             for k, l in np.ndindex(*self.radiance.shape[:2]):
                 light += self.view(k, l) / self.grid.view_count
-            return draw_light(axes, light, self.cfa, "mean of all views")
-        return draw_light(axes, self.view(*camera), self.cfa, f"view {camera}")
+        return draw_view(axes, light_picture(light, self.cfa), self.grid, title)
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

@@ -13,7 +13,14 @@ from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.arrays import check_total, read_only, whole_counts
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
 from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of
-from pcii.core.view_figures import chosen_camera, draw_light, draw_photons, middle_camera, photon_thumbnail
+from pcii.core.view_figures import (
+    chosen_camera,
+    draw_view,
+    light_picture,
+    middle_camera,
+    photon_picture,
+    view_thumbnail,
+)
 from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
@@ -123,7 +130,8 @@ class PhotonCounts(Brief):
     def _thumbnails(self) -> dict[str, str]:
         k, l = middle_camera(self.grid)
         counts = self.view(k, l)
-        return {f"view ({k}, {l}), photons: {counts.sum()}": photon_thumbnail(counts)}
+        picture = photon_picture(counts)
+        return {f"view ({k}, {l}), photons: {counts.sum()}": view_thumbnail(picture, self.grid)}
 
     @property
     def is_sparse(self) -> bool:
@@ -230,12 +238,13 @@ class PhotonCounts(Brief):
         camera = chosen_camera(self.grid, view)
         if camera is not None:
             counts = self.view(*camera)
-            return draw_photons(axes, counts, f"view {camera}, photons: {counts.sum()}")
+            title = f"view {camera}, photons: {counts.sum()}"
+            return draw_view(axes, photon_picture(counts), self.grid, title)
         # The sum is a whole number, and at its exposure the picture of the mean.
         views = np.ndindex(self.grid.rows, self.grid.cols)
         light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
         title = f"mean of all views, photons: {self.total}"
-        return draw_light(axes, light[..., None], self.cfa, title)
+        return draw_view(axes, light_picture(light[..., None], self.cfa), self.grid, title)
 
     def to_xarray(self) -> "xarray.Dataset":
         """`dense` over cameras and pixels."""

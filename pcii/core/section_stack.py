@@ -129,30 +129,30 @@ class Sections(Brief):
 
         film, planes = (self.grid.height, self.grid.width), evenly_chosen(len(self.planes), MOST_PANELS)
         panels = several_axes(axes, len(planes), film)
-        block = block_px(self.counts.shape[1:3], PANEL_PX) / self.subpixel
-        for panel, plane, image in zip(panels, planes, self._pictures(planes, PANEL_PX, kept), strict=True):
-            show_picture(panel, image, film, f"section at {self.z_mm[plane]:.5g} mm", block)
+        step_px = block_px(self.counts.shape[1:3], PANEL_PX)
+        for panel, plane, image in zip(panels, planes, self._pictures(planes, step_px, kept), strict=True):
+            show_picture(panel, image, film, f"section at {self.z_mm[plane]:.5g} mm", step_px / self.subpixel)
         return panels, planes
 
     def _thumbnails_of(self, kept: np.ndarray | None) -> dict[str, str]:
         """Small pictures for notebooks by caption, only of points that are `kept`, bool (Z, H, W)."""
-        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, evenly_chosen
+        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, block_px, evenly_chosen
         from pcii.figures.pictures import data_uri
 
         planes = evenly_chosen(len(self.planes), MOST_THUMBNAILS)
-        images = self._pictures(planes, THUMBNAIL_PX, kept)
+        images = self._pictures(planes, block_px(self.counts.shape[1:3], THUMBNAIL_PX), kept)
         return {f"{z:.5g} mm": data_uri(image) for z, image in zip(self.z_mm[planes], images, strict=True)}
 
-    def _pictures(self, planes: Sequence[int], longest_px: int, kept: np.ndarray | None) -> list[np.ndarray]:
-        """8-bit pictures of sections at a common exposure, no side longer than `longest_px`."""
+    def _pictures(self, planes: Sequence[int], step_px: int, kept: np.ndarray | None) -> list[np.ndarray]:
+        """8-bit pictures of sections in blocks of `step_px` x `step_px` voxels, at a common exposure."""
         from pcii.figures.exposure import exposed
 
-        images: list[tuple[np.ndarray, np.ndarray]] = []
-        for plane in planes:
+        def light(plane: int) -> tuple[np.ndarray, np.ndarray]:
             sums, samples = self.counts[plane], self.coverage[plane]
             if kept is not None:
                 sums = sums * kept[plane][..., None]
-            if self.cfa is not None:
-                sums, samples = (by_colour(mosaic[..., 0], self.cfa) for mosaic in (sums, samples))
-            images.append((sums, samples))
-        return exposed(images, longest_px)
+            if self.cfa is None:
+                return sums, samples
+            return by_colour(sums[..., 0], self.cfa), by_colour(samples[..., 0], self.cfa)
+
+        return exposed(map(light, planes), step_px)

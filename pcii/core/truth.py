@@ -96,15 +96,17 @@ class Truth(Brief):
         *,
         z_range_mm: tuple[float, float] | None = None,
     ) -> np.ndarray:
-        """Draw `object_z_mm` and the objects with their names, two panels; return the Matplotlib axes (2,).
+        """Draw `object_z_mm`, and the objects with names beside them; return the Matplotlib axes (2,).
 
         The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
         two, by default of a new figure. Raises `InputError` for another number.
         """
-        from pcii.figures.maps import draw_depth, draw_objects
+        from pcii.figures.maps import draw_depth
+        from pcii.figures.object_maps import draw_objects, named_width
         from pcii.figures.panels import several_axes
 
-        panels = several_axes(axes, 2, self.z_mm.shape)
+        height, width = self.z_mm.shape
+        panels = several_axes(axes, 2, self.z_mm.shape, widths=(1.0, named_width(width / height)))
         title = "true depth of the objects" if self.has_objects else "true depth"
         draw_depth(panels[0], self.object_z_mm, None, z_range_mm, title)
         draw_objects(panels[1], self.object_id, self.names)

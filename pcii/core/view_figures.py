@@ -1,5 +1,6 @@
 """Pictures of elemental images: which view, its colours, its exposure."""
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -10,6 +11,9 @@ from pcii.core.camera_grid import CameraGrid, check_camera
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+Picture = Callable[[int], np.ndarray]
+"""Makes an 8-bit picture (h, w, 3) in blocks of so many pixels to a side."""
 
 
 def middle_camera(grid: CameraGrid) -> tuple[int, int]:
@@ -34,7 +38,7 @@ def chosen_camera(grid: CameraGrid, view: tuple[int, int] | Literal["mean"] | No
     return k, l
 
 
-def _samples_and_colours(light: np.ndarray, cfa: str | None) -> tuple[np.ndarray, np.ndarray]:
+def colours_and_samples(light: np.ndarray, cfa: str | None) -> tuple[np.ndarray, np.ndarray]:
     """Light and number of samples, (H, W, C) each, of an image (H, W, C) that may be a mosaic."""
     samples = np.ones(light.shape, dtype=np.int64)
     if cfa is None:
@@ -42,42 +46,35 @@ def _samples_and_colours(light: np.ndarray, cfa: str | None) -> tuple[np.ndarray
     return by_colour(light[..., 0], cfa), by_colour(samples[..., 0], cfa)
 
 
-def draw_light(axes: "Axes | None", light: np.ndarray, cfa: str | None, title: str) -> np.ndarray:
-    """Draw light (H, W, C), a mosaic if `cfa` is given, in its colours; returns the axes (1,)."""
-    from pcii.figures.exposure import PANEL_PX, block_px, exposed
+def light_picture(light: np.ndarray, cfa: str | None) -> Picture:
+    """Light (H, W, C), a mosaic if `cfa` is given, in its colours."""
+    from pcii.figures.exposure import exposed
+
+    return lambda step_px: exposed([colours_and_samples(light, cfa)], step_px)[0]
+
+
+def photon_picture(counts: np.ndarray) -> Picture:
+    """Photon counts (H, W) of one view, in grey: of so few, neighbours would only take false colours."""
+    from pcii.figures import exposure
+
+    return lambda step_px: exposure.photon_picture(counts, step_px)
+
+
+def draw_view(axes: "Axes | None", picture: Picture, grid: CameraGrid, title: str) -> np.ndarray:
+    """Draw a picture over the pixels of a view; returns the axes (1,)."""
+    from pcii.figures.exposure import PANEL_PX, block_px
     from pcii.figures.panels import several_axes, show_picture
 
-    panels = several_axes(axes, 1, light.shape[:2])
-    (image,) = exposed([_samples_and_colours(light, cfa)], PANEL_PX)
-    show_picture(panels[0], image, light.shape[:2], title, block_px(light.shape, PANEL_PX))
+    film = grid.height, grid.width
+    step_px = block_px(film, PANEL_PX)
+    panels = several_axes(axes, 1, film)
+    show_picture(panels[0], picture(step_px), film, title, step_px)
     return panels
 
 
-def draw_photons(axes: "Axes | None", counts: np.ndarray, title: str) -> np.ndarray:
-    """Draw photon counts (H, W) of one view, in grey: of so few, neighbours would only take false colours.
-
-    Returns the axes (1,).
-    """
-    from pcii.figures.exposure import PANEL_PX, block_px, photon_picture
-    from pcii.figures.panels import several_axes, show_picture
-
-    panels = several_axes(axes, 1, counts.shape)
-    image = photon_picture(counts, PANEL_PX)
-    show_picture(panels[0], image, counts.shape, title, block_px(counts.shape, PANEL_PX))
-    return panels
-
-
-def light_thumbnail(light: np.ndarray, cfa: str | None) -> str:
-    """A small picture of light (H, W, C) as a data URI."""
-    from pcii.figures.exposure import THUMBNAIL_PX, exposed
+def view_thumbnail(picture: Picture, grid: CameraGrid) -> str:
+    """A small picture of a view as a data URI."""
+    from pcii.figures.exposure import THUMBNAIL_PX, block_px
     from pcii.figures.pictures import data_uri
 
-    return data_uri(exposed([_samples_and_colours(light, cfa)], THUMBNAIL_PX)[0])
-
-
-def photon_thumbnail(counts: np.ndarray) -> str:
-    """A small picture of photon counts (H, W) as a data URI."""
-    from pcii.figures.exposure import THUMBNAIL_PX, photon_picture
-    from pcii.figures.pictures import data_uri
-
-    return data_uri(photon_picture(counts, THUMBNAIL_PX))
+    return data_uri(picture(block_px((grid.height, grid.width), THUMBNAIL_PX)))

@@ -1,6 +1,5 @@
 """Plots of an evaluation: accuracy against photons per view and run time, and reliability of confidence."""
 
-import base64
 import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -8,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from pcii.evaluation.tables import light_name
 from pcii.figures.charts import draw_diagonal, draw_reliability_diagram
 from pcii.figures.palette import COLOURS, MARKERS, plot_label
+from pcii.figures.panels import new_figure
+from pcii.figures.pictures import uri_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +35,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     has_measure = {row["method"] for row in group["results"] if row.get(part, {}).get(measure)}
     if has_measure.isdisjoint(methods):
         return ""
-    figure = _figure(3.9)
+    figure = new_figure(10.5, 3.9, "constrained")
     by_photons, by_seconds = figure.subplots(1, 2, sharey=True)
     for number, method in enumerate(methods):
         rows = [row for row in group["results"] if row["method"] == method and row[part].get(measure)]
@@ -84,7 +85,7 @@ def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
         return ""
     columns = min(PANELS, len(budgets))
     lines = -(-len(budgets) // columns)
-    figure = _figure(0.7 + 2.6 * lines, 0.7 + 2.45 * columns)
+    figure = new_figure(0.7 + 2.45 * columns, 0.7 + 2.6 * lines, "constrained")
     panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
     for budget, axes in zip(budgets, panels.flat, strict=False):
         draw_diagonal(axes)
@@ -124,15 +125,6 @@ def _style(number: int) -> dict[str, Any]:
     }
 
 
-def _figure(height: float, width: float = 10.5) -> "Figure":
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _frame(axes: "Axes") -> None:
     """A vertical axis of shares, and a grid without a box."""
     axes.set_ylim(-0.02, 1.02)
@@ -143,7 +135,7 @@ def _frame(axes: "Axes") -> None:
 def _data_uri(figure: "Figure") -> str:
     stored = io.BytesIO()
     figure.savefig(stored, format="png")
-    return f"data:image/png;base64,{base64.b64encode(stored.getvalue()).decode()}"
+    return uri_of("png", stored.getvalue())
 
 
 def _bars(means: Sequence[Mapping[str, Any]]) -> list[list[float]]:

@@ -11,7 +11,8 @@ too. Matplotlib is imported on the first picture.
 charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
 exposure      What of an image is shown, and how bright: blocks, smoothed photons, means, a common
               exposure.
-maps          Maps over pixels with a scale or names: depth, entropy, objects.
+maps          Maps over pixels with a scale: depth, entropy.
+object_maps   Objects in colours, with their names beside the picture.
 palette       Colours and markers that the colour-blind can distinguish, and names as Matplotlib shows them.
 panels        Axes to draw in, given or new, and pictures over the pixels of a view.
 pictures      Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.

@@ -1,6 +1,6 @@
 """What of an image is shown, and how bright: blocks, smoothed photons, means, a common exposure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -106,22 +106,21 @@ def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]
     return [to_srgb8(estimate, white) for estimate, _ in blocks]
 
 
-def exposed(images: Sequence[tuple[np.ndarray, np.ndarray]], longest_px: int) -> list[np.ndarray]:
+def exposed(images: Iterable[tuple[np.ndarray, np.ndarray]], step_px: int) -> list[np.ndarray]:
     """8-bit pictures of images, each given by sums and numbers of samples (H, W, C), at the same exposure.
 
-    They are shown in blocks, so that no side is longer than `longest_px`.
+    They are shown in blocks of `step_px` x `step_px` pixels.
     """
     blocks: list[tuple[np.ndarray, np.ndarray]] = []
     for sums, samples in images:
-        step_px = block_px(sums.shape, longest_px)
         sums, samples = block_sums(sums, step_px), block_sums(samples, step_px)
         blocks.append((filled_means(sums, samples), samples))
     return encoded(blocks)
 
 
-def photon_picture(counts: np.ndarray, longest_px: int) -> np.ndarray:
+def photon_picture(counts: np.ndarray, step_px: int) -> np.ndarray:
     """8-bit picture of the photon counts (H, W) of one view: the photons in blocks, one or more are white."""
-    shown = block_sums(counts[..., None], block_px(counts.shape, longest_px))
+    shown = block_sums(counts[..., None], step_px)
     return to_srgb8(shown, max(1.0, white_level(shown)))
 
 

@@ -1,12 +1,11 @@
-"""Maps over pixels with a scale or names: depth, entropy, objects."""
+"""Maps over pixels with a scale: depth, entropy."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.figures.exposure import THUMBNAIL_PX, block_px
-from pcii.figures.palette import COLOURS, plot_label
 from pcii.figures.panels import figure_of, show_picture, write_in_middle
 from pcii.figures.pictures import data_uri, depth_image
 
@@ -17,10 +16,6 @@ OUTLYING = 0.01
 """Share of the depths, at either end, that may lie outside the scale."""
 LEAST_DEPTH_MM = 1.0
 """A scale of depth spans so much at least: what is flat is no picture of rounding errors."""
-MOST_NAMES = 20
-"""Objects that are named in a picture: the largest."""
-OBJECT_COLOURS = COLOURS[:-1]
-"""Black is where no object is."""
 
 
 def depth_limits_mm(z_mm: np.ndarray) -> tuple[float, float] | None:
@@ -39,8 +34,12 @@ def draw_depth(
     confidence: np.ndarray | None,
     limits_mm: tuple[float, float] | None,
     title: str,
+    scale_axes: "Axes | None" = None,
 ) -> None:
-    """Depth (H, W) in mm with a colour bar, near is bright; greyer where less sure, black where not known."""
+    """Depth (H, W) in mm with a colour bar, near is bright; greyer where less sure, black where not known.
+
+    The bar is drawn into `scale_axes`, by default into a part of `axes`.
+    """
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -50,7 +49,8 @@ def draw_depth(
         write_in_middle(axes, "no depth is known")
     if limits is not None:
         scale = ScalarMappable(Normalize(*limits), "viridis_r")
-        bar = figure_of(axes).colorbar(scale, ax=axes, label="depth z (mm)")
+        beside = axes if scale_axes is None else None
+        bar = figure_of(axes).colorbar(scale, cax=scale_axes, ax=beside, label="depth z (mm)")
         bar.ax.invert_yaxis()
 
 
@@ -82,33 +82,3 @@ def draw_entropy(axes: "Axes", bits: np.ndarray, most_bits: float, film: Sequenc
     show_picture(axes, entropy_image(bits, most_bits), film, "uncertainty of depth", side_px)
     scale = ScalarMappable(Normalize(0, most_bits), "cividis")
     figure_of(axes).colorbar(scale, ax=axes, label="entropy (bits)")
-
-
-def draw_objects(axes: "Axes", object_id: np.ndarray, names: Mapping[int, str]) -> None:
-    """Objects (H, W) in colours with their names; black where none is."""
-    image = np.zeros((*object_id.shape, 3))
-    ids, sizes = np.unique(object_id[object_id > 0], return_counts=True)
-    for place, number in enumerate(ids.tolist()):
-        image[object_id == number] = _rgb(OBJECT_COLOURS[place % len(OBJECT_COLOURS)])
-    show_picture(axes, image, object_id.shape, "objects")
-    box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "alpha": 0.8, "linewidth": 0}
-    for number in ids[np.argsort(-sizes, kind="stable")][:MOST_NAMES].tolist():
-        i, j = _middle(object_id == number)
-        axes.text(
-            j, i, plot_label(names[number]), bbox=box, clip_on=True, ha="center", va="center", color="black"
-        )
-    if not ids.size:
-        write_in_middle(axes, "no object is seen")
-
-
-def _rgb(colour: str) -> np.ndarray:
-    from matplotlib.colors import to_rgb
-
-    return np.array(to_rgb(colour))
-
-
-def _middle(mask: np.ndarray) -> tuple[int, int]:
-    """The pixel of a mask that is nearest to its centre of mass: a place for a name."""
-    pixels = np.argwhere(mask)
-    i, j = pixels[((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1).argmin()]
-    return int(i), int(j)

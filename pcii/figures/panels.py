@@ -1,7 +1,7 @@
 """Axes to draw in, given or new, and pictures over the pixels of a view."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ MOST_PANELS = 12
 COLUMNS = 4
 PANEL_IN = 3.4
 """Longer side of a panel of a new figure in inches."""
+DOTS_PER_INCH = 110
 LABELS_IN = 0.9
 """Room for the labels of a panel in inches."""
 GRID_COLOUR = "#8a94a6"
@@ -23,12 +24,16 @@ GRID_COLOUR = "#8a94a6"
 
 
 def several_axes(
-    axes: "Axes | Sequence[Axes] | np.ndarray | None", count: int, shape: Sequence[float] = (3.0, 4.0)
+    axes: "Axes | Sequence[Axes] | np.ndarray | None",
+    count: int,
+    shape: Sequence[float] = (3.0, 4.0),
+    widths: Sequence[float] | None = None,
 ) -> np.ndarray:
     """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those given, or new ones.
 
-    For one panel the axes may be given without a list. Raises `InputError` if the number of axes is not
-    `count`, or if something given is no Matplotlib axes.
+    Of few panels, in one row, some may be so many times as wide: `widths` (N,). For one panel the axes may be
+    given without a list. Raises `InputError` if the number of axes is not `count`, or if something given is
+    no Matplotlib axes.
     """
     from matplotlib import pyplot
     from matplotlib.axes import Axes
@@ -43,9 +48,13 @@ def several_axes(
         return _array_of(given)
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
+    ratios = [1.0] * columns if widths is None else list(widths)
     height, width = (PANEL_IN * side / max(shape) for side in shape)
-    size = columns * (max(width, PANEL_IN / 2) + LABELS_IN), rows * (max(height, PANEL_IN / 3) + LABELS_IN)
-    figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
+    across = sum(ratios) * max(width, PANEL_IN / 2) + columns * LABELS_IN
+    size = across, rows * (max(height, PANEL_IN / 3) + LABELS_IN)
+    figure, grid = pyplot.subplots(
+        rows, columns, squeeze=False, figsize=size, layout="compressed", width_ratios=ratios
+    )
     for unused in grid.flat[count:]:
         figure.delaxes(unused)
     return _array_of(list(grid.flat[:count]))
@@ -55,6 +64,18 @@ def _array_of(axes: "Sequence[Axes]") -> np.ndarray:
     kept = np.empty(len(axes), dtype=object)
     kept[:] = axes
     return kept
+
+
+def new_figure(
+    width_in: float, height_in: float, layout: Literal["compressed", "constrained"] | None
+) -> "Figure":
+    """An empty figure that needs no display and no global state."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
 
 
 def figure_of(axes: "Axes") -> "Figure | SubFigure":
@@ -80,6 +101,12 @@ def show_picture(
     axes.set_ylabel("row (px)")
     axes.set_title(title)
     axes.locator_params(integer=True, nbins=6)
+
+
+def hide_frame(axes: "Axes") -> None:
+    """No ticks, no labels and no lines around a picture."""
+    axes.set(xticks=[], yticks=[], xlabel="", ylabel="")
+    axes.spines[:].set_visible(False)
 
 
 def draw_outline(axes: "Axes", mask: np.ndarray, film: Sequence[int], colour: str) -> None:

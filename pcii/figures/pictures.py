@@ -112,7 +112,12 @@ def png_bytes(image: np.ndarray) -> bytes:
 
 def data_uri(image: np.ndarray) -> str:
     """An 8-bit RGB image as a data URI for HTML."""
-    return "data:image/png;base64," + base64.b64encode(png_bytes(image)).decode("ascii")
+    return uri_of("png", png_bytes(image))
+
+
+def uri_of(kind: str, content: bytes) -> str:
+    """A picture in a file of this kind, as a data URI."""
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def photo_uri(image: np.ndarray) -> str:
@@ -127,7 +132,7 @@ def photo_uri(image: np.ndarray) -> str:
     Image.fromarray(np.ascontiguousarray(image)).save(
         buffer, format="WEBP", quality=PHOTO_QUALITY, method=4, lossless=lossless
     )
-    return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+    return uri_of("webp", buffer.getvalue())
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

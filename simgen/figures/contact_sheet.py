@@ -1,29 +1,30 @@
 """A contact sheet of a finished dataset: its truth, its photons and its full-light images on one page."""
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.core.photon_counts import PhotonCounts
+from pcii.figures.object_maps import named_width
+from pcii.figures.panels import hide_frame, new_figure, write_in_middle
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import COUNTS
 from simgen.cameras.disparities import shifts_px
-from simgen.figures.picture_parts import (
-    check_picture_path,
-    draw_depth,
-    draw_objects,
-    hide_frame,
-    named_width,
-    new_figure,
-    part_of_interest,
-    save_figure,
+from simgen.figures.picture_parts import check_picture_path, draw_truth, part_of_interest, save_figure
+from simgen.figures.thumbnails import (
+    MOST_TILES,
+    Box,
+    chosen_cameras,
+    photon_block_px,
+    photon_tiles,
+    radiance_tiles,
 )
-from simgen.figures.thumbnails import MOST_TILES, Box, count_tiles, joined, radiance_tiles
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST_BARS = 40
-MARGIN = 0.03
-"""Around the objects, as a share of the picture's longer side."""
 HEAD_IN, TITLE_IN, GAP_IN, LABELS_IN = 0.65, 0.4, 0.3, 0.8
 """Room for the lines above all panels, a panel's title, between columns, and for numbers beside a scale."""
 WIDEST_IN, HIGHEST_IN, LEAST_IN = 4.6, 4.2, 1.6
@@ -50,8 +51,8 @@ def write_sheet(path: Path, out: Path) -> None:
     height, width = (part.stop - part.start for part in view_box)
     rows, cols = (min(number, MOST_TILES) for number in (dataset.grid.rows, dataset.grid.cols))
     size, places = layout(width / height, width * cols / (height * rows))
-    figure = new_figure(*size, layout=None)
-    axes = {name: figure.add_axes(place / np.array([*size, *size])) for name, place in places.items()}
+    figure = new_figure(*size, None)
+    axes = {name: figure.add_axes(tuple(place / np.array([*size, *size]))) for name, place in places.items()}
     for panel in axes.values():
         panel.set_anchor("N")  # the titles of a row are at one height
     _draw_counts(axes["photons"], counts, view_box)
@@ -99,50 +100,45 @@ def _parts(dataset: Dataset) -> tuple[Box, Box]:
     if truth is None:
         return (slice(0, grid.height), slice(0, grid.width)), (slice(0, grid.height), slice(0, grid.width))
     mask = truth.object_id > 0
-    margin = MARGIN * max(mask.shape)
     near = float(truth.z_mm[mask].min()) if mask.any() else np.inf
     away = max(np.abs(shift).max() for shift in shifts_px(grid, near)) if mask.any() else 0
-    return part_of_interest(mask, margin), part_of_interest(mask, margin + away)
+    return part_of_interest(mask), part_of_interest(mask, away)
 
 
-def _draw_truth(depth: Any, objects: Any, dataset: Dataset, box: Box) -> None:
+def _draw_truth(depth: "Axes", objects: "Axes", dataset: Dataset, box: Box) -> None:
     truth = dataset.truth
     if truth is None:
         _left_out(depth, "truth")
         _left_out(objects, "truth")
         return
-    draw_depth(depth, truth.z_mm[box], truth.object_id[box] > 0)
-    draw_objects(objects, truth.object_id[box], truth.names)
+    draw_truth(depth, objects, truth.z_mm[box], truth.object_id[box], truth.names)
 
 
-def _draw_counts(axes: Any, counts: PhotonCounts | None, box: Box) -> None:
+def _draw_counts(axes: "Axes", counts: PhotonCounts | None, box: Box) -> None:
     if counts is None:
         _left_out(axes, "photon counts")
         return
-    tiles = count_tiles(counts, box)
-    K, L, h, w = tiles.shape[:4]
-    grid = counts.grid
+    grid, side_px = counts.grid, photon_block_px(counts, box)
+    K, L = map(len, chosen_cameras(grid, MOST_TILES))
     some = "" if (grid.rows, grid.cols) == (K, L) else f"{K} x {L} of "
-    rows, cols = (part.stop - part.start for part in box)
-    axes.set_title(
-        f"photons of {some}{grid.rows} x {grid.cols} views, in bins of {rows / h:.2g} x {cols / w:.2g} pixels"
-    )
+    blocks = f"in blocks of {side_px} x {side_px} pixels" if side_px > 1 else "pixel by pixel"
+    axes.set_title(f"photons of {some}{grid.rows} x {grid.cols} views, {blocks}")
     hide_frame(axes)
-    axes.imshow(joined(tiles), interpolation="nearest")
+    axes.imshow(photon_tiles(counts, box, side_px), interpolation="nearest")
 
 
-def _draw_radiance(axes: Any, dataset: Dataset, box: Box) -> None:
+def _draw_radiance(axes: "Axes", dataset: Dataset, box: Box) -> None:
     views = dataset.views
     if views is None:
         _left_out(axes, "full-light images")
         return
-    tiles = radiance_tiles(views, RADIANCE_VIEWS, RADIANCE_PX, box)
-    axes.set_title(f"full light, {tiles.shape[0]} x {tiles.shape[1]} of the views")
+    K, L = map(len, chosen_cameras(views.grid, RADIANCE_VIEWS))
+    axes.set_title(f"full light, {K} x {L} of the views")
     hide_frame(axes)
-    axes.imshow(joined(tiles))
+    axes.imshow(radiance_tiles(views, RADIANCE_VIEWS, RADIANCE_PX, box))
 
 
-def _draw_histogram(axes: Any, counts: PhotonCounts | None) -> None:
+def _draw_histogram(axes: "Axes", counts: PhotonCounts | None) -> None:
     if counts is None:
         _left_out(axes, "photon counts")
         return
@@ -184,6 +180,6 @@ def facts(dataset: Dataset, counts: PhotonCounts | None) -> list[str]:
     return lines
 
 
-def _left_out(axes: Any, product: str) -> None:
+def _left_out(axes: "Axes", product: str) -> None:
     hide_frame(axes)
-    axes.text(0.5, 0.5, f"this dataset has no {product}", ha="center", transform=axes.transAxes)
+    write_in_middle(axes, f"this dataset has no {product}")

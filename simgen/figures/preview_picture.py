@@ -7,18 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.srgb import linear_to_srgb
+from pcii.figures.object_maps import named_width
+from pcii.figures.panels import hide_frame, new_figure
+from pcii.figures.pictures import to_srgb8, white_level
 from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.figures.picture_parts import (
-    DOTS_PER_INCH,
     check_picture_path,
-    draw_depth,
-    draw_objects,
+    draw_truth,
     frame_part,
-    hide_frame,
-    named_width,
-    new_figure,
     part_of_interest,
     save_figure,
 )
@@ -28,8 +25,6 @@ from simgen.renderer.radiance import render_view
 from simgen.truth.first_hits import first_hits_at_centre
 
 SIDE_PX = 512
-MARGIN = 0.03
-"""Around the objects, as a share of the picture's longer side."""
 PANEL_IN = 4.8
 """Height of a picture's panel."""
 
@@ -41,7 +36,7 @@ def write_preview(
     *,
     overrides: Sequence[str] = (),
     scene_number: int | None = None,
-    dots_per_inch: int = DOTS_PER_INCH,
+    dots_per_inch: float | None = None,
 ) -> None:
     """Write the preview of a scene or of a recipe's, a PNG or JPEG; `scene_number` says which draw of it.
 
@@ -58,18 +53,16 @@ def write_preview(
     picture = render_view(render_scene, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
     hits = first_hits_at_centre(render_scene, grid)
     things = hits.object_id > 0
-    white = float(np.quantile(picture[things] if things.any() else picture, 0.995))
-    box = part_of_interest(things, MARGIN * max(things.shape))
+    box = part_of_interest(things)
     aspect = float(np.clip(grid.width / grid.height, 0.4, 2.5))
     named = named_width(aspect)
-    figure = new_figure(PANEL_IN * (aspect * (2 + named) + 0.2) + 0.5, PANEL_IN + 0.7)
-    axes = figure.subplots(1, 3, width_ratios=(1, 1, named))
-    axes[0].imshow(linear_to_srgb(picture / max(white, 1e-12)))
-    axes[0].set_title("virtual centre")
-    hide_frame(axes[0])
+    figure = new_figure(PANEL_IN * (aspect * (2 + named) + 0.2) + 0.5, PANEL_IN + 0.7, "compressed")
+    whole, depth, objects = figure.subplots(1, 3, width_ratios=(1, 1, named))
+    whole.imshow(to_srgb8(picture, white_level(picture[things] if things.any() else picture)))
+    whole.set_title("virtual centre")
+    hide_frame(whole)
     if things.any() and box[0].stop - box[0].start < grid.height:
-        frame_part(axes[0], box)
-    draw_depth(axes[1], hits.z_mm[box], things[box])
-    draw_objects(axes[2], hits.object_id[box], render_scene.names)
+        frame_part(whole, box)
+    draw_truth(depth, objects, hits.z_mm[box], hits.object_id[box], render_scene.names)
     figure.suptitle(recipe.title or target.scene.title, parse_math=False)
     save_figure(figure, out, dots_per_inch)

@@ -14,6 +14,8 @@ from twins import unit_grid
 
 import pcii
 from pcii.core.focal_planes import FocalPlanes
+from pcii.figures.object_maps import draw_objects, spread_out
+from pcii.figures.panels import new_figure
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
 Z_MM = [1.0, 2.0]
@@ -142,11 +144,13 @@ def test_depth_is_greyer_where_less_sure_and_its_scale_is_in_mm() -> None:
     assert sorted(bar.get_ylim()) == [500, 700]
 
 
-def test_an_outlying_depth_does_not_set_the_scale() -> None:
+def test_neither_an_outlying_depth_nor_rounding_sets_the_scale() -> None:
     z_mm = np.linspace(540, 620, 500).reshape(20, 25)
     z_mm[0, 0] = 1e6
     bar = pcii.DepthMap(z_mm, np.ones(z_mm.shape)).plot()[0].figure.axes[-1]
     assert 535 < min(bar.get_ylim()) < max(bar.get_ylim()) < 625
+    flat = pcii.DepthMap(np.array([[540.0, 540.0001]]), np.ones((1, 2))).plot()[0].figure.axes[-1]
+    assert sorted(flat.get_ylim()) == pytest.approx([539.5, 540.5], abs=1e-3)
 
 
 def test_a_posterior_shows_a_pixel_or_all_entropies() -> None:
@@ -172,8 +176,38 @@ def test_truth_shows_depth_of_the_objects_and_their_names() -> None:
     depth, objects = pcii.Truth(z_mm, ids, {1: "ball", 2: "a$b"}).plot()
     assert max(depth.figure.axes[-1].get_ylim()) < 700
     assert not picture(depth)[0, 0].any()
-    named = {text.get_text(): text.get_position() for text in objects.texts}
-    assert named == {"ball": (4, 3), r"a\$b": (10, 7)}
+    assert [text.get_text() for text in objects.texts] == ["ball", r"a\$b"]  # left and right of the picture
+    ends = [np.array(line.get_xydata())[0].tolist() for line in objects.lines[::2]]
+    assert ends == [[4, 3], [9, 7]]
+    colours = [picture(objects)[i, j].tolist() for i, j in ((0, 0), (3, 4), (7, 9))]
+    assert len(set(map(tuple, colours))) == 3
+
+
+def test_names_of_two_dozen_objects_do_not_overlap() -> None:
+    names = {number: f"specimen_{number}" for number in range(1, 25)}
+    object_id = np.zeros((240, 240), dtype=np.int16)
+    rng = np.random.default_rng(2)
+    for number in names:  # half of them in one corner
+        i, j = rng.integers(0, 60 if number % 2 else 230, 2)
+        object_id[i : i + 9, j : j + 9] = number
+    figure = new_figure(9, 5, None)
+    axes = figure.subplots()
+    draw_objects(axes, object_id, names)
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) == len(np.unique(object_id)) - 1
+    for number, box in enumerate(boxes):
+        assert not any(box.overlaps(other) for other in boxes[number + 1 :])
+
+
+def test_places_are_moved_apart_and_no_further_than_needed() -> None:
+    np.testing.assert_allclose(spread_out(np.array([20.0, 50.0, 90.0]), 100), [20, 50, 90])
+    np.testing.assert_allclose(spread_out(np.array([50.0, 50.0]), 100), [47.5, 52.5])  # 5 apart
+    crowded = spread_out(np.full(30, 99.0), 100)
+    np.testing.assert_allclose(np.diff(crowded), 100 / 30)
+    assert crowded[0] > 0
+    assert crowded[-1] < 100
+    assert spread_out(np.zeros(0), 100).size == 0
 
 
 def test_a_score_draws_what_it_has() -> None:
