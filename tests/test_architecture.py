@@ -15,6 +15,7 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
+        "pictures",
         "figures",
         "core",
         "io",
@@ -52,7 +53,7 @@ ROOMS = {
 # What simgen may share with pcii: types, masks, file formats and how commands behave. Not its geometry
 # or anything built on it, so that simulation and reconstruction cannot share a sign mistake. Figures make
 # pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "figures", "core", "io", "exporting"}
+SHARED_ROOMS = {"base", "pictures", "figures", "core", "io", "exporting"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

@@ -20,8 +20,7 @@ from pcii.importing.count_frames import import_counts
 from pcii.importing.exported_files import exported_file, import_exported
 from pcii.importing.grid_check import GridCheck, check_grid
 from pcii.importing.hci_scenes import PARAMETERS, import_hci
-from pcii.importing.image_decoding import is_picture
-from pcii.importing.image_folders import import_images
+from pcii.importing.image_folders import import_images, is_picture
 from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.importing.light_encoding import Encoding
 

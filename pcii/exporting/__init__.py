@@ -10,7 +10,6 @@ exr_parts            One OpenEXR file: a part for each view with its radiance an
                      the truth.
 hci_layout           The layout of the 4D Light Field Benchmark of Konstanz and Heidelberg (Honauer et
                      al., ACCV 2016).
-pixel_files          Files of pixels that other tools read: PNG of 8 and 16 bits, PFM.
 publication_terms    Under what terms a dataset is published, and who made it: what its card says and its
                      data do not.
 sub_aperture_images  Sub-aperture images: a PNG for each view, named by row and column of its camera, and

@@ -23,10 +23,10 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.core.camera_grid import CameraGrid
-from pcii.exporting.pixel_files import write_pfm, write_png
 from pcii.exporting.view_names import number_width
 from pcii.figures.pictures import to_srgb8
 from pcii.io.dataset import Dataset
+from pcii.pictures.written_pixels import write_pfm, write_png
 from pcii.sections.demosaicing import demosaic
 
 PARAMETERS = "parameters.cfg"

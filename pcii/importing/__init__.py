@@ -12,13 +12,9 @@ grid_check      Whether views fit the cameras that were told: where they are sha
                 explains them better.
 hci_scenes      Scenes of the HCI 4D light field benchmark (Honauer et al. 2016): views, cameras and true
                 depth.
-image_decoding  One picture file to an array: PNG, JPEG, TIFF and EXR, of 8 or 16 bits or of floats, with
-                limits.
 image_folders   Elemental images from a folder of pictures, one file a view.
 lens_arrays     Pictures of a lens array: one picture that holds the elemental images of all lenses side
                 by side.
 light_encoding  Linear radiance from the numbers of picture files: sRGB, a gamma, or linear already.
-pfm_files       Maps in PFM files: portable float maps of one channel.
 plane_sweep     How well views agree at each of many depths: a plane sweep at reduced resolution.
-tiff_pages      Pages of TIFF files: grey or RGB, of 8 or 16 bits or of floats.
 """

@@ -12,9 +12,9 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
-from pcii.importing.image_decoding import check_unpacked
 from pcii.importing.image_folders import check_size
 from pcii.importing.light_encoding import Encoding, check_encoding, to_radiance
+from pcii.pictures.picture_files import check_unpacked
 
 LARGEST_BYTES = 1 << 34
 """Most bytes of an array in a file, 16 GiB."""

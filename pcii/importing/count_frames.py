@@ -12,8 +12,8 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.importing.array_files import opened_array
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
 from pcii.importing.file_patterns import files_by_camera
-from pcii.importing.image_decoding import Picture, decode, is_picture
-from pcii.importing.image_folders import check_size, headers_of, pages_of
+from pcii.importing.image_folders import check_size, headers_of, is_picture, pages_of
+from pcii.pictures.picture_files import Picture, decode
 
 
 def import_counts(

@@ -20,8 +20,9 @@ from pcii.exporting.event_archive import ARCHIVE as EVENTS
 from pcii.exporting.exr_parts import CENTRE
 from pcii.exporting.exr_parts import FILE as PARTS
 from pcii.importing.array_files import check_archive, opened_array
-from pcii.importing.image_decoding import check_unpacked
 from pcii.io.dataset_writer import check_budget, check_depth_range
+from pcii.pictures.exr_files import exr_channels, exr_headers, window_size
+from pcii.pictures.picture_files import check_unpacked
 
 GRID = tuple(field.name for field in fields(CameraGrid))
 
@@ -108,21 +109,13 @@ def _events(path: Path) -> Exported:
 
 
 def _parts(path: Path) -> Exported:
-    import OpenEXR
-
-    with OpenEXR.File(str(path), separate_channels=True, header_only=True) as file:
-        headers = [dict(part.header) for part in file.parts]  # gone when the file is closed
+    headers = exr_headers(path)
     told = json.loads(headers[0].get("comments", "null"))
     if not isinstance(told, Mapping) or not isinstance(told.get("grid"), Mapping):
         raise InputError(f"{path}: its comments do not say which cameras saw it; not of `simgen export`")
     grid, cfa = _grid(path, told["grid"]), told.get("cfa")
     _check_parts(path, headers, grid)
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        # Pixels are gone when the file is closed.
-        parts = {
-            part.name(): {name: np.array(channel.pixels) for name, channel in part.channels.items()}
-            for part in file.parts
-        }
+    parts = exr_channels(path)
     views = {place: channels for name, channels in parts.items() if (place := _place(name)) is not None}
     missing = next((place for place in np.ndindex(grid.rows, grid.cols) if place not in views), None)
     if views and missing is not None:
@@ -166,8 +159,7 @@ def _check_parts(path: Path, headers: Sequence[Mapping[str, Any]], grid: CameraG
     """Raise `InputError`, before pixels are decoded, for parts of another size, or of too many pixels."""
     size, channels = (grid.height, grid.width), 0
     for header in headers:
-        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
-        if (found := (bottom - top + 1, right - left + 1)) != size:
+        if (found := window_size(header)) != size:
             raise InputError(f"{path}: part {header['name']}: expected {size} pixels, got {found}")
         channels += len(header["channels"])
     unpacked = 4 * channels * grid.height * grid.width

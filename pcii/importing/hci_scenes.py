@@ -21,8 +21,8 @@ from pcii.exporting.hci_layout import INFINITY_M
 from pcii.importing.camera_order import Optics
 from pcii.importing.image_folders import import_images
 from pcii.importing.light_encoding import Encoding
-from pcii.importing.pfm_files import read_pfm
 from pcii.io.sealed_json import read_small
+from pcii.pictures.picture_files import decode, picture_of
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"
@@ -111,7 +111,13 @@ def import_hci(folder: str | Path, *, encoding: Encoding | None = None, report: 
 
 def _true_depth(path: Path, known: _Parameters) -> np.ndarray:
     """Planar depth (H, W) in mm, float32; `InputError` for depths that cannot be."""
-    numbers = read_pfm(path, (known.height, known.width)).astype(np.float64)
+    picture = picture_of(path, ["PFM"])
+    height, width, _ = picture.shape
+    if (height, width) != (known.height, known.width):
+        raise InputError(
+            f"{path}: is {height} x {width} px, where the views are {known.height} x {known.width}"
+        )
+    numbers = next(decode(picture))[..., 0].astype(np.float64)
     if path.name == DEPTH:
         z_mm = 1000 * numbers
     elif np.isfinite(numbers).all():

@@ -11,11 +11,18 @@ from pcii.base.progress import Report, silent
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
 from pcii.importing.file_patterns import files_by_camera, square_of
-from pcii.importing.image_decoding import Picture, decode, picture_of
 from pcii.importing.light_encoding import Encoding, check_encoding, to_radiance
+from pcii.pictures.picture_files import Picture, decode, kind_of, picture_of
 
 LARGEST_BYTES = 1 << 33
 """Most memory of all views together, 8 GiB."""
+VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
+"""Kinds of pictures of views."""
+
+
+def is_picture(path: Path) -> bool:
+    """Whether this is a file that begins like a picture of views."""
+    return path.is_file() and kind_of(path) in VIEWS
 
 
 def import_images(
@@ -62,7 +69,7 @@ def pages_of(
     Pages are counted along the rows of `grid`, by default a square one. Raises `InputError` for another
     number of pages.
     """
-    picture = picture_of(path)
+    picture = picture_of(path, VIEWS)
     if picture.pages == 1:
         raise InputError(
             f"{path}: is one picture; of a lens array it needs --lens-array, as one of several views its "
@@ -84,7 +91,7 @@ def headers_of(files: np.ndarray, *, pages: bool = False) -> np.ndarray:
     """
     pictures = np.empty(files.shape, dtype=object)
     for camera, path in np.ndenumerate(files):
-        picture = picture_of(path)
+        picture = picture_of(path, VIEWS)
         if picture.pages > 1 and not pages:
             raise InputError(f"{path}: has {picture.pages} pages; frames of photon counts need --counts")
         first = pictures.flat[0] or picture

@@ -9,9 +9,9 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
-from pcii.importing.image_decoding import decode, picture_of
-from pcii.importing.image_folders import check_size, radiance_of
+from pcii.importing.image_folders import VIEWS, check_size, radiance_of
 from pcii.importing.light_encoding import Encoding, check_encoding
+from pcii.pictures.picture_files import decode, picture_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ def import_lens_array(
     is the width of the whole picture. Raises `InputError` for lenses that are not within the picture.
     """
     check_encoding(encoding)
-    picture = picture_of(Path(path))
+    picture = picture_of(Path(path), VIEWS)
     if picture.pages > 1:
         raise InputError(f"{path}: has {picture.pages} pages; expected one picture")
     height, width, channels = picture.shape

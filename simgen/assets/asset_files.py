@@ -121,7 +121,7 @@ class _Worker:
         finally:
             clock.cancel()
         if refused is not None:
-            raise InputError(f"{path}: this file {shorten(refused)}")
+            raise InputError(f"{path}: {shorten(refused)}")
         return arrays
 
     def _ask(self, kind: str, path: Path) -> tuple[str | None, dict[str, np.ndarray]]:

@@ -1,7 +1,7 @@
 """The process that decodes strangers' files: whatever they do to it, the parent lives.
 
 It is started once for a scene. A line {"kind": ..., "path": ...} on standard input is answered on
-standard output by a line of JSON, {"refused": "the end of a sentence"} or {"arrays": [names]}, and
+standard output by a line of JSON, {"refused": "a sentence about it"} or {"arrays": [names]}, and
 those arrays in NumPy's .npy format; nothing is pickled.
 """
 
@@ -44,11 +44,13 @@ def _answer(answers: BinaryIO, kind: str, path: Path) -> None:
         arrays = dict(_decode(kind, path))
         head = {"arrays": list(arrays)}
     except MemoryError:
-        arrays, head = {}, {"refused": f"takes more than {MEMORY_BYTES >> 20} MiB to read"}
+        arrays, head = {}, {"refused": f"this file takes more than {MEMORY_BYTES >> 20} MiB to read"}
     except ValueError as fault:
-        arrays, head = {}, {"refused": str(fault)}
+        sentence, named = str(fault), f"{path}: "
+        refused = sentence.removeprefix(named) if sentence.startswith(named) else f"this file {sentence}"
+        arrays, head = {}, {"refused": refused}
     except Exception as fault:  # decoders raise whatever they like
-        arrays, head = {}, {"refused": f"cannot be read ({type(fault).__name__}: {fault})"}
+        arrays, head = {}, {"refused": f"this file cannot be read ({type(fault).__name__}: {fault})"}
     answers.write(json.dumps(head).encode() + b"\n")
     # Nothing but write(): of a true file NumPy asks the position, which a pipe has not.
     pipe: Any = SimpleNamespace(write=answers.write)
@@ -64,7 +66,7 @@ def _decode(kind: str, path: Path) -> Iterator[tuple[str, np.ndarray]]:
     elif kind == "image":
         from simgen.assets.image_files import read_texture
 
-        yield "pixels", read_texture(_bytes(path))
+        yield "pixels", read_texture(path)
     else:
         from simgen.assets.obj_files import read_obj
         from simgen.assets.ply_files import read_ply

@@ -99,25 +99,25 @@ OBJS: dict[str, tuple[bytes, str]] = {
     "slashes": (obj("f 1/1/1/1 2 3"), "line 5"),
 }
 PICTURES: dict[str, tuple[bytes, str]] = {
-    "bomb.png": (png(width=60_000, height=60_000, data=BOMB), "60000 x 60000 pixels, more than"),
-    "billions.png": (png(width=2**31 - 1, height=2**31 - 1), "more than a texture may have"),
-    "no_pixels.png": (png(width=0, height=0), "cannot be read"),
+    "bomb.png": (png(width=60_000, height=60_000, data=BOMB), "60000 x 60000 px, and at most 67108864"),
+    "billions.png": (png(width=2**31 - 1, height=2**31 - 1), "and at most 67108864 pixels"),
+    "no_pixels.png": (png(width=0, height=0), "its header cannot be read"),
     "text_bomb.png": (png(extra=chunk(b"zTXt", b"a\0\0" + BOMB)), "too large"),
     "profile_bomb.png": (png(extra=chunk(b"iCCP", b"a\0\0" + BOMB)), "too large"),
-    "truncated.png": (png()[:-30], "cannot be read"),
-    "checksum.png": (png()[:-20] + b"\0\0\0\0" + png()[-16:], "cannot be read"),
+    "truncated.png": (png()[:-30], "its header cannot be read"),
+    "checksum.png": (png()[:-20] + b"\0\0\0\0" + png()[-16:], "damaged or cut off"),
     "two.png": (animation(), "holds 2 pictures"),
-    "clear.png": (picture("RGBA", "PNG"), "transparent in places"),
-    "clear_palette.png": (picture("P", "PNG", transparency=0), "transparent in places"),
-    "print.jpg": (picture("CMYK", "JPEG"), "mode CMYK"),
-    "print.tif": (picture("CMYK", "TIFF"), "mode CMYK"),
-    "float.tif": (picture("F", "TIFF"), "mode F"),
-    "truncated.jpg": (picture("RGB", "JPEG")[:-200], "cannot be read"),
+    "clear.png": (picture("RGBA", "PNG"), "not opaque everywhere"),
+    "clear_palette.png": (picture("P", "PNG", transparency=0), "not opaque everywhere"),
+    "print.jpg": (picture("CMYK", "JPEG"), "a CMYK picture"),
+    "print.tif": (picture("CMYK", "TIFF"), "of the kind SEPARATED"),
+    "float.tif": (picture("F", "TIFF"), "a picture of float32"),
+    "truncated.jpg": (picture("RGB", "JPEG")[:-200], "its header cannot be read"),
     "gif.png": (picture("RGB", "GIF"), "not a PNG, JPEG or TIFF"),
     "page.png": (b"%!PS-Adobe-3.0\n", "not a PNG, JPEG or TIFF"),
     "empty.png": (b"", "not a PNG, JPEG or TIFF"),
     "huge_directory.tif": (b"II*\0\x08\0\0\0" + b"\xff" * 4000, "cannot be read"),
-    "circle.tif": (b"II*\0\x08\0\0\0\0\0\x08\0\0\0", "cannot be read"),
+    "circle.tif": (b"II*\0\x08\0\0\0\0\0\x08\0\0\0", "pixels of the type None"),
 }
 
 
@@ -293,7 +293,8 @@ def test_a_decoder_that_fails_is_told_and_survived(
     deed, message = FAULTS[fault]
     start, sound = assets._START.rsplit("from", 1)
     monkeypatch.setattr(assets, "_START", f"{start}\n{_PLANTED % deed}\nfrom{sound}")
-    monkeypatch.setattr(assets, "SECONDS", 1)
+    if "takes longer" in message:  # a busy machine needs a second to start the process
+        monkeypatch.setattr(assets, "SECONDS", 1)
     monkeypatch.chdir(tmp_path)
     sentence = refusal(scene_with(tmp_path, "thing.png", png()))
     assert "thing.png" in sentence
@@ -365,8 +366,8 @@ def test_environments_that_cannot_shine(tmp_path: Path) -> None:
         (exr(tmp_path / "inf.exr", value=np.inf), "the value inf"),
         (exr(tmp_path / "negative.exr", value=-1.0), "the value -1"),
         (exr(tmp_path / "grey.exr", names="Y"), "R, G and B are needed"),
-        (truncated, "cannot be read"),
-        (large, "is 100000 x 100000 pixels"),
+        (truncated, "its header cannot be read"),
+        (large, "100000 x 100000 px, and at most"),
         (radiance, "convert it to OpenEXR"),
     ):
         with pytest.raises(InputError, match=message) as caught:

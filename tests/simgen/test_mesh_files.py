@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from hostile_files import chunk, ply, scene_toml
-from PIL import Image
+from PIL import Image, ImageOps
 
 from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
 from simgen.assets.obj_files import read_obj
@@ -124,8 +125,29 @@ def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(pixels[..., 1], [[1, 1, 1], [1, 1, 0]])
 
 
-def test_a_photograph_stands_as_its_camera_stood(tmp_path: Path) -> None:
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.jpg"])
+def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tmp_path: Path) -> None:
     exif = Image.Exif()
-    exif[0x0112] = 6  # to be turned clockwise
-    Image.new("RGB", (16, 8)).save(tmp_path / "a.jpg", exif=exif)
-    assert worn(tmp_path, "a.jpg").image("a.jpg").shape == (16, 8, 3)
+    exif[0x0112] = orientation
+    pixels = np.random.default_rng(1).integers(0, 256, (4, 6, 3)).astype(np.uint8)
+    Image.fromarray(pixels).save(tmp_path / name, exif=exif)
+    with Image.open(tmp_path / name) as image:
+        upright = np.asarray(ImageOps.exif_transpose(image))
+    np.testing.assert_allclose(worn(tmp_path, name).image(name), srgb_to_linear(upright), rtol=1e-6)
+
+
+@pytest.mark.parametrize(("bits", "dtype"), [(1, "bool"), (4, "uint8"), (8, "uint8"), (12, "uint16")])
+@pytest.mark.parametrize("zero_is", ["black", "white"])
+def test_tiff_of_any_bits_is_as_bright(bits: int, dtype: str, zero_is: str, tmp_path: Path) -> None:
+    numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
+    told = None if bits == 1 else bits
+    tifffile.imwrite(
+        tmp_path / "a.tif", numbers.astype(dtype), photometric=f"minis{zero_is}", bitspersample=told
+    )
+    share = numbers / ((1 << bits) - 1)
+    expected = srgb_to_linear(1 - share if zero_is == "white" else share)
+    half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
+    np.testing.assert_allclose(
+        worn(tmp_path, "a.tif").image("a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step
+    )

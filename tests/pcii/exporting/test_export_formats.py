@@ -17,11 +17,11 @@ from twins import unit_grid
 import pcii
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.exporting.export_formats import WRITERS, export_dataset
-from pcii.exporting.pixel_files import write_png
 from pcii.io.collection_layout import index_row, write_collection, write_index
 from pcii.io.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest, write_manifest
 from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
+from pcii.pictures.written_pixels import write_png
 
 
 def dataset_of(root, dense, **members):

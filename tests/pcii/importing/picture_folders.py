@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -49,11 +50,14 @@ def write_exr(path: Path, image: np.ndarray) -> None:
 def png16(image: np.ndarray) -> bytes:
     """A PNG file of 16 bits by the specification, without a library that might share a fault."""
     height, width, channels = image.shape
-    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in image)
-    header = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, 0)
-    return (
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND")
-    )
+    return png_file(width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], image.astype(">u2"))
+
+
+def png_file(width: int, height: int, bits: int, colour_type: int, rows: Iterable[np.ndarray]) -> bytes:
+    """A PNG file with this header and these rows."""
+    header = struct.pack(">IIBBBBB", width, height, bits, colour_type, 0, 0, 0)
+    pixels = zlib.compress(b"".join(b"\0" + row.tobytes() for row in rows))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND")
 
 
 def chunk(name: bytes, content: bytes = b"") -> bytes:

@@ -16,8 +16,8 @@ from twins import unit_grid
 import pcii
 from pcii.app.commands import app
 from pcii.core.truth import Truth
-from pcii.importing import image_decoding
 from pcii.importing.exported_files import import_exported
+from pcii.pictures import picture_files
 
 
 @pytest.fixture
@@ -211,6 +211,6 @@ def test_what_is_too_large_is_refused_before_memory_is_taken(dataset, tmp_path: 
 
 def test_parts_that_unpack_to_much_are_refused(dataset, tmp_path: Path, monkeypatch) -> None:
     file = pcii.export_dataset(dataset, "exr", tmp_path / "out") / "views.exr"
-    monkeypatch.setattr(image_decoding, "UNPACKED_BYTES", 2000)  # 26 channels of 20 pixels are 2080 bytes
-    monkeypatch.setattr(image_decoding, "MOST_GROWTH", 0)
+    monkeypatch.setattr(picture_files, "UNPACKED_BYTES", 2000)  # 26 channels of 20 pixels are 2080 bytes
+    monkeypatch.setattr(picture_files, "MOST_GROWTH", 0)
     assert "unpack to" in one_sentence(lambda: import_exported(file), file)

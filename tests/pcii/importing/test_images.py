@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, make_folder, numbers, write
+from picture_folders import OPTICS, H, W, make_folder, numbers, png_file, write
 from PIL import Image
 
 from pcii.base.errors import InputError
@@ -72,6 +72,27 @@ def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: 
     decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
     expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
     np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
+
+
+def test_png_of_few_bits_and_palettes_are_as_bright(tmp_path: Path) -> None:
+    share = np.linspace(0, 1, H * W).reshape(H, W)
+    four = png_file(
+        W,
+        H,
+        4,
+        0,
+        [
+            np.packbits(np.unpackbits(row[:, None], axis=1)[:, 4:])
+            for row in np.rint(share * 15).astype(np.uint8)
+        ],
+    )
+    (tmp_path / "0_0.png").write_bytes(four)
+    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)[..., 0]
+    np.testing.assert_allclose(seen, np.rint(share * 15) / 15, rtol=1e-6)
+    colours = Image.fromarray(numbers(0, 0) // 32 * 32).convert("P", palette=Image.Palette.ADAPTIVE)
+    colours.save(tmp_path / "0_0.png")
+    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)
+    np.testing.assert_allclose(seen, np.asarray(colours.convert("RGB")) / 255, rtol=1e-6)
 
 
 @pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])

@@ -191,8 +191,8 @@ def picture(mode: str) -> Make:
     return lambda root: Image.new(mode, (W, H)).save(root / "0_0.png")
 
 
-def png_of(width: int, height: int, bits: int = 8, colour: int = 2) -> bytes:
-    header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
+def png_of(width: int, height: int, bits: int = 8) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)
     pixels = zlib.compress(b"\0" * 1000)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND")
 
@@ -366,7 +366,6 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("mixed channels", folder(lambda r: write(r / "1_1.png", numbers(0, 0, channels=1))), NAMED, "1 channels .* 3 channels"),
     ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
     ("grey alpha", folder(picture("LA"), channels=1), NAMED, "0_0.png: has an alpha channel"),
-    ("palette", folder(picture("P")), NAMED, "0_0.png: has a palette"),
     ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
     ("cmyk", folder(cmyk), NAMED, "0_0.png: a CMYK picture"),
     ("turned JPEG", folder(turned("JPEG")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
@@ -381,8 +380,7 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "60000 x 60000 px, and at most"),
     ("many large", folder(content("0_0.png", png_of(11_000, 11_000)), rows=1, cols=1), [*NAMED, "--grid", 1, 1], "damaged"),
     ("bomb of 16 bits", folder(content("0_0.png", png_of(11_000, 11_000, bits=16))), NAMED, "unpack to 692 MiB of memory, and at most 512"),
-    ("no pixels", folder(content("0_0.png", png_of(0, 5))), NAMED, "5 x 0 px"),
-    ("4 bits", folder(content("0_0.png", png_of(W, H, bits=4, colour=0))), NAMED, "a PNG picture of 4 bits"),
+    ("no pixels", folder(content("0_0.png", png_of(0, 5))), NAMED, "0_0.png: its header cannot be read"),
     ("alpha in EXR", folder(exr_alpha, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "has an alpha channel"),
     ("parts of EXR", folder(exr_of_two_parts, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: has 2 parts"),
     ("NaN in EXR", folder(exr_nan, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: holds NaN or infinity"),
@@ -427,12 +425,12 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("camera options beside", hci(), CAMERAS, "tells the cameras"),
     ("byte order", hci(maps=swapped), [], "the sign of the scale in its header"),
     ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 8 x 6 px, where the views are 6 x 8"),
-    ("cut map", hci(maps=lambda r: [true_depth(np.ones((H, W)))(r), cut("gt_depth_lowres.pfm")(r)]), [], "bytes after its header"),
+    ("cut map", hci(maps=lambda r: [true_depth(np.ones((H, W)))(r), cut("gt_depth_lowres.pfm")(r)]), [], "damaged or cut off"),
     ("depth 0", hci(maps=true_depth(np.zeros((H, W)))), [], "depths are not between"),
     ("NaN depth", hci(maps=true_depth(np.full((H, W), np.nan))), [], "depths are not between"),
     ("NaN disparity", hci(maps=true_depth(np.full((H, W), np.nan), name="gt_disp_lowres.pfm")), [], "holds NaN"),
-    ("colour map", hci(maps=content("gt_depth_lowres.pfm", b"PF\n8 6\n-1\n")), [], "not a PFM map of one channel"),
-    ("words in a map", hci(maps=content("gt_depth_lowres.pfm", b"Pf\n8 six\n-1\n")), [], "for width, height and scale"),
+    ("colour map", hci(maps=content("gt_depth_lowres.pfm", b"PF\n8 6\n-1\n")), [], "not a PFM picture"),
+    ("words in a map", hci(maps=content("gt_depth_lowres.pfm", b"Pf\n8 six\n-1\n")), [], "its header cannot be read"),
 ]  # fmt: skip
 
 
