@@ -15,11 +15,11 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
+        "imaging",
         "pictures",
         "figures",
         "core",
         "io",
-        "imaging",
         "sections",
         "exporting",
         "evidence",
@@ -50,10 +50,10 @@ ROOMS = {
         "app",
     ],
 }
-# What simgen may share with pcii: types, masks, file formats and how commands behave. Not its geometry
-# or anything built on it, so that simulation and reconstruction cannot share a sign mistake. Figures make
-# pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "pictures", "figures", "core", "io", "exporting"}
+# What simgen may share with pcii: image tools, types, masks, file formats and how commands behave. Not its
+# geometry or anything built on it, so that simulation and reconstruction cannot share a sign mistake. Figures
+# make pictures of plain arrays: they know no camera, and stand before the types.
+SHARED_ROOMS = {"base", "imaging", "pictures", "figures", "core", "io", "exporting"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

@@ -17,9 +17,9 @@ from pcii.core.truth import Truth
 from pcii.core.view_figures import middle_camera
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import (
-    block_sums,
     encoded,
     filled_means,
+    image_block_sums,
     photon_picture,
     smoothed,
     smoothing_for,
@@ -66,7 +66,7 @@ class Crop:
 
     def sums(self, image: np.ndarray) -> np.ndarray:
         """Sums over the blocks of an image (H, W, C)."""
-        return block_sums(image[self.rows, self.cols], self.step_px)
+        return image_block_sums(image[self.rows, self.cols], self.step_px)
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,5 +283,5 @@ def _interesting_part(grid: CameraGrid, truth: Truth | None, focus: Sequence[Seg
     if truth is not None and truth.has_objects:
         return truth.object_id > 0
     if not focus:
-        return np.ones((grid.height, grid.width), dtype=bool)
+        return np.ones(grid.shape_HW, dtype=bool)
     return np.logical_or.reduce([segmented.in_focus.any(axis=0) for segmented in focus])

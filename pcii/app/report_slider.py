@@ -21,6 +21,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import encoded
+from pcii.imaging.blocks import evenly_chosen
 from pcii.sections.reconstruction import reconstruct
 
 MOST_PLANES = 20
@@ -41,7 +42,7 @@ def slider_planes(outcome: Outcome) -> tuple[FocalPlanes, dict[int, int]]:
     Those next to a plane of the analysis are left out, and of very many planes of the analysis some.
     """
     grid, own = outcome.dataset.grid, outcome.sections.z_mm
-    chosen = np.unique(np.linspace(0, len(own) - 1, MOST_PLANES).round().astype(int))
+    chosen = evenly_chosen(len(own), MOST_PLANES)
     near, far = min(outcome.z_range_mm[0], own.min()), max(outcome.z_range_mm[1], own.max())
     own_px = total_disparity_px(grid, own[chosen])
     span_px = float(total_disparity_px(grid, near) - total_disparity_px(grid, far))

@@ -6,14 +6,16 @@ that is not writable, so each loop is compiled once per machine. All loops toget
 it is announced (`progress`): as a stage of a command, and in one line where another program imports this
 package.
 
-Loops are shared among threads by ranges of their outermost index (`in_threads`). Numba's own parallel loops
-take twice as long to compile, and their OpenMP threads do not survive a fork.
+Loops are shared among threads by ranges of their outermost index (`shared`, `in_threads`). Numba's own
+parallel loops take twice as long to compile, and their OpenMP threads do not survive a fork. The same
+threads share out the steps of longer work (`each_in_threads`).
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numba as nb
 from numba.core import event
@@ -24,6 +26,10 @@ compiled = nb.njit(nogil=True, cache=True)
 """Decorator of a compiled function."""
 helper = nb.njit(nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # type: ignore
 """Decorator of a function that only compiled functions call: it has no entry from Python to compile."""
+
+Arguments = ParamSpec("Arguments")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 PARTS_PER_THREAD = 4
 """Ranges per thread: who is done early takes one more. Results do not depend on it."""
@@ -42,19 +48,51 @@ def in_threads(loop: Callable[..., Any], count: int, *arguments: Any) -> list[An
     parts = min(count, PARTS_PER_THREAD * _threads) if _threads > 1 else 1
     if parts <= 1:
         return [loop(0, count, *arguments)]
-    results: list[Any] = [None] * parts
-    waiting = iter(range(parts))
+    ends = [count * part // parts for part in range(parts + 1)]
+    return each_in_threads(lambda part: loop(ends[part], ends[part + 1], *arguments), range(parts))
+
+
+def each_in_threads(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """`function` of each item, in their order; several threads take one item at a time, this one among them.
+
+    They gain where the function spends its time in compiled loops or in NumPy.
+    """
+    results: list[Any] = [None] * len(items)
+    waiting = iter(range(len(items)))
 
     def work() -> None:
-        for part in waiting:
-            results[part] = loop(count * part // parts, count * (part + 1) // parts, *arguments)
+        for place in waiting:
+            results[place] = function(items[place])
 
-    others = [_thread_pool().submit(work) for _ in range(min(_threads, parts) - 1)]
+    others = [_thread_pool().submit(work) for _ in range(min(_threads, len(items)) - 1)]
     work()
     for other in others:
         if not other.cancel():  # it had not begun: all is done
             other.result()
     return results
+
+
+def shared(
+    count: Callable[..., int],
+) -> Callable[[Callable[Concatenate[int, int, Arguments], Result]], Callable[Arguments, list[Result]]]:
+    """Decorator of a loop `loop(first, last, *arguments)`: compiled, called as `loop(*arguments)`.
+
+    Threads share the indices from 0 to `count(*arguments)` - 1, as `in_threads` tells.
+    """
+
+    def decorate(
+        loop: Callable[Concatenate[int, int, Arguments], Result],
+    ) -> Callable[Arguments, list[Result]]:
+        inner = compiled(loop)
+
+        @wraps(loop)
+        def run(*arguments: Arguments.args, **named: Arguments.kwargs) -> list[Result]:
+            assert not named, "arguments of loops have places, not names"
+            return in_threads(inner, count(*arguments), *arguments)
+
+        return run
+
+    return decorate
 
 
 def use_threads(count: int) -> None:

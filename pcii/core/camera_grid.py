@@ -103,6 +103,11 @@ class CameraGrid(Brief):
         """Shape (K, L, H, W) of one monochrome stack of views."""
         return (self.rows, self.cols, self.height, self.width)
 
+    @property
+    def shape_HW(self) -> tuple[int, int]:
+        """Shape (H, W) of one view, and of a section."""
+        return (self.height, self.width)
+
     def plot(self, axes: "Axes | None" = None) -> np.ndarray:
         """Draw where the cameras stand, in mm, with both baselines and the virtual centre.
 

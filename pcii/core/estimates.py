@@ -162,7 +162,7 @@ class DepthPosterior(Brief):
     block_px: int
 
     def __post_init__(self) -> None:
-        h, w = (-(-size // self.block_px) for size in (self.planes.grid.height, self.planes.grid.width))
+        h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
         if self.probability.shape != (len(self.planes), h, w) or self.no_surface.shape != (h, w):
             raise InputError(
                 f"probability, no_surface: expected ({len(self.planes)}, {h}, {w}) and ({h}, {w}), got "

@@ -185,7 +185,7 @@ class PhotonCounts(Brief):
         if self._dense is not None:
             return self._dense[k, l]
         events = self.events
-        image = np.zeros((self.grid.height, self.grid.width), dtype=np.int64)
+        image = np.zeros(self.grid.shape_HW, dtype=np.int64)
         number = k * self.grid.cols + l
         of_view = slice(self.view_starts[number], self.view_starts[number + 1])
         image[events.i[of_view], events.j[of_view]] = events.n[of_view]

@@ -15,6 +15,7 @@ from pcii.core.bayer import by_colour, check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.xarray_form import labelled_dataset
+from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
     import xarray
@@ -124,10 +125,10 @@ class Sections(Brief):
         self, axes: "Axes | Sequence[Axes] | np.ndarray | None", kept: np.ndarray | None
     ) -> tuple[np.ndarray, list[int]]:
         """Draw as `plot` does, only points that are `kept`, bool (Z, H, W); the axes and the planes shown."""
-        from pcii.figures.exposure import PANEL_PX, block_px, evenly_chosen
+        from pcii.figures.exposure import PANEL_PX, block_px
         from pcii.figures.panels import MOST_PANELS, several_axes, show_picture
 
-        film, planes = (self.grid.height, self.grid.width), evenly_chosen(len(self.planes), MOST_PANELS)
+        film, planes = self.grid.shape_HW, evenly_chosen(len(self.planes), MOST_PANELS)
         panels = several_axes(axes, len(planes), film)
         step_px = block_px(self.counts.shape[1:3], PANEL_PX)
         for panel, plane, image in zip(panels, planes, self._pictures(planes, step_px, kept), strict=True):
@@ -136,7 +137,7 @@ class Sections(Brief):
 
     def _thumbnails_of(self, kept: np.ndarray | None) -> dict[str, str]:
         """Small pictures for notebooks by caption, only of points that are `kept`, bool (Z, H, W)."""
-        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, block_px, evenly_chosen
+        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, block_px
         from pcii.figures.pictures import data_uri
 
         planes = evenly_chosen(len(self.planes), MOST_THUMBNAILS)

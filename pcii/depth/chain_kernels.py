@@ -6,7 +6,7 @@ plane with probabilities that fall by a factor with each plane, or jumps to any 
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.base.compiled_loops import helper, shared
 
 
 @helper
@@ -28,18 +28,8 @@ def pass_on(belief: np.ndarray, message: np.ndarray, fall: float, jump: float) -
         message[z] /= largest
 
 
-def chain_posteriors(likelihood: np.ndarray, fall: float, jump: float, least: float) -> np.ndarray:
-    """Posterior probabilities of blocks from likelihoods of rows of them, both (h, w, Z) float32.
-
-    The largest of a block is 1. Values below `least` are raised to it.
-    """
-    posterior = np.empty_like(likelihood)
-    in_threads(_chain_posteriors, len(likelihood), posterior, likelihood, fall, jump, least)
-    return posterior
-
-
-@compiled
-def _chain_posteriors(
+@shared(lambda posterior, *_: len(posterior))
+def chain_posteriors(
     first: int,
     last: int,
     posterior: np.ndarray,
@@ -48,7 +38,10 @@ def _chain_posteriors(
     jump: float,
     least: float,
 ) -> None:
-    """Of the rows `first` to `last` - 1."""
+    """Writes to `posterior` the probabilities of blocks, from likelihoods of rows of them: (h, w, Z) float32.
+
+    The largest of a block is 1. Values below `least` are raised to it.
+    """
     _, w, Z = likelihood.shape
     for i in range(first, last):
         forward = np.empty((w, Z), np.float32)

@@ -10,7 +10,7 @@ from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import FocusEvidence, best_labels, focus_evidence, windowed
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
-from pcii.sections.photon_statistics import cells_to_pixels
+from pcii.imaging.blocks import on_pixels
 
 PLANE_STEP_PX = 2.0
 """Total disparity between neighbouring planes: a blur half-extent of 1 px."""
@@ -54,7 +54,7 @@ def focus_depth(counts: PhotonCounts, z_range_mm: tuple[float, float]) -> DepthM
     abstains |= ~halves_of(counts, planes, out_of_focus=True).agree(best, ~abstains)
     depth = np.where(abstains, np.nan, depth)
     confidence = np.where(abstains, 0.0, confidence)
-    return DepthMap(cells_to_pixels(depth, CELL_PX, grid), cells_to_pixels(confidence, CELL_PX, grid))
+    return DepthMap(*(on_pixels(part, CELL_PX, grid.shape_HW) for part in (depth, confidence)))
 
 
 def _photons_nearby(evidence: FocusEvidence, best: np.ndarray) -> np.ndarray:

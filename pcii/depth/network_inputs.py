@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.evidence.texture_evidence import TextureEvidence
-from pcii.sections.photon_statistics import cell_sums
+from pcii.imaging.blocks import block_sums
 
 CELL_SIDE_BLOCKS = 2
 """Blocks of a cell along each axis: the surface's posterior and the coverage are of cells."""
@@ -47,10 +47,7 @@ def inputs_of(
         return np.pad(values, [(0, 0), *((0, -size % multiple) for size in values.shape[1:])])
 
     nats, sums, samples = (padded(part) for part in (evidence.nats, evidence.sums, evidence.samples))
-    in_cells = [
-        np.stack([cell_sums(plane, CELL_SIDE_BLOCKS, np.float32) for plane in part])
-        for part in (nats, samples)
-    ]
+    in_cells = [block_sums(part, CELL_SIDE_BLOCKS, np.float32) for part in (nats, samples)]
     posterior = surface_posterior(in_cells[0], prior).transpose(2, 0, 1)
     ratio = np.log(np.maximum(posterior * len(nats), np.float32(np.exp(LEAST_LOG_RATIO))))
     total, number = float(evidence.sums.sum(dtype=np.float64)), float(evidence.samples.sum(dtype=np.float64))

@@ -16,7 +16,7 @@ from pcii.core.images import Views, in_binary_unit
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.depth_planes import peak_depth_mm
-from pcii.sections.photon_statistics import cell_sums, cells_to_pixels
+from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.sections.reconstruction import reconstruct
 
 STEP_PX = 1.0
@@ -88,7 +88,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
 
     def in_cells(sums: np.ndarray) -> np.ndarray:
         """Sums (h, w, C) over cells of voxels (H, W, C)."""
-        return np.moveaxis(cell_sums(np.moveaxis(sums, -1, 0), side, np.float64), 0, -1)
+        return block_sums(sums, side, np.float64, (0, 1))
 
     def gain(sections: Sections, plane: int) -> np.ndarray:
         photons, samples = (in_cells(sums[plane]) for sums in (sections.counts, sections.coverage))
@@ -109,7 +109,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
         nats = photons * np.log(rate / mean) - (expected - samples * mean)
         nats = np.where(around > 0, nats, 0.0)
         smooth = gaussian_filter(nats.sum(axis=-1), LIKELIHOOD_SIGMA_PX / side, mode="constant")
-        return cells_to_pixels(smooth, side, data.grid)
+        return on_pixels(smooth, side, data.grid.shape_HW)
 
     return _swept(data, z_range_mm, gain)
 

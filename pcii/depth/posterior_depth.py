@@ -23,7 +23,7 @@ from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
-from pcii.sections.photon_statistics import cells_to_pixels
+from pcii.imaging.blocks import on_pixels
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
@@ -65,7 +65,7 @@ class PosteriorDepth:
         detected = self._detected(data, posterior, evidence.photons, plane)
         depth = np.where(detected, z_mm, np.nan)
         maps = depth, np.where(detected, confidence, 0.0)
-        return DepthMap(*(cells_to_pixels(part, posterior.block_px, data.grid) for part in maps))
+        return DepthMap(*(on_pixels(part, posterior.block_px, data.grid.shape_HW) for part in maps))
 
     def posterior_with_detection(
         self, data: PhotonCounts | Views, z_range_mm: tuple[float, float]
@@ -168,9 +168,9 @@ def _halves_agree(
     every_other = planes.take(slice(None, None, 2))
     i, j = (
         np.minimum(np.arange(-(-size // CELL_PX)) * CELL_PX // block_px, blocks - 1)
-        for size, blocks in zip((data.grid.height, data.grid.width), best.shape, strict=True)
+        for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)
     )
     plane = best[np.ix_(i, j)] // 2
     agree = halves_of(data, every_other, out_of_focus=True).agree(plane, np.ones(plane.shape, bool))
-    agree = cells_to_pixels(agree, CELL_PX, data.grid)
+    agree = on_pixels(agree, CELL_PX, data.grid.shape_HW)
     return agree[::block_px, ::block_px]

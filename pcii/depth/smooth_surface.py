@@ -37,7 +37,9 @@ def surface_posterior(nats: np.ndarray, prior: SurfacePrior) -> np.ndarray:
     from pcii.depth.chain_kernels import chain_posteriors
 
     def along_rows(likelihood: np.ndarray) -> np.ndarray:
-        return chain_posteriors(np.ascontiguousarray(likelihood), prior.fall, prior.jump, LEAST)
+        posterior = np.empty(likelihood.shape, np.float32)
+        chain_posteriors(posterior, np.ascontiguousarray(likelihood), prior.fall, prior.jump, LEAST)
+        return posterior
 
     def along_columns(likelihood: np.ndarray) -> np.ndarray:
         return along_rows(likelihood.swapaxes(0, 1)).swapaxes(0, 1)

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, in_threads
+from pcii.base.compiled_loops import compiled, shared
 from pcii.evidence.prediction_types import PlacedEvents, Predicted
 
 
@@ -27,19 +27,8 @@ def gain_over_blur(events: PlacedEvents, predicted: Predicted, gain: np.ndarray,
             photons[colour[e], a, b] += n[e]
 
 
+@shared(lambda expected, rows, cols, weight, views: len(views))
 def views_of_planes(
-    expected: np.ndarray, rows: np.ndarray, cols: np.ndarray, weight: float, views: np.ndarray
-) -> None:
-    """Adds to `views` (V, H, W) `weight` times the photons per cell of each camera that all planes predict.
-
-    `expected` (Z, H, W) are the photons per cell of the planes; `rows` (Z, A) and `cols` (Z, B) the shifts of
-    A x B = V cameras in whole cells.
-    """
-    in_threads(_views_of_planes, len(views), expected, rows, cols, weight, views)
-
-
-@compiled
-def _views_of_planes(
     first: int,
     last: int,
     expected: np.ndarray,
@@ -48,7 +37,11 @@ def _views_of_planes(
     weight: float,
     views: np.ndarray,
 ) -> None:
-    """Of the views `first` to `last` - 1."""
+    """Adds to `views` (V, H, W) `weight` times the photons per cell of each camera that all planes predict.
+
+    `expected` (Z, H, W) are the photons per cell of the planes; `rows` (Z, A) and `cols` (Z, B) the shifts of
+    A x B = V cameras in whole cells.
+    """
     Z, H, W = expected.shape
     across = cols.shape[1]
     for v in range(first, last):
@@ -59,7 +52,10 @@ def _views_of_planes(
                     views[v, i - down, j - right] += weight * expected[z, i, j]
 
 
+@shared(lambda views, expected, *_: len(expected))
 def duel_planes(
+    first: int,
+    last: int,
     views: np.ndarray,
     expected: np.ndarray,
     rows: np.ndarray,
@@ -75,24 +71,6 @@ def duel_planes(
     `predicted` (Z, N) is the rate of each event by each plane, `together` (N,) by their mean; `expected`
     (Z, H, W) are the photons per cell of each plane, `views` (V, H, W) those of their mean in each camera.
     """
-    in_threads(_duel_planes, len(expected), views, expected, rows, cols, predicted, cell, together, n, result)
-
-
-@compiled
-def _duel_planes(
-    first: int,
-    last: int,
-    views: np.ndarray,
-    expected: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    predicted: np.ndarray,
-    cell: np.ndarray,
-    together: np.ndarray,
-    n: np.ndarray,
-    result: np.ndarray,
-) -> None:
-    """Of the planes `first` to `last` - 1."""
     _, H, W = expected.shape
     across = cols.shape[1]
     for z in range(first, last):

@@ -15,7 +15,6 @@ With the maximum-likelihood rate of each voxel instead, the depth of largest lik
 entropy of the photons' places: Eq. 9 of Muniraj et al. 2017 with Poisson statistics.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,7 +88,7 @@ def predictions_of(counts: PhotonCounts, planes: FocalPlanes) -> tuple[FocusEvid
 
 
 def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[FocusEvidence, Predictions]:
-    from pcii.base.compiled_loops import threads
+    from pcii.base.compiled_loops import each_in_threads
     from pcii.evidence import focus_kernels as kernels
     from pcii.evidence.prediction_kernels import predict
     from pcii.evidence.projection_kernels import cells_of_events
@@ -104,7 +103,7 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
     expected = np.zeros((Z * keep, h, w), np.float32)
     n, full_weight = events.n.astype(np.float32), np.ones(N, np.float32)
     place = events.k, events.l, events.i, events.j
-    film, all_views = (grid.height, grid.width), np.ones((h, w), np.float32)
+    film, all_views = grid.shape_HW, np.ones((h, w), np.float32)
 
     def evaluate(z: int) -> None:
         cell_of = np.empty(N, np.int32)
@@ -119,8 +118,7 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
         if keep:
             rate[z], cell[z], expected[z] = predicted.rate, cell_of, predicted.samples * predicted.mean
 
-    with ThreadPoolExecutor(threads()) as pool:
-        list(pool.map(evaluate, range(Z)))
+    each_in_threads(evaluate, range(Z))
     return FocusEvidence(planes, gain, photons), Predictions(rate, cell, expected)
 
 

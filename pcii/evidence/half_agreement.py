@@ -32,8 +32,8 @@ from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.weighted_sums import camera_sums, whole_shifts_px
+from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.bright_regions import box_around
-from pcii.sections.photon_statistics import cell_sums
 
 FALSE_RATE = 1e-3
 """Largest share of pure noise in which the halves may seem to agree."""
@@ -134,7 +134,7 @@ class Halves:
         cells[rows, cols] = where
         largest = 0.0
         for side, inside, outside in zip(BLOCKS_CELLS, self.inside, self.outside, strict=True):
-            weight = cell_sums(cells, side, np.float64)
+            weight = block_sums(cells, side, np.float64)
             blocks = (slice(None), *np.nonzero(weight))
             weight, own = weight[blocks[1:]], inside.at(blocks)
             total = own.p @ weight
@@ -151,7 +151,7 @@ class Halves:
         agreed, total = np.zeros(label.shape, bool), np.zeros(label.shape)
         for z in np.unique(label[where]):
             at_plane = where & (label == z)
-            rows, cols = box_around(cell_sums(at_plane, side, np.float64) > 0, (reach, reach))
+            rows, cols = box_around(block_sums(at_plane, side, np.float64) > 0, (reach, reach))
             own, nearer, farther = (
                 each[size].at((z, rows, cols)) for each in (self.inside, self.nearer, self.farther)
             )
@@ -160,7 +160,7 @@ class Halves:
             cells = tuple(slice(axis.start * side, axis.stop * side) for axis in (rows, cols))
             selected = at_plane[cells]
             for result, values in ((agreed, agree), (total, _windowed(own.p, sigma))):
-                result[cells][selected] = _in_cells(values, side, selected.shape)[selected]
+                result[cells][selected] = on_pixels(values, side, selected.shape)[selected]
         return agreed, total
 
     def _outside_range(
@@ -172,7 +172,7 @@ class Halves:
         for z in range(len(outside.p)):
             agreed |= _agreement(outside.at(z), sigma) >= least_agreement(len(outside.p))
             np.maximum(largest, _windowed(outside.p[z], sigma), out=largest)
-        return _in_cells(agreed, BLOCKS_CELLS[size], shape), _in_cells(largest, BLOCKS_CELLS[size], shape)
+        return on_pixels(agreed, BLOCKS_CELLS[size], shape), on_pixels(largest, BLOCKS_CELLS[size], shape)
 
 
 def least_agreement(planes: int) -> float:
@@ -237,20 +237,17 @@ def _products(
 def _products_of_plane(
     sums: np.ndarray, samples: np.ndarray, side: int, *, is_counted: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    shape = cell_sums(sums[0], side, np.float64).shape
+    shape = block_sums(sums[0], side, np.float64).shape
     products, noise, compared = np.ones(shape), np.ones(shape), np.ones(shape, bool)
     for half_sums, half_samples in zip(sums, samples, strict=True):
-        block_sums, block_samples = (
-            cell_sums(half_sums, side, np.float64),
-            cell_sums(half_samples, side, np.float64),
-        )
-        near_sums, near_samples = _neighbour_sums(block_sums), _neighbour_sums(block_samples)
-        covered = (block_samples > 0) & (near_samples > 0)
-        expected = np.divide(block_samples * near_sums, near_samples, out=np.zeros(shape), where=covered)
+        own_sums, own_samples = (block_sums(part, side, np.float64) for part in (half_sums, half_samples))
+        near_sums, near_samples = _neighbour_sums(own_sums), _neighbour_sums(own_samples)
+        covered = (own_samples > 0) & (near_samples > 0)
+        expected = np.divide(own_samples * near_sums, near_samples, out=np.zeros(shape), where=covered)
         # Blocks darker than average have no more weight than average ones.
         scale = np.abs(expected) + np.abs(expected).mean()
         scale += scale == 0
-        products *= (block_sums - expected) / scale
+        products *= (own_sums - expected) / scale
         noise *= LEAST_CONTRAST**2 + (np.maximum(expected, 0) / scale**2 if is_counted else 0.0)
         compared &= covered
     products, noise = (np.where(compared, part, 0).astype(np.float32) for part in (products, noise))
@@ -262,11 +259,6 @@ def _neighbour_sums(blocks: np.ndarray) -> np.ndarray:
     padded = np.pad(blocks, 1)
     rows = padded[:-2] + padded[1:-1] + padded[2:]
     return rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] - blocks
-
-
-def _in_cells(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
-    """The values of blocks at each of their cells, of which there are `shape`."""
-    return blocks.repeat(side, axis=0).repeat(side, axis=1)[: shape[0], : shape[1]]
 
 
 def _windowed(values: np.ndarray, sigma: float) -> np.ndarray:

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.base.compiled_loops import helper, shared
 
 
 @helper
@@ -30,7 +30,10 @@ def _recursive_mean(values: np.ndarray, left: np.ndarray, up: np.ndarray) -> Non
             values[i, j] += up[i + 1, j] * (values[i + 1, j] - values[i, j])
 
 
+@shared(lambda narrow, *_: len(narrow))
 def windows_within_edges(
+    first: int,
+    last: int,
     narrow: np.ndarray,
     picture: np.ndarray,
     noise: float,
@@ -45,22 +48,6 @@ def windows_within_edges(
     distance to the next cell, by `stiffness` for twice the noise. Domain transform of Gastal and Oliveira
     2011.
     """
-    in_threads(_windows_within_edges, len(narrow), narrow, picture, noise, stiffness, scales, weights, result)
-
-
-@compiled
-def _windows_within_edges(
-    first: int,
-    last: int,
-    narrow: np.ndarray,
-    picture: np.ndarray,
-    noise: float,
-    stiffness: float,
-    scales: np.ndarray,
-    weights: np.ndarray,
-    result: np.ndarray,
-) -> None:
-    """Of the planes `first` to `last` - 1."""
     _, H, W = narrow.shape
     for z in range(first, last):
         distance = np.ones((2, H, W), np.float32)
@@ -109,19 +96,8 @@ def _pass_to_neighbour(message: np.ndarray, steps: np.ndarray, jump: float) -> N
         message[z] = min(message[z], top) - low
 
 
+@shared(lambda cost, messages, direction, *_: cost.shape[direction // 2])
 def pass_messages(
-    cost: np.ndarray, messages: np.ndarray, direction: int, steps: np.ndarray, jump: float
-) -> None:
-    """One sweep of belief propagation: costs (H, W, Z), messages (4, H, W, Z) from left, right, above, below.
-
-    A change to the next label costs `steps` (Z - 1,), any change at most `jump`. Lines are independent.
-    """
-    lines = cost.shape[0] if direction < 2 else cost.shape[1]
-    in_threads(_pass_messages, lines, cost, messages, direction, steps, jump)
-
-
-@compiled
-def _pass_messages(
     first: int,
     last: int,
     cost: np.ndarray,
@@ -130,7 +106,10 @@ def _pass_messages(
     steps: np.ndarray,
     jump: float,
 ) -> None:
-    """Along the rows, or for the directions 2 and 3 the columns, `first` to `last` - 1."""
+    """One sweep of belief propagation: costs (H, W, Z), messages (4, H, W, Z) from left, right, above, below.
+
+    A change to the next label costs `steps` (Z - 1,), any change at most `jump`. Lines are independent.
+    """
     H, W, Z = cost.shape
     sideways = direction < 2
     opposite = direction + 1 if direction % 2 == 0 else direction - 1

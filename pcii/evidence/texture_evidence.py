@@ -25,7 +25,6 @@ little evidence.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
@@ -35,7 +34,7 @@ import numpy as np
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views, binary_scale
 from pcii.core.photon_counts import PhotonCounts
-from pcii.sections.photon_statistics import cell_sums, sum_of
+from pcii.imaging.blocks import block_sums, sum_of
 from pcii.sections.reconstruction import reconstruct
 
 
@@ -91,7 +90,7 @@ def evidence_of_texture(
     The sum over a window is the logarithm, but for a constant, of how likely its samples are if the surface
     is at this plane. A mosaic has all colours in a block of 2 pixels or more, for any shift.
     """
-    from pcii.base.compiled_loops import threads
+    from pcii.base.compiled_loops import each_in_threads
 
     planes = replace(planes, rounding=ROUNDING)
     chosen = model or TextureModel()
@@ -103,18 +102,15 @@ def evidence_of_texture(
 
     def of_plane(plane: int) -> tuple[list[np.ndarray], np.ndarray, np.ndarray, np.ndarray]:
         blocks = _block_sums(data, planes.take([plane]), block_px, scale)
-        cells = [cell_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
+        cells = [block_sums(part, CELL_BLOCKS, np.float32) for part in blocks]
         photons = cells[SUMS] ** 2 / np.maximum(cells[SPREAD], LEAST_RATE)
         octaves = _of_section(blocks, chosen, least_samples)
         return octaves, blocks[SUMS][:h, :w], blocks[SAMPLES][:h, :w], photons
 
-    with ThreadPoolExecutor(threads()) as pool:
-        octaves, *others = zip(*pool.map(of_plane, range(len(planes))), strict=True)
-        largest = [np.maximum(np.max(each, axis=0), 0) for each in zip(*octaves, strict=True)]
-        nats = pool.map(lambda excess: _summed(_saturated(excess, largest, chosen)), octaves)
-        return TextureEvidence(
-            np.stack([each[:h, :w] for each in nats]), *(np.stack(each) for each in others)
-        )
+    octaves, *others = zip(*each_in_threads(of_plane, range(len(planes))), strict=True)
+    largest = [np.maximum(np.max(each, axis=0), 0) for each in zip(*octaves, strict=True)]
+    nats = each_in_threads(lambda excess: _summed(_saturated(excess, largest, chosen))[:h, :w], octaves)
+    return TextureEvidence(np.stack(nats), *(np.stack(each) for each in others))
 
 
 def _block_sums(
@@ -129,7 +125,7 @@ def _block_sums(
     section = reconstruct(data, plane, variance=not is_counted)
 
     def in_blocks(values: np.ndarray) -> np.ndarray:
-        blocks = cell_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
+        blocks = block_sums(sum_of(list(np.moveaxis(values, -1, 0)), np.float32), block_px, np.float32)
         return np.pad(blocks, [(0, -size % CELL_BLOCKS) for size in blocks.shape])
 
     blocks = [
@@ -149,7 +145,7 @@ def _of_section(blocks: list[np.ndarray], model: TextureModel, least_samples: fl
     parts, excess = blocks, list[np.ndarray]()
     for octave in range(model.octaves):
         if octave > 1:
-            parts = [cell_sums(part, 2, np.float32) / 4 for part in parts]
+            parts = [block_sums(part, 2, np.float32) / 4 for part in parts]
         finer, parts = parts, [gaussian_filter(part, _blur(octave), mode="constant") for part in parts]
         mean, around = (part[SUMS] / np.maximum(part[SAMPLES], LEAST_SAMPLES) for part in (finer, parts))
         number = np.maximum(parts[SAMPLES], LEAST_SAMPLES)

@@ -5,6 +5,8 @@ it falls into. Photon events are added one by one; of images, sums over the bloc
 differences of its running sums over rows and columns, so that they cost as much as there are blocks.
 """
 
+from functools import partial
+
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
@@ -36,8 +38,7 @@ def camera_sums(
     its colours together.
     """
     edges = [
-        _block_edges(moves, size, block_px)
-        for moves, size in zip(shifts, (data.grid.height, data.grid.width), strict=True)
+        _block_edges(moves, size, block_px) for moves, size in zip(shifts, data.grid.shape_HW, strict=True)
     ]
     by_row, by_col = (np.diff(each, axis=-1).astype(np.float64) for each in edges)
     samples = np.einsum("zka,gkl,zlb->zgab", by_row, weights, by_col, optimize=True)
@@ -62,42 +63,39 @@ def _of_events(
     block_px: int,
     shape: tuple[int, ...],
 ) -> np.ndarray:
-    from pcii.base.compiled_loops import in_threads
+    from pcii.base.compiled_loops import each_in_threads
     from pcii.evidence.projection_kernels import cells_of_events
 
-    events, film = counts.events, (counts.grid.height, counts.grid.width)
+    events, film = counts.events, counts.grid.shape_HW
     place, n = (events.k, events.l, events.i, events.j), events.n
     weight = weights[:, events.k, events.l] * n
     sums = np.zeros(shape)
 
-    def of_planes(first: int, last: int) -> None:
+    def add_events(z: int) -> None:
         block = np.empty(n.size, np.int32)
-        for z in range(first, last):
-            cells_of_events(*place, shifts[0][z], shifts[1][z], film, block_px, block)
-            inside = block >= 0
-            for group, own in enumerate(weight):
-                summed = np.bincount(block[inside], own[inside], shape[2] * shape[3])
-                sums[z, group] = summed.reshape(shape[2:])
+        cells_of_events(*place, shifts[0][z], shifts[1][z], film, block_px, block)
+        inside = block >= 0
+        for group, own in enumerate(weight):
+            sums[z, group] = np.bincount(block[inside], own[inside], sums[z, group].size).reshape(shape[2:])
 
-    in_threads(of_planes, len(sums))
+    each_in_threads(add_events, range(len(sums)))
     return sums
 
 
 def _of_images(
     data: PhotonCounts | Views, edges: list[np.ndarray], weights: np.ndarray, shape: tuple[int, ...]
 ) -> np.ndarray:
-    from pcii.base.compiled_loops import in_threads
+    from pcii.base.compiled_loops import each_in_threads
 
     sums = np.zeros(shape)
     running = np.zeros((data.grid.height + 1, data.grid.width + 1))
 
-    def add_view(first: int, last: int, k: int, l: int, mean: float) -> None:
-        for z in range(first, last):
-            rows, cols = edges[0][z, k], edges[1][z, l]
-            blocks = np.diff(np.diff(running[rows[:, None], cols], axis=0), axis=1)
-            blocks += mean * np.outer(np.diff(rows), np.diff(cols))
-            for group in np.flatnonzero(weights[:, k, l]):
-                sums[z, group] += weights[group, k, l] * blocks
+    def add_view(z: int, k: int, l: int, mean: float) -> None:
+        rows, cols = edges[0][z, k], edges[1][z, l]
+        blocks = np.diff(np.diff(running[rows[:, None], cols], axis=0), axis=1)
+        blocks += mean * np.outer(np.diff(rows), np.diff(cols))
+        for group in np.flatnonzero(weights[:, k, l]):
+            sums[z, group] += weights[group, k, l] * blocks
 
     for k, l in np.ndindex(data.grid.rows, data.grid.cols):
         image = data.view(k, l).astype(np.float64)
@@ -105,5 +103,5 @@ def _of_images(
         # From the mean, running sums stay small and lose no digits.
         mean = float(image.mean())
         np.cumsum(np.cumsum(image - mean, axis=0), axis=1, out=running[1:, 1:])
-        in_threads(add_view, len(sums), k, l, mean)
+        each_in_threads(partial(add_view, k=k, l=l, mean=mean), range(len(sums)))
     return sums

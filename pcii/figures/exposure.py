@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from pcii.figures.pictures import to_srgb8, white_level
+from pcii.imaging.blocks import block_sums
 
 PANEL_PX = 320
 """Pictures with longer sides are drawn in blocks of 2 x 2 pixels or more: a panel has about as many dots on a
@@ -27,23 +28,10 @@ def block_px(shape: Sequence[int], longest_px: int) -> int:
     return -(-max(shape[0], shape[1], 1) // longest_px)
 
 
-def block_sums(image: np.ndarray, step_px: int) -> np.ndarray:
-    """Sums over blocks of `step_px` x `step_px` pixels of an image (H, W, C), as int64 or float64.
-
-    Those at the ends may be smaller.
-    """
-    kind = np.float64 if image.dtype.kind == "f" else np.int64
-    missing = [-size % step_px for size in image.shape[:2]]
-    padded = np.pad(image, [(0, missing[0]), (0, missing[1]), (0, 0)]) if any(missing) else image
+def image_block_sums(image: np.ndarray, step_px: int) -> np.ndarray:
+    """Sums over blocks of an image (H, W, C), as int64 or float64; infinite ones are no error."""
     with np.errstate(over="ignore", invalid="ignore"):
-        # Strided sums: NumPy's own over short runs take several times as long.
-        rows = padded[::step_px].astype(kind)
-        for place in range(1, step_px):
-            rows += padded[place::step_px]
-        sums = rows[:, ::step_px].copy()
-        for place in range(1, step_px):
-            sums += rows[:, place::step_px]
-    return sums
+        return block_sums(image, step_px, np.float64 if image.dtype.kind == "f" else np.int64, (0, 1))
 
 
 def smoothing_for(sections: Sequence[np.ndarray]) -> float:
@@ -55,7 +43,9 @@ def smoothing_for(sections: Sequence[np.ndarray]) -> float:
     >>> smoothing_for([np.ones((80, 80, 1), int)]), smoothing_for([np.full((80, 80, 3), 9)])
     (2.5, 0.0)
     """
-    squares = np.concatenate([block_sums(counts, DENSITY_PX).sum(axis=-1).ravel() for counts in sections])
+    squares = np.concatenate(
+        [image_block_sums(counts, DENSITY_PX).sum(axis=-1).ravel() for counts in sections]
+    )
     lit = squares[squares > 0].astype(np.float64)
     if not lit.size:
         return 0.0
@@ -113,21 +103,12 @@ def exposed(images: Iterable[tuple[np.ndarray, np.ndarray]], step_px: int) -> li
     """
     blocks: list[tuple[np.ndarray, np.ndarray]] = []
     for sums, samples in images:
-        sums, samples = block_sums(sums, step_px), block_sums(samples, step_px)
+        sums, samples = image_block_sums(sums, step_px), image_block_sums(samples, step_px)
         blocks.append((filled_means(sums, samples), samples))
     return encoded(blocks)
 
 
 def photon_picture(counts: np.ndarray, step_px: int) -> np.ndarray:
     """8-bit picture of the photon counts (H, W) of one view: the photons in blocks, one or more are white."""
-    shown = block_sums(counts[..., None], step_px)
+    shown = image_block_sums(counts[..., None], step_px)
     return to_srgb8(shown, max(1.0, white_level(shown)))
-
-
-def evenly_chosen(count: int, most: int) -> list[int]:
-    """Indices of all of `count` things, or of `most` of them evenly apart, the first and the last included.
-
-    >>> evenly_chosen(3, 4), evenly_chosen(9, 3)
-    ([0, 1, 2], [0, 4, 8])
-    """
-    return np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist()

@@ -157,7 +157,7 @@ def _suggested(
 
 def _check_parts(path: Path, headers: Sequence[Mapping[str, Any]], grid: CameraGrid) -> None:
     """Raise `InputError`, before pixels are decoded, for parts of another size, or of too many pixels."""
-    size, channels = (grid.height, grid.width), 0
+    size, channels = grid.shape_HW, 0
     for header in headers:
         if (found := window_size(header)) != size:
             raise InputError(f"{path}: part {header['name']}: expected {size} pixels, got {found}")

@@ -12,6 +12,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import disparity_px
+from pcii.imaging.blocks import block_sums, evenly_chosen
 
 MOST_CAMERAS = 5
 """Most camera rows, and columns, that are used: first, last, and equally spread between."""
@@ -56,15 +57,11 @@ def small_views(view: Callable[[int, int], np.ndarray], grid: CameraGrid, most_p
     Cells are of an even number of pixels, so that each holds all colours of a Bayer pattern, unless the views
     are small.
     """
-    rows, cols = (_spread(count) for count in (grid.rows, grid.cols))
+    rows, cols = (np.array(evenly_chosen(count, MOST_CAMERAS)) for count in (grid.rows, grid.cols))
     scale = -(-max(grid.height, grid.width) // most_px)
     scale = max(1, min(scale + scale % 2 if scale > 1 else 1, grid.height, grid.width))
     images = [_reduced(_finite(view(k, l), k, l), scale) for k in rows for l in cols]
     return SmallViews(np.stack(images), np.repeat(rows, cols.size), np.tile(cols, rows.size), scale)
-
-
-def _spread(count: int) -> np.ndarray:
-    return np.unique(np.rint(np.linspace(0, count - 1, min(count, MOST_CAMERAS))).astype(int))
 
 
 def _finite(image: np.ndarray, k: int, l: int) -> np.ndarray:
@@ -81,7 +78,7 @@ def _reduced(image: np.ndarray, scale: int) -> np.ndarray:
     largest = float(np.abs(image).max(initial=0))
     if largest > 1e30 or 0 < largest < 1e-30:  # squares and sums in single precision
         image = image / largest
-    cells = image[: h * scale, : w * scale].reshape(h, scale, w, scale).mean(axis=(1, 3), dtype=np.float32)
+    cells = block_sums(image[: h * scale, : w * scale], scale, np.float32) / scale**2
     light = np.sqrt(np.maximum(cells, 0))
     light /= max(float(light.mean()), 1e-30)
     return gaussian_filter(light, BLUR_PX) - gaussian_filter(light, BACKGROUND_PX)

@@ -15,8 +15,8 @@ from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.imaging.blocks import on_pixels
 from pcii.removal.likelihood.likelihood_method import FOCUS_PX
-from pcii.sections.photon_statistics import cells_to_pixels
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class PosteriorMasks:
         posterior, detected = self.depth.posterior_with_detection(counts, self.range_mm(planes))
         near = self.in_focus_probability(posterior, planes.total_disparity_px)
 
-        def on_pixels(blocks: np.ndarray) -> np.ndarray:
-            return np.stack([cells_to_pixels(each, posterior.block_px, counts.grid) for each in blocks])
-
-        in_focus = on_pixels((near > 0.5) & detected)
-        return Segmented(in_focus, "posterior", sections, {"probability": on_pixels(near)})
+        masks, probability = (
+            on_pixels(blocks, posterior.block_px, counts.grid.shape_HW)
+            for blocks in ((near > 0.5) & detected, near)
+        )
+        return Segmented(masks, "posterior", sections, {"probability": probability})
 
     def in_focus_probability(self, posterior: DepthPosterior, planes_px: np.ndarray) -> np.ndarray:
         """Probability (P, h, w) float32 of being in focus at planes of the total disparities (P,)."""

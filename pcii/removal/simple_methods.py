@@ -11,9 +11,10 @@ from pcii.core.estimates import Segmented
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
+from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
 from pcii.imaging.bright_regions import brightness as root_photons
-from pcii.sections.photon_statistics import cells_to_pixels, pooled_estimate, section_window_px, view_samples
+from pcii.sections.photon_statistics import pooled_estimate, section_window_px, view_samples
 from pcii.sections.probe_planes import with_probes
 from pcii.sections.reconstruction import extend, view_coverage
 
@@ -132,13 +133,13 @@ def _is_even(counts: PhotonCounts, planes: FocalPlanes, plane: int, cell_px: int
     dispersion = views * squares / np.maximum(total, 1) - total
     # chdtri is the inverse of the upper tail.
     even = dispersion <= chdtri(np.maximum(views - 1, 1), 1 - POISSON_QUANTILE)
-    return cells_to_pixels(even, cell_px, counts.grid)
+    return on_pixels(even, cell_px, counts.grid.shape_HW)
 
 
 def _views(planes: FocalPlanes, cell_px: int) -> np.ndarray:
     """How many views cover the middle of each cell of the first plane, at least 1."""
     grid = planes.grid
     coverage = view_coverage(planes)[0].astype(np.float64)
-    rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in (grid.height, grid.width))
+    rows, cols = (np.arange(0, size, cell_px) + cell_px // 2 for size in grid.shape_HW)
     middle = np.ix_(np.minimum(rows, grid.height - 1), np.minimum(cols, grid.width - 1))
     return np.maximum(coverage[middle], 1)

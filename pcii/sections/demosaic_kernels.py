@@ -2,21 +2,16 @@
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.base.compiled_loops import helper, shared
 
 
-def interpolate_green(green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
+@shared(lambda green, *_: len(green))
+def interpolate_green(first: int, last: int, green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
     """Green at every pixel of a mosaic (H, W): Eqs. 4 and 5 of Muniraj et al. 2017.
 
     `cells` (2, 2) are the colours of the Bayer cells. The image is continued by reflection about its border
     pixels.
     """
-    in_threads(_interpolate_green, len(raw), green, raw, cells)
-
-
-@compiled
-def _interpolate_green(first: int, last: int, green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
-    """Of the rows `first` to `last` - 1."""
     height, width = raw.shape
     for i in range(first, last):
         row, above, below = raw[i], raw[_reflected(i - 1, height)], raw[_reflected(i + 1, height)]
@@ -42,16 +37,11 @@ def _interpolate_green(first: int, last: int, green: np.ndarray, raw: np.ndarray
                     green[i, j] = (above[j] + left + right + below[j]) / 4
 
 
-def interpolate_chroma(image: np.ndarray, green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
-    """Colours (H, W, 3) from a mosaic and its green: Eq. 6, differences from green at their own sites."""
-    in_threads(_interpolate_chroma, len(raw), image, green, raw, cells)
-
-
-@compiled
-def _interpolate_chroma(
+@shared(lambda image, *_: len(image))
+def interpolate_chroma(
     first: int, last: int, image: np.ndarray, green: np.ndarray, raw: np.ndarray, cells: np.ndarray
 ) -> None:
-    """Of the rows `first` to `last` - 1."""
+    """Colours (H, W, 3) from a mosaic and its green: Eq. 6, differences from green at their own sites."""
     height, width = raw.shape
     for i in range(first, last):
         up, down = _reflected(i - 1, height), _reflected(i + 1, height)

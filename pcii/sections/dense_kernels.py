@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, in_threads
+from pcii.base.compiled_loops import shared
 from pcii.sections.image_moves import Groups, Moves, Running
 from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
 
@@ -14,18 +14,8 @@ def _bands(height: int) -> int:
     return -(-height // BAND)
 
 
+@shared(lambda sums, variance, images, *_: _bands(images.shape[1]))
 def sum_views(
-    sums: np.ndarray, variance: np.ndarray, images: np.ndarray, moves: Moves, groups: Groups
-) -> bool:
-    """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
-
-    `variance` is empty if it is not wanted. Returns whether the results and all images are finite.
-    """
-    return all(in_threads(_sum_views, _bands(images.shape[1]), sums, variance, images, moves, groups))
-
-
-@compiled
-def _sum_views(
     first_band: int,
     last_band: int,
     sums: np.ndarray,
@@ -34,7 +24,10 @@ def _sum_views(
     moves: Moves,
     groups: Groups,
 ) -> bool:
-    """Of the bands from `first_band` to `last_band` - 1."""
+    """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
+
+    `variance` is empty if it is not wanted. Returns whether the results and all images are finite.
+    """
     height, width = images.shape[1:]
     bad = bad_rows(images, moves) if first_band == 0 else 0
     for band in range(first_band, last_band):
@@ -56,17 +49,12 @@ def _sum_views(
     return bad == 0
 
 
-def add_views(running: Running, images: np.ndarray, moves: Moves) -> bool:
+@shared(lambda running, images, moves: _bands(images.shape[1]))
+def add_views(first_band: int, last_band: int, running: Running, images: np.ndarray, moves: Moves) -> bool:
     """Add shifted images (V, H, N) to running sums of their groups.
 
     Returns whether all pixels that fall outside the section are finite.
     """
-    return all(in_threads(_add_views, _bands(images.shape[1]), running, images, moves))
-
-
-@compiled
-def _add_views(first_band: int, last_band: int, running: Running, images: np.ndarray, moves: Moves) -> bool:
-    """Of the bands from `first_band` to `last_band` - 1."""
     bad = bad_rows(images, moves) if first_band == 0 else 0
     height = running.total.shape[1]
     for band in range(first_band, last_band):
@@ -74,19 +62,14 @@ def _add_views(first_band: int, last_band: int, running: Running, images: np.nda
     return bad == 0
 
 
-def merge_groups(sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups) -> bool:
+@shared(lambda sums, *_: len(sums))
+def merge_groups(
+    first: int, last: int, sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups
+) -> bool:
     """Sums and, unless it is empty, variances (H, W, C) from the running sums of the groups.
 
     Returns whether the results are finite.
     """
-    return all(in_threads(_merge_groups, len(sums), sums, variance, running, groups))
-
-
-@compiled
-def _merge_groups(
-    first: int, last: int, sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups
-) -> bool:
-    """Of the rows `first` to `last` - 1."""
     bad = 0
     for line in range(first, last):
         merge_line(sums, variance, running, groups, 0, line)
@@ -96,7 +79,10 @@ def _merge_groups(
     return bad == 0
 
 
+@shared(lambda total, squares, first, image, *_: len(image))
 def add_fine(
+    first_row: int,
+    last_row: int,
     total: np.ndarray,
     squares: np.ndarray,
     first: np.ndarray,
@@ -110,22 +96,6 @@ def add_fine(
     Pixel (i, j) belongs to voxel (`rows[i]`, `cols[j]`): no two of an image to the same. `cells` (2, 2) are
     the colours of a mosaic's Bayer cells, empty where every pixel holds all colours.
     """
-    in_threads(_add_fine, len(image), total, squares, first, image, rows, cols, cells)
-
-
-@compiled
-def _add_fine(
-    first_row: int,
-    last_row: int,
-    total: np.ndarray,
-    squares: np.ndarray,
-    first: np.ndarray,
-    image: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    cells: np.ndarray,
-) -> None:
-    """Of the rows `first_row` to `last_row` - 1 of the image."""
     height, width, _ = total.shape
     for i in range(first_row, last_row):
         row = rows[i]

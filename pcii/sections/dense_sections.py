@@ -115,14 +115,15 @@ class _Plane:
         self.is_mosaic, self.with_variance = cfa is not None, variance
         self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
         self.groups = groups_of(self.row_px, self.col_px, grid, cfa)
-        self.sums = empty((grid.height, grid.width, C), dtype)
+        self.sums = empty((*grid.shape_HW, C), dtype)
         self.variance = empty(self.sums.shape if variance else (0, grid.width, C), dtype)
 
     def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Make the section of images (V, H, N) of all views; returns whether it and the images are finite."""
         from pcii.sections import dense_kernels
 
-        return dense_kernels.sum_views(self.sums, self.variance, images, self._moves(views), self.groups)
+        moves = self._moves(views)
+        return all(dense_kernels.sum_views(self.sums, self.variance, images, moves, self.groups))
 
     def start(self) -> None:
         """Begin a section of views that come in batches."""
@@ -136,13 +137,13 @@ class _Plane:
         """Add images (V, H, N) of these views; returns whether the pixels outside the section are finite."""
         from pcii.sections import dense_kernels
 
-        return dense_kernels.add_views(self._running(), images, self._moves(views))
+        return all(dense_kernels.add_views(self._running(), images, self._moves(views)))
 
     def finish(self) -> bool:
         """Compute the result from the running sums; returns whether it is finite."""
         from pcii.sections import dense_kernels
 
-        return dense_kernels.merge_groups(self.sums, self.variance, self._running(), self.groups)
+        return all(dense_kernels.merge_groups(self.sums, self.variance, self._running(), self.groups))
 
     def _moves(self, views: np.ndarray) -> Moves:
         return moves_of(self.row_px, self.col_px, views, self.channels, self.is_mosaic)

@@ -4,35 +4,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, in_threads, threads
+from pcii.base.compiled_loops import shared, threads
 
 BAND_BYTES = 1 << 18
 """Size of a band of a section. It fits in the cache of a core, so that photons are added there and not in
 memory; halved or doubled, a section takes a tenth longer at most."""
 
 
+def bands_of(section: np.ndarray) -> int:
+    """Into how many bands of rows a section (H, W, C) is divided among threads."""
+    return min(max(threads(), section.nbytes // BAND_BYTES), max(section.shape[0], 1))
+
+
+@shared(lambda counts, rows, cols, starts, i, j, colour, n, bands: len(counts) * bands)
 def scatter(
-    counts: np.ndarray,
-    rows: np.ndarray,
-    cols: np.ndarray,
-    starts: np.ndarray,
-    i: np.ndarray,
-    j: np.ndarray,
-    colour: np.ndarray,
-    n: np.ndarray,
-) -> None:
-    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
-
-    `rows` (Z, K, h) and `cols` (Z, L, w) are the voxels of the pixels of each camera; `starts` (K L + 1,) is
-    where each view's photons begin, which are sorted by row. Each section is divided into bands of rows: a
-    thread clears a band and adds the photons that fall in it.
-    """
-    bands = min(max(threads(), counts[0].nbytes // BAND_BYTES), max(counts.shape[1], 1))
-    in_threads(_scatter, len(counts) * bands, counts, rows, cols, starts, i, j, colour, n, bands)
-
-
-@compiled
-def _scatter(
     first_part: int,
     last_part: int,
     counts: np.ndarray,
@@ -45,7 +30,12 @@ def _scatter(
     n: np.ndarray,
     bands: int,
 ) -> None:
-    """Of the parts plane * `bands` + band from `first_part` to `last_part` - 1."""
+    """Sums of photons per voxel and colour: `counts` (Z, H, W, C), overwritten.
+
+    `rows` (Z, K, h) and `cols` (Z, L, w) are the voxels of the pixels of each camera; `starts` (K L + 1,) is
+    where each view's photons begin, which are sorted by row. Each section is divided into `bands_of` it: a
+    thread clears a band and adds the photons that fall in it.
+    """
     _, height, width, _ = counts.shape
     across = cols.shape[1]
     begin = np.empty(starts.size - 1, np.int64)  # of each view, its first photon that is not yet added
@@ -73,14 +63,9 @@ def _scatter(
             begin[view] = e
 
 
-def copy_rows(target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
+@shared(lambda target, *_: len(target))
+def copy_rows(first: int, last: int, target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
     """Set each row n of `target` (N, M) to row `kinds[n]` of `rows` (P, M)."""
-    in_threads(_copy_rows, len(target), target, kinds, rows)
-
-
-@compiled
-def _copy_rows(first: int, last: int, target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
-    """Of the rows `first` to `last` - 1."""
     for row in range(first, last):
         source, line = rows[kinds[row]], target[row]
         for x in range(line.size):
@@ -100,21 +85,8 @@ class Samples(NamedTuple):
     squares: np.ndarray
 
 
+@shared(lambda samples, row, col, n, starts, window, bands: bands)
 def window_samples(
-    samples: Samples, row: np.ndarray, col: np.ndarray, n: np.ndarray, starts: np.ndarray, window: int
-) -> None:
-    """Statistics of each window's samples that are not zero, from zeros.
-
-    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
-    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. A
-    thread owns a band of rows. The cost follows the photons times the cells of a window.
-    """
-    bands = threads()
-    in_threads(_window_samples, bands, samples, row, col, n, starts, window, bands)
-
-
-@compiled
-def _window_samples(
     first_band: int,
     last_band: int,
     samples: Samples,
@@ -125,7 +97,13 @@ def _window_samples(
     window: int,
     bands: int,
 ) -> None:
-    """Of the bands from `first_band` to `last_band` - 1."""
+    """Statistics of each window's samples that are not zero, from zeros.
+
+    A sample is the sum of one view's photons in the window of `window` x `window` cells about a cell. `row`,
+    `col` and `n` (N,) are the photons' cells and numbers, view v's from `starts[v]` to `starts[v + 1]`. Each
+    of the `bands` of rows goes through all photons, so there need be no more than threads. The cost follows
+    the photons times the cells of a window.
+    """
     number, first, difference, squares = samples
     height, width = number.shape
     above = (window - 1) // 2  # the window of a cell reaches further above and left of it if its size is even

@@ -5,15 +5,14 @@ hardly any has two different non-zero samples. So samples are pooled over small 
 is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
+from pcii.imaging.blocks import sum_of
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""
@@ -96,14 +95,11 @@ def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
     """Means (H, W, C) float64 over square windows; outside the film there is nothing."""
     from scipy.ndimage import uniform_filter
 
-    from pcii.base.compiled_loops import in_threads
-
-    def of_colours(first: int, last: int) -> None:
-        colours = means[..., first:last]
-        uniform_filter(colours, window_px, colours, "constant", axes=(0, 1))
+    from pcii.base.compiled_loops import each_in_threads
 
     means = values.astype(np.float64)
-    in_threads(of_colours, means.shape[-1])
+    colours = list(np.moveaxis(means, -1, 0))
+    each_in_threads(lambda colour: uniform_filter(colour, window_px, colour, "constant"), colours)
     return means
 
 
@@ -147,6 +143,7 @@ def view_samples(
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
     """
+    from pcii.base.compiled_loops import threads
     from pcii.sections import event_kernels as kernels
 
     grid, events = counts.grid, counts.events
@@ -158,35 +155,11 @@ def view_samples(
     starts = np.append(0, np.cumsum(inside))[counts.view_starts]
     cells = row[inside] // cell_px, col[inside] // cell_px
     samples = kernels.Samples(number, first, difference, squares)
-    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells)
+    kernels.window_samples(samples, *cells, events.n[inside], starts, window_cells, threads())
     mean = (number * first + difference) / np.maximum(number, 1)
     deviations = np.maximum(number * squares - difference.astype(np.float64) ** 2, 0)
     variance = deviations / np.maximum(number * (number - 1), 1)
     return ViewSamples(number, mean, np.where(number > 1, variance, 0.0))
-
-
-def cell_sums(pixels: np.ndarray, cell_px: int, dtype: type) -> np.ndarray:
-    """Sums over cells of `cell_px` x `cell_px` pixels (..., H, W); those at the ends may be smaller."""
-    *others, H, W = pixels.shape
-    if H % cell_px or W % cell_px:
-        pixels = np.pad(pixels, [(0, 0)] * len(others) + [(0, -H % cell_px), (0, -W % cell_px)])
-    # Strided sums: NumPy's over several short axes take five times as long.
-    rows = sum_of([pixels[..., place::cell_px, :] for place in range(cell_px)], dtype)
-    return sum_of([rows[..., place::cell_px] for place in range(cell_px)], dtype)
-
-
-def sum_of(parts: Sequence[np.ndarray], dtype: type) -> np.ndarray:
-    """Sum of arrays of one shape, added one by one."""
-    total = parts[0].astype(dtype)
-    for part in parts[1:]:
-        total += part
-    return total
-
-
-def cells_to_pixels(cells: np.ndarray, cell_px: int, grid: CameraGrid) -> np.ndarray:
-    """Values on cells, (H / cell_px, W / cell_px) rounded up, as values on pixels (H, W)."""
-    full = cells.repeat(cell_px, axis=0).repeat(cell_px, axis=1)
-    return full[: grid.height, : grid.width]
 
 
 def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:

@@ -161,7 +161,8 @@ def _scatter(
     # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.
     counts = empty(shape, np.int32 if n is events.n and data.total < 2**31 else np.int64)
     colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
-    kernels.scatter(counts, rows, cols, data.view_starts, events.i, events.j, colours, n)
+    place = data.view_starts, events.i, events.j, colours
+    kernels.scatter(counts, rows, cols, *place, n, kernels.bands_of(counts[0]))
     return counts
 
 

@@ -8,7 +8,8 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.view_figures import colours_and_samples
-from pcii.figures.exposure import block_px, evenly_chosen, exposed
+from pcii.figures.exposure import block_px, exposed
+from pcii.imaging.blocks import evenly_chosen
 
 Box = tuple[slice, slice]
 """Rows and columns of a film."""

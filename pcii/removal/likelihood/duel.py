@@ -12,6 +12,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import in_cells
 from pcii.evidence.focus_likelihood import JUMP_NATS, Predictions, best_labels, predictions_of, windowed
+from pcii.imaging.blocks import evenly_chosen
 from pcii.imaging.bright_regions import connected_pieces
 from pcii.removal.likelihood.regions import Region
 
@@ -65,7 +66,9 @@ def _duel(counts: PhotonCounts, planes: FocalPlanes, seen: Predictions) -> np.nd
     """Nats that each depth gains over all of them together (S, h, w)."""
     from pcii.evidence import focus_kernels as kernels
 
-    rows, cols = (in_cells(axis[:, _some(axis.shape[1])]) for axis in planes.whole_shifts_px)
+    rows, cols = (
+        in_cells(axis[:, evenly_chosen(axis.shape[1], VIEWS_PER_AXIS)]) for axis in planes.whole_shifts_px
+    )
     S, h, w = seen.expected.shape
     views = np.zeros((rows.shape[1] * cols.shape[1], h, w), np.float32)
     kernels.views_of_planes(seen.expected, rows, cols, 1 / S, views)
@@ -77,7 +80,3 @@ def _duel(counts: PhotonCounts, planes: FocalPlanes, seen: Predictions) -> np.nd
     n = counts.events.n.astype(np.float32)
     kernels.duel_planes(views, seen.expected, rows, cols, rate, seen.cell, together, n, gain)
     return gain
-
-
-def _some(cameras: int) -> np.ndarray:
-    return np.unique(np.linspace(0, cameras - 1, VIEWS_PER_AXIS).round().astype(int))

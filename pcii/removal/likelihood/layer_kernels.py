@@ -8,7 +8,7 @@ beside the photons that tell where it is, at some depths in more views than at o
 
 import numpy as np
 
-from pcii.base.compiled_loops import compiled, helper, in_threads
+from pcii.base.compiled_loops import compiled, helper, in_threads, shared
 from pcii.evidence.cells import CELL_PX
 
 PARTS = CELL_PX * CELL_PX
@@ -209,13 +209,8 @@ def _paint(
                     line[j] = line[j] * (1 - share[j]) + own[j]
 
 
-def views_of(covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray) -> None:
-    """How many views see a layer's cells past what is `covered` (V, H, W): `total` (H, W), overwritten."""
-    in_threads(_views_of, -(-len(total) // BAND), covered, rows, cols, total)
-
-
-@compiled
-def _views_of(
+@shared(lambda covered, rows, cols, total: -(-len(total) // BAND))
+def views_of(
     first_band: int,
     last_band: int,
     covered: np.ndarray,
@@ -223,20 +218,13 @@ def _views_of(
     cols: np.ndarray,
     total: np.ndarray,
 ) -> None:
-    """Of the bands from `first_band` to `last_band` - 1."""
+    """How many views see a layer's cells past what is `covered` (V, H, W): `total` (H, W), overwritten."""
     for top in range(first_band * BAND, last_band * BAND, BAND):
         _look_through(covered, None, rows, cols, top, total[top : top + BAND])
 
 
+@shared(lambda behind, covered, rows, cols, total: -(-len(total) // BAND))
 def light_of(
-    behind: np.ndarray, covered: np.ndarray, rows: np.ndarray, cols: np.ndarray, total: np.ndarray
-) -> None:
-    """What they see there of what is `behind` (V, H, W), all views together: `total` (H, W), overwritten."""
-    in_threads(_light_of, -(-len(total) // BAND), behind, covered, rows, cols, total)
-
-
-@compiled
-def _light_of(
     first_band: int,
     last_band: int,
     behind: np.ndarray,
@@ -245,21 +233,13 @@ def _light_of(
     cols: np.ndarray,
     total: np.ndarray,
 ) -> None:
-    """Of the bands from `first_band` to `last_band` - 1."""
+    """What they see there of what is `behind` (V, H, W), all views together: `total` (H, W), overwritten."""
     for top in range(first_band * BAND, last_band * BAND, BAND):
         _look_through(covered, behind, rows, cols, top, total[top : top + BAND])
 
 
-def gathered(values: np.ndarray, rows: np.ndarray, cols: np.ndarray, result: np.ndarray) -> None:
-    """The views' `values` (V, H, W) where a layer would show them, summed: `result` (H, W), overwritten.
-
-    What a view shows beside the layer's frame counts at its nearest border.
-    """
-    in_threads(_gathered, len(result), values, rows, cols, result)
-
-
-@compiled
-def _gathered(
+@shared(lambda values, rows, cols, result: len(result))
+def gathered(
     first_row: int,
     last_row: int,
     values: np.ndarray,
@@ -267,7 +247,10 @@ def _gathered(
     cols: np.ndarray,
     result: np.ndarray,
 ) -> None:
-    """Of the rows `first_row` to `last_row` - 1."""
+    """The views' `values` (V, H, W) where a layer would show them, summed: `result` (H, W), overwritten.
+
+    What a view shows beside the layer's frame counts at its nearest border.
+    """
     _, H, W = values.shape
     for a in range(first_row, last_row):
         result[a, :] = np.float32(0)

@@ -54,7 +54,7 @@ def background_bounds(counts: PhotonCounts, spread_px: float) -> tuple[float, fl
     rows, cols = (axis[0] for axis in planes.whole_shifts_px)
     # A cell is seen by whoever sees the pixel at its centre.
     i, j = (np.arange(size) * CELL_PX + CELL_PX // 2 for size in (h, w))
-    views = _views_of(i, j, rows, cols, (grid.height, grid.width))
+    views = _views_of(i, j, rows, cols, grid.shape_HW)
     smooth, seen = (gaussian_filter(part.astype(np.float64), DARK_CELLS) for part in (photons, views))
     typical = photon_weighted_mean(photons) / V
     well_seen = views >= views.max() / 2

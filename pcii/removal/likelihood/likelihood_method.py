@@ -41,6 +41,7 @@ from pcii.evidence.focus_likelihood import (
 )
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
+from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around, dilated
 from pcii.removal.likelihood.duel import duelled, where_planes_touch
 from pcii.removal.likelihood.layer_search import layered
@@ -158,8 +159,8 @@ def _outlines(
     inner = _on_pixels(inner, grid)
     # What nothing speaks for is free to be taken; what is defocused is not.
     firm = [0, *(region.number for region in regions if region.gain_nats > SURE_NATS)]
-    on_pixels = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
-    masks = np.zeros((planes, grid.height, grid.width), dtype=bool)
+    number_of = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
+    masks = np.zeros((planes, *grid.shape_HW), dtype=bool)
     belongs = np.zeros((planes, counts.events.n.size), dtype=bool)
     spreads = sorted({region.spread_px for region in regions if region.is_there})
     found: list[tuple[Region, tuple[slice, slice], Future[np.ndarray]]] = []
@@ -169,9 +170,9 @@ def _outlines(
             for region in regions:
                 if not region.is_there or region.spread_px != spread:
                     continue
-                start = on_pixels == region.number
+                start = number_of == region.number
                 box = box_around(start)
-                taken = ((on_pixels > 0) & ~start)[box]
+                taken = ((number_of > 0) & ~start)[box]
                 _close_frame(taken, box, grid)
                 photons, samples = (
                     part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
@@ -181,8 +182,8 @@ def _outlines(
         row, col, inside = FocalPlanes.at_total_disparity(grid, spread).project(counts.events, 0)
         for region, box, outline in found:
             if region.spread_px == spread:
-                mask = np.zeros((grid.height, grid.width), dtype=bool)
-                mask[box] = np.where(inner[box], on_pixels[box] == region.number, outline.result())
+                mask = np.zeros(grid.shape_HW, dtype=bool)
+                mask[box] = np.where(inner[box], number_of[box] == region.number, outline.result())
                 masks[region.plane] |= mask
                 belongs[region.plane, inside] |= mask[row[inside], col[inside]]
     return masks, belongs
@@ -198,6 +199,4 @@ def _close_frame(taken: np.ndarray, box: tuple[slice, slice], grid: CameraGrid) 
 
 
 def _on_pixels(cells: np.ndarray, grid: CameraGrid) -> np.ndarray:
-    from pcii.sections.photon_statistics import cells_to_pixels
-
-    return cells_to_pixels(cells, CELL_PX, grid)
+    return on_pixels(cells, CELL_PX, grid.shape_HW)

@@ -8,10 +8,10 @@ import numpy as np
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
+from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import large_pieces, roberts_magnitude
 from pcii.sections.photon_statistics import (
     ViewSamples,
-    cells_to_pixels,
     photons_around_a_photon,
     truncated_poisson_variance,
     view_samples,
@@ -52,7 +52,7 @@ def adaptive_threshold(
         "answered": known,
         "kept": ~rejected,
     }
-    return {name: cells_to_pixels(cells, cell_px, counts.grid) for name, cells in maps.items()}
+    return {name: on_pixels(cells, cell_px, counts.grid.shape_HW) for name, cells in maps.items()}
 
 
 def _threshold(samples: ViewSamples, cell_px: int, tolerance_px: float) -> np.ndarray:

@@ -1,0 +1,45 @@
+"""Square blocks of pixels: sums over them, and their values on pixels again; some of many things."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+
+def block_sums(pixels: np.ndarray, side: int, dtype: type, axes: tuple[int, int] = (-2, -1)) -> np.ndarray:
+    """Sums over blocks of `side` x `side` along two axes, as `dtype`; blocks at the ends may be smaller.
+
+    >>> block_sums(np.ones((3, 4), int), 2, int).tolist()
+    [[4, 4], [2, 2]]
+    """
+    missing = [(0, 0)] * pixels.ndim
+    for axis in axes:
+        missing[axis] = (0, -pixels.shape[axis] % side)
+    sums = np.pad(pixels, missing) if any(end for _, end in missing) else pixels
+    for axis in axes:
+        # Strided sums: NumPy's over short runs take five times as long.
+        along = np.moveaxis(sums, axis, 0)
+        sums = np.moveaxis(sum_of([along[place::side] for place in range(side)], dtype), 0, axis)
+    return sums
+
+
+def sum_of(parts: Sequence[np.ndarray], dtype: type) -> np.ndarray:
+    """Sum of arrays of one shape, added one by one."""
+    total = parts[0].astype(dtype)
+    for part in parts[1:]:
+        total += part
+    return total
+
+
+def on_pixels(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarray:
+    """Values of blocks (..., h, w) at each of their pixels, of which there are `shape` (H, W)."""
+    full = blocks.repeat(side, axis=-2).repeat(side, axis=-1)
+    return full[..., : shape[0], : shape[1]]
+
+
+def evenly_chosen(count: int, most: int) -> list[int]:
+    """Indices of all of `count` things, or of `most` of them evenly apart, the first and the last included.
+
+    >>> evenly_chosen(3, 4), evenly_chosen(9, 3)
+    ([0, 1, 2], [0, 4, 8])
+    """
+    return np.linspace(0, count - 1, min(count, most)).round().astype(int).tolist()
