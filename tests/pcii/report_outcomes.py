@@ -2,7 +2,7 @@
 
 import base64
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,11 +29,9 @@ TRUTH = Truth(Z_MM, IDS, {3: "ball", 5: "unseen", 7: "card"})
 FOUND = np.where(IDS > 0, np.where(IDS > 0, Z_MM, 0) + np.linspace(-3, 5, 48), np.nan)
 
 
-def outcome_of(
-    root: Path, images: Any, truth: Truth | None, z_mm: tuple[float, ...] = (500, 700), **texts: Any
-) -> Outcome:
+def outcome_of(root: Path, images: Any, truth: Truth | None, z_mm: tuple[float, ...] = (500, 700)) -> Outcome:
     """Results as `analyse` gives them, of a method that keeps the first object, with a depth by hand."""
-    dataset = save_dataset(root, images, truth, z_mm=list(z_mm), title="By hand", **texts)
+    dataset = save_dataset(root, images, truth, z_mm=list(z_mm), title="By hand")
     sections = reconstruct(dataset.counts_or_views, z_mm)
     focus: tuple[Segmented, ...] = ()
     if dataset.has_counts:
@@ -44,6 +42,17 @@ def outcome_of(
     full_light = None if dataset.views is None else reconstruct(dataset.views, z_mm)
     z_range_mm = depth_range_of(dataset)
     return Outcome(dataset, full_light, sections, focus, depth, result, z_range_mm, {"depth": 1.0})
+
+
+class Written(NamedTuple):
+    """Results, and the report of them."""
+
+    outcome: Outcome
+    path: Path
+
+    @property
+    def page(self) -> str:
+        return self.path.read_text(encoding="utf-8")
 
 
 def page_of(outcome: Outcome, folder: Path, **options: Any) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_outcomes import COUNTS, FOUND, GRID, IDS, LIGHT, TRUTH, decoded, outcome_of, page_of
+from report_outcomes import COUNTS, FOUND, GRID, IDS, LIGHT, TRUTH, Written, decoded, outcome_of, page_of
 
 from pcii.app import report_origin
 from pcii.app.pipeline import Outcome
@@ -31,9 +31,14 @@ def words_of(page: str) -> str:
     return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", text)))
 
 
-@pytest.fixture(scope="module")
-def full(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
-    return outcome_of(tmp_path_factory.mktemp("full") / "d", (COUNTS, LIGHT), TRUTH)
+@pytest.fixture
+def full(reports: dict[str, Written]) -> Outcome:
+    return reports["full"].outcome
+
+
+@pytest.fixture
+def page(reports: dict[str, Written]) -> str:
+    return reports["full"].page
 
 
 def test_the_slider_reads_out_what_the_results_say(full: Outcome) -> None:
@@ -71,13 +76,13 @@ def test_blocks_of_pixels_are_read_out_where_there_are_many(
 
 
 @pytest.mark.parametrize("z_mm", [(500.0,), (500.0, 700.0), tuple(np.linspace(400, 900, 40))])
-def test_planes_of_the_slider(tmp_path: Path, z_mm: tuple[float, ...]) -> None:
-    outcome = outcome_of(tmp_path / "d", COUNTS, TRUTH, z_mm)
-    planes, own = slider_planes(outcome)
+def test_planes_of_the_slider(full: Outcome, z_mm: tuple[float, ...]) -> None:
+    z_range_mm = min(z_mm) * 0.8, max(z_mm) * 1.25
+    planes, own = slider_planes(replace(full, sections=reconstruct(COUNTS, z_mm), z_range_mm=z_range_mm))
     assert len(planes) <= 2 * MOST_PLANES
     assert (np.diff(planes.z_mm) > 0).all()
     # To the ends of the range, or to a plane of the analysis that looks the same.
-    ends = total_disparity_px(GRID, np.array([min(z_mm) * 0.8, max(z_mm) * 1.25]))
+    ends = total_disparity_px(GRID, np.array(z_range_mm))
     assert np.abs(total_disparity_px(GRID, planes.z_mm[[0, -1]]) - ends).max() < 0.51
     assert [z_mm[there] for there in own.values()] == [planes.z_mm[here] for here in own]
     assert len(own) == min(len(z_mm), MOST_PLANES)
@@ -97,8 +102,8 @@ def test_one_camera_has_one_section_for_all_depths(tmp_path: Path) -> None:
     assert "The section at 500 mm" in words_of(page)
 
 
-def test_without_truth_nothing_of_it_is_shown(tmp_path: Path) -> None:
-    page = page_of(outcome_of(tmp_path / "d", COUNTS, None), tmp_path)
+def test_without_truth_nothing_of_it_is_shown(reports: dict[str, Written]) -> None:
+    page = reports["counts"].page
     words = words_of(page)
     assert "The truth is not known" in words
     for absent in (
@@ -119,9 +124,8 @@ def test_without_truth_nothing_of_it_is_shown(tmp_path: Path) -> None:
     assert 'data-name="truth"' not in page
 
 
-def test_radiance_alone_has_light_to_read_out(tmp_path: Path) -> None:
-    outcome = outcome_of(tmp_path / "d", LIGHT, None)
-    words = words_of(page_of(outcome, tmp_path))
+def test_radiance_alone_has_light_to_read_out(reports: dict[str, Written]) -> None:
+    words, outcome = words_of(reports["light"].page), reports["light"].outcome
     assert "light, share of the most" in words
     assert "photons in the section" not in words
     shown = slider(Shown.of(outcome, 0.0), silent)
@@ -130,22 +134,22 @@ def test_radiance_alone_has_light_to_read_out(tmp_path: Path) -> None:
     np.testing.assert_allclose(light, means / means.max(), atol=2e-5)
 
 
-def test_only_the_papers_scene_has_the_papers_numbers(tmp_path: Path) -> None:
-    outcome = outcome_of(tmp_path / "d", (COUNTS, LIGHT), TRUTH, (540, 620))
+def test_only_the_papers_scene_has_the_papers_numbers(full: Outcome, page: str, tmp_path: Path) -> None:
     titles = ("Figure 6", "Figure 7", "Table 1")
-    words = words_of(page_of(outcome, tmp_path))
+    words = words_of(page)
     assert not any(title in words for title in titles)
     assert "In the paper" not in words
     assert "Entropy of the objects" in words
-    manifest = read_manifest(tmp_path / "d") | {"recipe": {"scene": "two_objects", "seed": 1}}
-    write_manifest(tmp_path / "d", manifest)
-    paper = replace(outcome, dataset=open_dataset(tmp_path / "d"))
+    manifest = {**full.dataset.manifest, "recipe": {"scene": "two_objects", "seed": 1}}
+    paper = replace(
+        full, dataset=replace(full.dataset, manifest=manifest), sections=reconstruct(COUNTS, (540, 620))
+    )
     words = words_of(page_of(paper, tmp_path))
     assert all(title in words for title in titles)
 
 
-def test_entropies_have_intervals(full: Outcome, tmp_path: Path) -> None:
-    words = words_of(page_of(full, tmp_path))
+def test_entropies_have_intervals(full: Outcome, page: str, tmp_path: Path) -> None:
+    words = words_of(page)
     bits = full.score.objects[0]["entropy"]["500"]
     assert re.search(rf"ball {bits:.3f} ± \d\.\d\d\d ", words)
     assert "unseen" not in words.split("How this was made")[0].split("Entropy of the objects")[1]
@@ -190,10 +194,9 @@ def test_how_it_was_made(full: Outcome, tmp_path: Path, monkeypatch: pytest.Monk
     assert ("identity", manifest["identity"]) in rows["data"]
 
 
-def test_smoothing_is_said_and_can_be_left_out(full: Outcome, tmp_path: Path) -> None:
+def test_smoothing_is_said_and_can_be_left_out(full: Outcome, page: str, tmp_path: Path) -> None:
     """Fewer than two photons a voxel are smoothed; the slider shows them as they are too."""
     toggles = re.compile(r'name="light"[^>]*> ([^<]*)</label>')
-    page = page_of(full, tmp_path)
     (width,) = set(re.findall(r"smoothed by ([\d.]+) px", page))
     assert 1 < float(width) < 4
     assert toggles.findall(page) == [
@@ -209,17 +212,12 @@ def test_smoothing_is_said_and_can_be_left_out(full: Outcome, tmp_path: Path) ->
     assert "--smoothing-px 0" in words_of(page)
 
 
-def test_the_command_makes_the_same_results(full: Outcome, tmp_path: Path) -> None:
-    words = words_of(page_of(full, tmp_path))
+def test_the_command_makes_the_same_report(full: Outcome, page: str, tmp_path: Path) -> None:
+    words = words_of(page)
     assert "pcii run d -o RESULTS --z-mm 500 --z-mm 700 --method 'by hand'" in words
     assert str(full.dataset.path.parent) not in words
-
-
-def test_a_report_is_the_same_twice_but_for_its_date(
-    full: Outcome, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(report_origin, "_of_analysis", lambda *_: [("command", "pcii run")])
-    assert page_of(full, tmp_path) == page_of(full, tmp_path)
+    first, second = (each.split("How this was made")[0] for each in (page, page_of(full, tmp_path)))
+    assert first == second  # dates and machines are below
 
 
 def test_colours_without_samples_are_those_around() -> None:
@@ -250,8 +248,7 @@ def test_errors_of_depth_and_their_scale(full: Outcome) -> None:
     assert 0.9 < inside.mean() <= 1
 
 
-def test_tables_can_be_scrolled_by_keyboard_and_pictures_have_words(full: Outcome, tmp_path: Path) -> None:
-    page = page_of(full, tmp_path)
+def test_tables_can_be_scrolled_by_keyboard_and_pictures_have_words(page: str) -> None:
     tables = re.findall(r"<div class=\"wide\"([^>]*)>\s*<table", page)
     assert len(tables) == page.count("<table")
     assert all('tabindex="0"' in each and "aria-label" in each for each in tables)

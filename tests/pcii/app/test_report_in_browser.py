@@ -1,17 +1,17 @@
 """report.html in headless Chromium: slider, toggles, and a read-out that says what the arrays say."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
 from chromium import CHROMIUM, Page, browser_page
-from report_outcomes import COUNTS, FOUND, IDS, LIGHT, TRUTH, outcome_of, page_of
+from report_outcomes import COUNTS, FOUND, IDS, TRUTH, Written
 
+from pcii.app.pipeline import Outcome
+from pcii.app.report_figures import Shown
 from pcii.sections.reconstruction import reconstruct
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")]
-PHOTONS = "photon counts, smoothed by 2 px"
 SHOWN = "[...document.querySelectorAll('#look .frame img')].filter(i => !i.hidden).map(i => i.alt)"
 
 
@@ -21,44 +21,35 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
         yield page
 
 
-@pytest.fixture(scope="module")
-def reports(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Reports with everything, of counts alone, and of light alone; where nothing is true."""
-    found: dict[str, Path] = {}
-    for name, images, truth in (
-        ("full", (COUNTS, LIGHT), TRUTH),
-        ("counts", COUNTS, None),
-        ("light", LIGHT, None),
-    ):
-        folder = tmp_path_factory.mktemp(name)
-        page_of(outcome_of(folder / "d", images, truth), folder, smoothing_px=2.0)
-        found[name] = folder / "report.html"
-    return found
+@pytest.fixture
+def full(browser: Page, reports: dict[str, Written]) -> Outcome:
+    """The report with everything is open."""
+    browser.open(reports["full"].path)
+    return reports["full"].outcome
 
 
 def read(browser: Page, name: str) -> str:
     return browser.text(f'.readout [data-read="{name}"]')
 
 
-def test_the_slider_moves_through_the_depths(browser: Page, reports: dict[str, Path]) -> None:
-    browser.open(reports["full"])
-    assert browser.value(SHOWN) == [f"section at 500 mm, {PHOTONS}"]
+def test_the_slider_moves_through_the_depths(browser: Page, full: Outcome) -> None:
+    photons = f"photon counts, smoothed by {Shown.of(full).smoothing_px:g} px"
+    assert browser.value(SHOWN) == [f"section at 500 mm, {photons}"]
     browser.click("#plane")  # the middle
     middle = browser.text("#depth-shown")
-    assert browser.value(SHOWN) == [f"section at {middle}, {PHOTONS}"]
+    assert browser.value(SHOWN) == [f"section at {middle}, {photons}"]
     browser.press("ArrowRight")
     after = browser.text("#depth-shown")
     assert float(after.split()[0]) > float(middle.split()[0])
     assert browser.value("document.querySelector('#plane').getAttribute('aria-valuetext')") == after
-    assert browser.text("#shown") == f"section at {after}, {PHOTONS}"
+    assert browser.text("#shown") == f"section at {after}, {photons}"
     for place, depth in (("first", "500 mm"), ("last", "700 mm")):
         browser.click(f".jumps button:{place}-of-type")
         assert browser.text("#depth-shown") == browser.text('[aria-pressed="true"]') == depth
     assert not browser.faults
 
 
-def test_toggles_change_light_points_and_comparison(browser: Page, reports: dict[str, Path]) -> None:
-    browser.open(reports["full"])
+def test_toggles_change_light_points_and_comparison(browser: Page, full: Outcome) -> None:
     browser.click('input[name="light"][value="1"]')
     assert browser.value(SHOWN) == ["section at 500 mm, photon counts as they are"]
     browser.click('input[name="light"][value="2"]')
@@ -84,8 +75,7 @@ def test_toggles_change_light_points_and_comparison(browser: Page, reports: dict
     assert not browser.faults
 
 
-def test_the_read_out_says_what_the_arrays_say(browser: Page, reports: dict[str, Path]) -> None:
-    browser.open(reports["full"])
+def test_the_read_out_says_what_the_arrays_say(browser: Page, full: Outcome) -> None:
     photons = reconstruct(COUNTS, 500).counts[0].sum(axis=-1)
     for row, col in ((20, 14), (20, 34), (5, 3), (39, 47), (0, 0)):
         browser.point("#look .frame", (col + 0.5) / 48, (row + 0.5) / 40)
@@ -103,8 +93,7 @@ def test_the_read_out_says_what_the_arrays_say(browser: Page, reports: dict[str,
             assert (read(browser, "error"), read(browser, "object")) == ("–", "none")
 
 
-def test_the_cross_hair_moves_by_keys_on_every_picture(browser: Page, reports: dict[str, Path]) -> None:
-    browser.open(reports["full"])
+def test_the_cross_hair_moves_by_keys_on_every_picture(browser: Page, full: Outcome) -> None:
     browser.value("document.querySelectorAll('.frame')[2].focus()")
     browser.press("ArrowRight")
     browser.press("ArrowDown", shift=True)
@@ -118,18 +107,17 @@ def test_the_cross_hair_moves_by_keys_on_every_picture(browser: Page, reports: d
     assert read(browser, "pixel") == "39, 25"  # the border
 
 
-@pytest.mark.parametrize("name", ["full", "counts", "light"])
-@pytest.mark.parametrize("width", [1200, 400])
+@pytest.mark.parametrize(("name", "width"), [("full", 1200), ("full", 400), ("counts", 400), ("light", 1200)])
 def test_nothing_is_fetched_logged_or_cut_off(
-    browser: Page, reports: dict[str, Path], name: str, width: int
+    browser: Page, reports: dict[str, Written], name: str, width: int
 ) -> None:
     browser.requests.clear()
-    browser.open(reports[name], width)
+    browser.open(reports[name].path, width)
     browser.point("#look .frame")
     assert read(browser, "pixel") != "–"
     assert not browser.faults
     fetched = [url for url in browser.requests if not url.startswith("data:")]
-    assert set(fetched) == {reports[name].as_uri()}
+    assert set(fetched) == {reports[name].path.as_uri()}
     assert browser.value("document.documentElement.scrollWidth") <= width
     # Tables that are too wide scroll in their own box.
     wide = "[...document.querySelectorAll('.wide')].every(d => d.getBoundingClientRect().right <= innerWidth)"

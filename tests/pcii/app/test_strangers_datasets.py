@@ -31,11 +31,9 @@ def run(*arguments: object) -> int:
     return command_line.run(app, [str(argument) for argument in arguments])
 
 
-@pytest.mark.parametrize("has", ["counts", "counts truth", "counts views", "counts views depth"])
+@pytest.mark.parametrize("has", ["counts", "counts views depth"])
 def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: str) -> None:
     truth = None
-    if "truth" in has:
-        truth = Truth(Z_MM, IDS, {1: "ball"})
     if "depth" in has:  # of surfaces without names, as in benchmarks of depth
         truth = Truth(np.full((40, 48), 500.0), 0 * IDS, {})
     images = (COUNTS, Views(LIGHT, GRID)) if "views" in has else COUNTS
@@ -55,10 +53,8 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
         assert outcome.score.depth["hci"]["answered"] is not None
 
 
-@pytest.mark.parametrize("with_truth", [False, True])
-def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, with_truth: bool, capsys) -> None:
-    truth = Truth(Z_MM, IDS, {1: "ball"}) if with_truth else None
-    save_dataset(tmp_path / "d", Views(LIGHT, GRID), truth, z_mm=500)
+def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
+    save_dataset(tmp_path / "d", Views(LIGHT, GRID), Truth(Z_MM, IDS, {1: "ball"}), z_mm=500)
     out = tmp_path / "out"
     assert run("run", tmp_path / "d", "-o", out) == 0
     assert "sections and depth only" in capsys.readouterr().out
