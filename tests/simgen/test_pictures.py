@@ -9,7 +9,9 @@ import pytest
 from PIL import Image
 from tiny import TINY_RECIPE
 
+import simgen
 from pcii.base import command_line
+from pcii.base.errors import InputError
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
@@ -120,16 +122,15 @@ def test_pictures_are_refused_in_one_sentence(
 
 
 @pytest.mark.renders
-def test_a_folder_that_may_not_be_written_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
+    simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
+    assert_shows_something(tmp_path / "x.png")
     monkeypatch.setattr("simgen.figures.picture_parts.write_bytes_safely", refuse)
-    out = str(tmp_path / "x.png")
-    assert command_line.run(cli.app, ["preview", "two_objects", "-o", out, "--samples-per-pixel", "1"]) == 2
-    assert "cannot be written here (Permission denied)" in capsys.readouterr().err
+    with pytest.raises(InputError, match=r"x.png: cannot be written here \(Permission denied\)$"):
+        simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
 
 
 def test_the_part_of_interest_keeps_the_films_aspect() -> None:

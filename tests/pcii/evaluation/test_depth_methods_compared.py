@@ -84,26 +84,23 @@ def test_without_names_every_method_is_scored_on_all_that_it_takes(tmp_path: Pat
     assert chosen([nested], "depth", budgets=["20"]) == [("nested", NESTED, "depth:posterior")]
 
 
-def test_depth_means_the_default_under_its_own_name(tmp_path: Path) -> None:
-    both = saved(tmp_path / "both", (COUNTS, LIGHT))
-    evaluate([both.path], tmp_path / "out", methods=["depth", "depth:posterior"])
-    assert named(tmp_path / "out") == {(None, "depth:posterior"), (FULL_LIGHT, "depth:posterior")}
-    assert len(rows_of(tmp_path / "out")) == 2
-    (group,) = evaluate([both.path], tmp_path / "out", methods=["depth:posterior"])["groups"]
-    assert [row["photons_per_view"] is None for row in group["results"]] == [False, True]
-    assert depth_overview([group]).header == ("scene", "method", "by exposure", "full light")
-
-
-def test_full_light_is_a_budget_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_full_light_is_a_budget_by_name_and_depth_means_the_default(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     both, out = saved(tmp_path / "both", (COUNTS, LIGHT)), tmp_path / "out"
-    command = ["evaluate", str(both.path), "-o", str(out), "--method", "depth:variance-sweep"]
+    methods = ("depth", "depth:posterior", "depth:variance-sweep")
+    command = ["evaluate", str(both.path), "-o", str(out), *(f"--method={method}" for method in methods)]
     assert command_line.run(cli.app, [*command, "--budget", FULL_LIGHT]) == 0
-    assert named(out) == {(FULL_LIGHT, "depth:variance-sweep")}
+    assert named(out) == {(FULL_LIGHT, method) for method in methods[1:]}
     page = (out / "evaluation.html").read_text()
     assert "<td>full light</td>" in page
     assert page.count("data:image/png;base64,") == 2  # errors, and reliability
     assert command_line.run(cli.app, [*command, "--budget", "bright"]) == 2
     assert "budget: expected a number of photons or 'full-light', got 'bright'" in capsys.readouterr().err
+    (group,) = evaluate([both.path], out, methods=["depth"])["groups"]
+    assert [row["photons_per_view"] is None for row in group["results"]] == [False, True, True]
+    assert depth_overview([group]).header == ("scene", "method", "by exposure", "full light")
+    assert len(rows_of(out)) == 3
 
 
 def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(

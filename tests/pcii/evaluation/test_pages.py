@@ -26,7 +26,6 @@ from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.rows import claim_rows
 from pcii.evaluation.summary import summarise
-from pcii.evaluation.tables import Table
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import read_manifest, write_manifest
 from pcii.removal.methods import METHODS
@@ -183,16 +182,6 @@ def test_all_names_show_as_text_in_the_evaluation(pages: dict[str, str]) -> None
             # The heading, and by method in both overviews.
             assert texts.count(f"{shown} (scene={scene})") == 1 + 2 + 1
         assert f"IoU of {shown} is lower with 50 photons than with 20, by -0.400 (-0.400 to -0.400)." in texts
-
-
-@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
-def test_a_title_of_each_kind_stays_in_its_place(name: str) -> None:
-    group = {"label": name, "datasets": 1, "recipe": name, "plots": [], "tables": [], "losses": [name]}
-    made = Table("made", ("what", "value"), (("machine", name),))
-    content = {"notes": [name], "overviews": [], "groups": [group], "made": made}
-    read = Read(page("evaluation.html.j2", content).decode())
-    assert {tag for tag, _ in read.elements} <= ELEMENTS
-    assert read.texts.count(visible(name)) == 5  # the note, heading, recipe, sentence and machine
 
 
 def test_markdown_has_no_elements_links_or_torn_tables(pages: dict[str, str]) -> None:

@@ -61,16 +61,6 @@ def test_times_have_no_negative_interval() -> None:
     assert (mean_interval([1.0, 1.0, 1.0, 1.0, 100.0]).low or 0) < -30
 
 
-def test_times_that_are_alike_have_students_interval() -> None:
-    x = [1.00, 1.01, 1.02]
-    student, found = mean_interval(x), positive_mean_interval(x)
-    # They differ by the square of the relative half width, 0.025.
-    assert (found.low, found.high) == (
-        pytest.approx(student.low, abs=1e-3),
-        pytest.approx(student.high, abs=1e-3),
-    )
-
-
 def test_times_of_nothing_and_negative_ones() -> None:
     none = positive_mean_interval([0.0, 0.0])
     assert (none.mean, none.low, none.high) == (0.0, 0.0, 0.0)

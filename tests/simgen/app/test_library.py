@@ -81,11 +81,6 @@ def test_what_is_wrong_is_told_in_one_sentence() -> None:
         simgen.nothing_of_that_name  # noqa: B018
 
 
-def test_a_preview_is_written(tmp_path: Path) -> None:
-    simgen.preview("two_objects", tmp_path / "look.png", samples_per_pixel=1)
-    assert (tmp_path / "look.png").stat().st_size > 1000
-
-
 def test_help_shows_the_functions_and_importing_loads_no_renderer() -> None:
     text = pydoc.plain(pydoc.render_doc(simgen))
     for name in ("draw_photons", "generate", "load_recipe", "load_scene", "preview"):
