@@ -3,8 +3,8 @@
 command_options  Options that several commands take: folder of results, depths, a smaller photon budget.
 commands         The `pcii` command.
 import_commands  The command `pcii import`: images made by others become a dataset.
-import_source    What `pcii import` was told to read, read, and how to mend it if the views do not fit
-                 together.
+import_options   Options of `pcii import`: of views and their order, cameras, lens arrays, light, and the
+                 dataset.
 long_steps       The long steps of an analysis; what an earlier run did is kept if nothing that it follows
                  from has changed.
 pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2

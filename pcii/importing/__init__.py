@@ -13,6 +13,10 @@ grid_check      Whether views fit the cameras that were told: where they are sha
 hci_scenes      Scenes of the HCI 4D light field benchmark (Honauer et al. 2016): views, cameras and true
                 depth.
 image_folders   Elemental images from a folder of pictures, one file a view.
+import_advice   How an import is to be mended if its views do not fit the cameras that were told, in words of
+                options.
+import_requests What an import is asked for, and what is read of it: which kind of source it is, and what goes
+                with it.
 lens_arrays     Pictures of a lens array: one picture that holds the elemental images of all lenses side
                 by side.
 light_encoding  Linear radiance from the numbers of picture files: sRGB, a gamma, or linear already.
