@@ -134,6 +134,8 @@ class MajorantArrays:
     def owner_of(self, candidates: Candidates, z_mm: Any) -> Any:
         """The entry that each candidate's path, which hits something at depth `z_mm`, belongs to."""
         mi, dr, layers = self.setup.render_scene.mi, load_drjit(), self.majorant.layers
+        # As `DisparityLayers.layer_of`: what lies in the cameras' own plane is in the nearest layer.
+        z_mm = dr.maximum(z_mm, self.nearness_mm / (self.last_step + 1))
         nearness = dr.minimum(self.nearness_mm / z_mm, self.last_step)
         nearest = dr.gather(mi.Int32, self.layer_at, mi.UInt32(dr.round(nearness)))
         coarse_px, across = self.majorant.coarse_px, self.majorant.coarse_cols
