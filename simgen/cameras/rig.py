@@ -127,6 +127,11 @@ def as_rig(cameras: Cameras) -> Rig:
     return Rig(cameras, position_mm, np.tile(np.eye(3), (*across.shape, 1, 1)))
 
 
+def corners(grid: CameraGrid) -> list[tuple[int, int]]:
+    """The cameras (k, l) at the corners of a grid: four, or fewer of a single row or column."""
+    return [(k, l) for k in sorted({0, grid.rows - 1}) for l in sorted({0, grid.cols - 1})]
+
+
 def with_larger_pixels(grid: CameraGrid, scale: float, *, least_px: int) -> CameraGrid:
     """The same field of view on pixels `scale` times as large, at least `least_px` of them to a side."""
     return replace(

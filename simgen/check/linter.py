@@ -12,7 +12,7 @@ from simgen.check.many_draws import draw_findings
 from simgen.check.scene_facts import Facts, Finding
 from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
-from simgen.check.targets import load_target, target_sweep
+from simgen.check.targets import target_of, target_sweep
 from simgen.dataset.prepared import needs_of
 from simgen.spec.scene import Scene, is_drawn, load_scene
 from simgen.spec.sweeps import Sweep
@@ -41,7 +41,7 @@ def lint(
         scenes = {number: _draw(recipe.scene, near, number) for number in numbers}
         line = f"{recipe.title or recipe.scene}, draws {numbers[0]} to {numbers[-1]}: {seen_by}"
         return line, draw_findings(scenes, recipe.grid.camera_grid(), recipe.analysis.z_mm)
-    target = load_target(name_or_path, overrides, scene_number)
+    target = target_of(sweep, near, scene_number)
     line = f"{target.recipe.title or target.scene.title}: {seen_by}"
     return line, hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
 

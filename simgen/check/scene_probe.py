@@ -4,7 +4,7 @@ import itertools
 import shutil
 import time
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,13 @@ from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import as_rig, with_larger_pixels
+from simgen.cameras.rig import as_rig, corners, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
-from simgen.check.unseen import SAME_DEPTH, hidden_by, on_film, pixels_without_occluders
+from simgen.check.unseen import hidden_by, on_backdrop, on_film, pixels_without_occluders
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes, fits
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import plan
+from simgen.photons.counting_plan import Plan, plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
@@ -36,59 +36,48 @@ ALONE_PX, SCALAR_ALONE_PX = 256, 128
 SAMPLES = 4
 
 
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """A scene on a coarse film: its picture in the sensor's colours, and what is hit first.
+
+    `boxes` are the objects' bounding boxes by number; `alone` is a still coarser film, on which objects can
+    be looked at one by one, and `together` what all of them show there.
+    """
+
+    target: Prepared
+    render_scene: RenderScene
+    grid: CameraGrid
+    image: np.ndarray
+    centre: FirstHits
+    corners: dict[tuple[int, int], FirstHits]
+    boxes: dict[int, np.ndarray]
+    alone: CameraGrid
+    together: FirstHits
+
+
 def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
-    recipe, scene, kind = target.recipe, target.scene, backend.choose().kind
-    compiled = kind != "scalar"
-    render_scene = target.render_scene()
-    grid = recipe.grid.camera_grid()
-    made = None
-    needs = needs_of(recipe)
-    if recipe.products.counts:
-        capture = capture_of(recipe, target.seed)
-        made = plan(
-            capture,
-            Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth),
-            kind,
-            least_samples(recipe),
-            may_explore=fits(needs),
-        )
+    recipe, scene, compiled = target.recipe, target.scene, backend.choose().kind != "scalar"
+    render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
+    made = _plan_of(target, render_scene) if recipe.products.counts else None
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
+    alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
     image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, small)
-    rows, cols = {0, grid.rows - 1}, {0, grid.cols - 1}
     begun = time.perf_counter()
-    corners = {
-        (k, l): first_hits_of_view(render_scene, small, k, l) for k in sorted(rows) for l in sorted(cols)
-    }
-    hit_s = (time.perf_counter() - begun) / (len(corners) * centre.z_mm.size)
-    boxes = _boxes(render_scene)
-    alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
-    together = first_hits_at_centre(render_scene, alone)
-    hidden = _hidden_shares(render_scene, target, alone, boxes, together)
+    ends = {(k, l): first_hits_of_view(render_scene, small, k, l) for k, l in corners(grid)}
+    hit_s = (time.perf_counter() - begun) / (len(ends) * centre.z_mm.size)
+    boxes, together = _boxes(render_scene), first_hits_at_centre(render_scene, alone)
+    look = _Look(target, render_scene, small, image, centre, ends, boxes, alone, together)
     light = image.sum(axis=(0, 1))
-    objects = [
-        _object_facts(number, name, centre, corners, image, boxes.get(number), hidden, small)
-        for number, name in render_scene.names.items()
-    ]
     return Facts(
         grid=grid,
         sensor=recipe.sensor,
         photons=recipe.photons,
         render=recipe.render,
         analysis=recipe.analysis,
-        needs=needs,
-        objects=tuple(
-            replace(
-                thing,
-                stands_at_mm=scene.objects[number - 1].position_mm[2],
-                on_film=None if number not in boxes else on_film(boxes[number], grid),
-                hidden_by=()
-                if thing.z_mm.size
-                else hidden_by(render_scene, scene, target.folder, number, alone, together),
-            )
-            for number, thing in enumerate(objects, start=1)
-        ),
+        needs=needs_of(recipe),
+        objects=tuple(_object_facts(look, number, name) for number, name in render_scene.names.items()),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
         elsewhere={
@@ -100,7 +89,7 @@ def probe_scene(target: Prepared) -> Facts:
         compiled=compiled,
         memory_bytes=available_bytes(),
         disk_bytes=shutil.disk_usage(Path()).free,
-        corners=len(corners),
+        corners=len(ends),
         lamps_away=_lamps_away(scene, list(boxes.values())),
         level=scene.level,
         gain=render_scene.gain,
@@ -108,6 +97,14 @@ def probe_scene(target: Prepared) -> Facts:
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),
     )
+
+
+def _plan_of(target: Prepared, render_scene: RenderScene) -> Plan:
+    """How the counts would be made."""
+    recipe, capture = target.recipe, capture_of(target.recipe, target.seed)
+    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
+    kind, may_explore = backend.choose().kind, fits(needs_of(recipe))
+    return plan(capture, setup, kind, least_samples(recipe), may_explore=may_explore)
 
 
 def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:
@@ -130,30 +127,29 @@ def _picture(
     return image, spent / (SAMPLES * grid.height * grid.width)
 
 
-def _object_facts(
-    number: int,
-    name: str,
-    centre: FirstHits,
-    corners: dict[tuple[int, int], FirstHits],
-    image: np.ndarray,
-    box: np.ndarray | None,
-    hidden: dict[int, float],
-    grid: CameraGrid,
-) -> ObjectFacts:
-    here = centre.object_id == number
-    masks = [hits.object_id == number for hits in corners.values()]
-    full = [camera for camera, mask in zip(corners, masks, strict=True) if mask.all()]
+def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
+    target, box, here = look.target, look.boxes.get(number), look.centre.object_id == number
+    masks = {camera: hits.object_id == number for camera, hits in look.corners.items()}
+    full = [camera for camera, mask in masks.items() if mask.all()]
+    unseen_behind = (
+        ()
+        if here.any()
+        else hidden_by(look.render_scene, target.scene, target.folder, number, look.alone, look.together)
+    )
     return ObjectFacts(
         name=name,
-        z_mm=centre.z_mm[here].astype(np.float64),
+        z_mm=look.centre.z_mm[here].astype(np.float64),
         film_share=float(here.mean()),
-        light_share=_share(image[here].sum(axis=0), image.sum(axis=(0, 1))),
-        hidden_share=hidden.get(number, 0.0),
-        corners_seen=sum(bool(mask.any()) for mask in masks),
-        corners_cut=sum(_at_border(mask) for mask in masks),
+        light_share=_share(look.image[here].sum(axis=0), look.image.sum(axis=(0, 1))),
+        hidden_share=_hidden_share(look, number),
+        corners_seen=sum(bool(mask.any()) for mask in masks.values()),
+        corners_cut=sum(_at_border(mask) for mask in masks.values()),
         centre_cut=_at_border(here),
         body_z_mm=(0.0, 0.0) if box is None else (float(box[0, 2]), float(box[1, 2])),
-        encloses_camera=box is not None and any(_holds(box, grid, *camera) for camera in full),
+        stands_at_mm=target.scene.objects[number - 1].position_mm[2],
+        hidden_by=unseen_behind,
+        on_film=None if box is None else on_film(box, target.recipe.grid.camera_grid()),
+        encloses_camera=box is not None and any(_holds(box, look.grid, *camera) for camera in full),
     )
 
 
@@ -169,11 +165,7 @@ def _colour_share(light: np.ndarray, cfa: str | None) -> np.ndarray:
 
 def _elsewhere(scene: Scene, hits: FirstHits) -> dict[Elsewhere, np.ndarray]:
     """Masks (H, W) of what the centre sees that is no object."""
-    wall = np.inf if scene.backdrop is None else scene.backdrop.z_mm
-    other, hit = hits.object_id == 0, np.isfinite(hits.z_mm)
-    on_wall = np.zeros(hit.shape, dtype=bool)
-    if np.isfinite(wall):
-        on_wall[hit] = np.abs(hits.z_mm[hit] - wall) <= SAME_DEPTH * wall
+    other, hit, on_wall = hits.object_id == 0, np.isfinite(hits.z_mm), on_backdrop(scene, hits.z_mm)
     return {"backdrop": other & on_wall, "a lamp in view": other & hit & ~on_wall, "nothing": other & ~hit}
 
 
@@ -202,26 +194,21 @@ def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
     return bool(np.all((box[0] <= place) & (place <= box[1])))
 
 
-def _hidden_shares(
-    render_scene: RenderScene,
-    target: Prepared,
-    grid: CameraGrid,
-    boxes: dict[int, np.ndarray],
-    together: FirstHits,
-) -> dict[int, float]:
-    """Share of each object, seen alone from the virtual centre, that other objects stand before.
+def _hidden_share(look: _Look, number: int) -> float:
+    """Share of an object, seen alone from the virtual centre, that other objects stand before.
 
     Only objects whose boxes appear to overlap another's are looked at alone.
     """
-    owner, shares = together.object_id, dict[int, float]()
-    for number in render_scene.names:
-        others = [box for other, box in boxes.items() if other != number]
-        if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
-            continue
-        alone = pixels_without_occluders(render_scene, target.scene, target.folder, number, grid)
-        before = alone & (owner > 0) & (owner != number)
-        shares[number] = float(before.sum() / alone.sum()) if alone.any() else 0.0
-    return shares
+    boxes = look.boxes
+    others = [box for other, box in boxes.items() if other != number]
+    if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
+        return 0.0
+    alone = pixels_without_occluders(
+        look.render_scene, look.target.scene, look.target.folder, number, look.alone
+    )
+    owner = look.together.object_id
+    before = alone & (owner > 0) & (owner != number)
+    return float(before.sum() / alone.sum()) if alone.any() else 0.0
 
 
 def _overlap(one: np.ndarray, other: np.ndarray) -> bool:

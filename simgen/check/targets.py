@@ -28,7 +28,11 @@ def load_target(
     .toml at its end, the recipe. Of fields with several values the first is taken. Raises `InputError` for
     what is missing or not valid.
     """
-    sweep, near = target_sweep(name_or_path, overrides)
+    return target_of(*target_sweep(name_or_path, overrides), scene_number)
+
+
+def target_of(sweep: Sweep, near: Path | None, scene_number: int | None = None) -> Prepared:
+    """The recipe of a sweep's first values with its scene; see `load_target`."""
     recipe = sweep.recipe(0)
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})

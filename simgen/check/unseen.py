@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.cameras.rig import Camera, as_rig, centre_camera
+from simgen.cameras.rig import Camera, as_rig, centre_camera, corners
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.spec.lights import AreaLight, UniformLight
 from simgen.spec.materials import Material
@@ -54,14 +54,19 @@ def hidden_by(
     z_mm, owner = centre.z_mm[row, col].astype(np.float64), centre.object_id[row, col]
     point = centre_camera(grid).towards(row, col) * z_mm[:, None]
     found = Counter(render_scene.names[number] for number in owner[owner > 0].tolist())
-    other = owner == 0
-    on_wall = np.zeros(other.shape, dtype=bool)
-    if scene.backdrop is not None:
-        on_wall = np.abs(z_mm - scene.backdrop.z_mm) <= SAME_DEPTH * scene.backdrop.z_mm
+    other, on_wall = owner == 0, on_backdrop(scene, z_mm)
     found["the backdrop"] = int((other & on_wall).sum())
     found.update(_lamps_at(scene, point[other & ~on_wall]))
     least = max(1, LEAST_SHARE * row.size)
     return tuple(name for name, times in found.most_common() if times >= least)
+
+
+def on_backdrop(scene: Scene, z_mm: np.ndarray) -> np.ndarray:
+    """Which first hits at these depths, +inf for none, are so near the backdrop that they are on it; bool."""
+    if scene.backdrop is None:
+        return np.zeros(z_mm.shape, dtype=bool)
+    wall_mm = scene.backdrop.z_mm
+    return np.abs(z_mm - wall_mm) <= SAME_DEPTH * wall_mm
 
 
 def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
@@ -69,10 +74,10 @@ def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
     if box[0, 2] <= 0:
         return OnFilm((np.inf, np.inf), in_view=True)
     rig, centre = as_rig(grid), centre_camera(grid)
-    ends = [rig.camera(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
-    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
-    across, down = np.ptp(centre.film_px(corners), axis=0).tolist()
-    return OnFilm((across, down), any(_meets(corners, one) for one in (centre, *ends)))
+    ends = [rig.camera(k, l) for k, l in corners(grid)]
+    points = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+    across, down = np.ptp(centre.film_px(points), axis=0).tolist()
+    return OnFilm((across, down), any(_meets(points, one) for one in (centre, *ends)))
 
 
 def _seen(

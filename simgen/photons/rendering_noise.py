@@ -15,7 +15,7 @@ import numpy as np
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import with_larger_pixels
+from simgen.cameras.rig import corners, with_larger_pixels
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.truth.first_hits import first_hits_of_view
@@ -81,8 +81,8 @@ def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: in
 
 def first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
     """Up to `DEPTHS` depths in mm, of what a coarse look from the corner cameras finds; inf for nothing."""
-    small, ends = _coarse(grid), [(k, l) for k in {0, grid.rows - 1} for l in {0, grid.cols - 1}]
-    z_mm = np.concatenate([first_hits_of_view(render_scene, small, k, l).z_mm.ravel() for k, l in ends])
+    hits = [first_hits_of_view(render_scene, _coarse(grid), k, l) for k, l in corners(grid)]
+    z_mm = np.concatenate([of_view.z_mm.ravel() for of_view in hits])
     nearest = float(z_mm.min())
     if not nearest < math.inf:
         return (math.inf,)

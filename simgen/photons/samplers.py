@@ -8,6 +8,7 @@ from simgen.photons.candidates import CandidateSampler, Setup
 from simgen.photons.majorant import Majorant
 from simgen.photons.scalar_sampler import ScalarSampler
 from simgen.photons.wavefront_sampler import WavefrontSampler
+from simgen.renderer.backend import is_scalar
 from simgen.renderer.path_tracing import surrounding_radiance
 from simgen.renderer.wavelengths import light_of
 
@@ -16,17 +17,13 @@ def sampler_for(
     setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
 ) -> CandidateSampler:
     """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
-    if _is_scalar(setup):
+    if is_scalar(setup.render_scene.mi):
         return ScalarSampler(setup, majorant, groups)
     return WavefrontSampler(setup, majorant, groups, ambient)
 
 
 def surroundings(setup: Setup) -> np.ndarray:
     """What pixels see of what shines from all around (C,), where candidates are guessed at; else zeros."""
-    if _is_scalar(setup):
+    if is_scalar(setup.render_scene.mi):
         return np.zeros(setup.channels)
     return surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
-
-
-def _is_scalar(setup: Setup) -> bool:
-    return setup.render_scene.mi.variant().startswith("scalar")

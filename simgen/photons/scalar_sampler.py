@@ -15,14 +15,13 @@ from pcii.core.bayer import colour_cells
 from simgen.photons.candidates import Accepted, Setup, chances, even_film_points
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
-from simgen.renderer.backend import shape_numbers
+from simgen.renderer.intersection import objects_by_shape, rows_of
 from simgen.sensor.photon_table import PhotonTable
 
 PATHS = 4
 """Paths of a candidate, whose mean is compared with the bound: the less it varies, the more are kept."""
 GUESS = 1e-9
 """What majorants take for a guess: the same of every candidate, and less than any bound."""
-PART = 1 << 14
 
 
 @dataclass(frozen=True)
@@ -144,20 +143,14 @@ class ScalarSampler:
 
     def _inside(self, candidates: _Candidates) -> np.ndarray:
         """Numbers of those that fall on the film."""
-        H, W = self.setup.grid.height, self.setup.grid.width
-        return np.flatnonzero(
-            (candidates.row >= 0) & (candidates.row < H) & (candidates.col >= 0) & (candidates.col < W)
-        )
+        grid, row, col = self.setup.grid, candidates.row, candidates.col
+        return np.flatnonzero((row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width))
 
     def _first_hits(self, candidates: _Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
         render_scene, intersect = self.setup.render_scene, self.setup.render_scene.scene.ray_intersect
-        numbers = zip(render_scene.scene.shapes(), shape_numbers(render_scene.scene), strict=True)
-        ids = {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
-        object_id, z_mm = (
-            np.zeros(candidates.k.size, np.int16),
-            np.full(candidates.k.size, np.inf, np.float32),
-        )
+        ids, size = objects_by_shape(render_scene), candidates.k.size
+        object_id, z_mm = np.zeros(size, np.int16), np.full(size, np.inf, np.float32)
         for number, ray in enumerate(self._traced(candidates)):
             hit = intersect(ray)
             if hit.is_valid():
@@ -190,11 +183,8 @@ class ScalarSampler:
         origins, directions = self.setup.rig.rays(
             candidates.k, candidates.l, candidates.row_px, candidates.col_px, lens_point
         )
-        columns = np.concatenate([origins, directions], axis=1)
-        # Python's numbers take several times the memory of NumPy's, so there are never many at once.
-        for part in np.split(columns, range(PART, len(columns), PART)):
-            for ray in part.tolist():
-                yield mi.RayDifferential3f(mi.Point3f(ray[:3]), mi.Vector3f(ray[3:]))
+        for ray in rows_of(np.concatenate([origins, directions], axis=1)):
+            yield mi.RayDifferential3f(mi.Point3f(ray[:3]), mi.Vector3f(ray[3:]))
 
     def _samples(self, candidates: _Candidates, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
         guess = np.full((candidates.k.size, self.setup.channels), GUESS)

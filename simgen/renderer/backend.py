@@ -144,6 +144,11 @@ def load_drjit() -> Any:
     return dr
 
 
+def is_scalar(mi: Any) -> bool:
+    """Whether rays are traced one by one, for want of a compiled backend."""
+    return mi.variant().startswith("scalar")
+
+
 def use_threads(count: int) -> None:
     """Let the compiled backend of this process run on so many threads."""
     load_drjit().set_thread_count(count)
@@ -186,7 +191,7 @@ def shape_numbers(scene: Any) -> list[int]:
     counting from scene to scene, so that the numbers follow no order. A miss is 0 in both.
     """
     mi = _mitsuba()
-    if mi.variant().startswith("scalar"):
+    if is_scalar(mi):
         return list(range(1, len(scene.shapes()) + 1))
     numbers: Any = load_drjit().reinterpret_array(mi.UInt32, scene.shapes_dr())
     return [int(number) for number in numbers]
@@ -269,12 +274,9 @@ def _key(kind: Kind, library: str) -> str:
         parts += [str(path.resolve()), str(state.st_size), str(state.st_mtime_ns)]
     if kind == "cuda":
         driver = Path("/proc/driver/nvidia/version")
-        parts += [driver.read_text() if driver.exists() else "", *_visible_devices()]
+        devices = os.environ.get("CUDA_VISIBLE_DEVICES", "all"), *map(str, Path("/dev").glob("nvidia*"))
+        parts += [driver.read_text() if driver.exists() else "", *devices]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
-
-
-def _visible_devices() -> list[str]:
-    return [os.environ.get("CUDA_VISIBLE_DEVICES", "all"), *map(str, Path("/dev").glob("nvidia*"))]
 
 
 def _cached(key: str, probe: Callable[[], tuple[bool, str]]) -> tuple[bool, str]:

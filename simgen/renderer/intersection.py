@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from simgen.renderer.backend import load_drjit, shape_numbers
+from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
 
@@ -19,12 +19,11 @@ def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: n
     """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
     mi, scene = render_scene.mi, render_scene.scene
     unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-    if _one_by_one(mi):
-        numbers = zip(scene.shapes(), shape_numbers(scene), strict=True)
-        ids = {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
+    if is_scalar(mi):
+        ids = objects_by_shape(render_scene)
         found = np.zeros(len(unit), dtype=np.int16)
         origin = mi.Point3f(*origin_mm)
-        for number, towards in enumerate(_rows(unit)):
+        for number, towards in enumerate(rows_of(unit)):
             hit = scene.ray_intersect(mi.RayDifferential3f(origin, mi.Vector3f(towards)))
             if hit.is_valid():
                 found[number] = ids[hit.shape.id()]
@@ -43,8 +42,8 @@ def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndar
     away = target_mm - origin_mm
     length = np.linalg.norm(away, axis=-1)
     unit, reach = away / length[:, None], length * (1 - SHY_OF_TARGET)
-    if _one_by_one(mi):
-        rows = _rows(np.column_stack([origin_mm, unit, reach]))
+    if is_scalar(mi):
+        rows = rows_of(np.column_stack([origin_mm, unit, reach]))
         rays = (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
         return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(unit))
     ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin_mm), _vectors(mi, mi.Vector3f, unit))
@@ -52,14 +51,17 @@ def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndar
     return np.array(scene.ray_test(ray))
 
 
-def _one_by_one(mi: Any) -> bool:
-    return mi.variant().startswith("scalar")
-
-
 def _vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:
     return kind(*(floats(mi, column) for column in rows.T))
 
 
-def _rows(array: np.ndarray) -> Iterator[list[float]]:
+def objects_by_shape(render_scene: RenderScene) -> dict[str, int]:
+    """The object that each shape belongs to, by the shape's own id; for scalar mode."""
+    numbers = zip(render_scene.scene.shapes(), shape_numbers(render_scene.scene), strict=True)
+    return {shape.id(): render_scene.object_of_shape[number] for shape, number in numbers}
+
+
+def rows_of(array: np.ndarray) -> Iterator[list[float]]:
+    """The rows of an array (N, C) as Python's numbers, never many at once; for scalar mode."""
     for start in range(0, len(array), PART):
         yield from array[start : start + PART].tolist()

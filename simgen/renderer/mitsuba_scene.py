@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
-from simgen.renderer.backend import load_drjit, shape_numbers
+from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape, pose_of
@@ -45,7 +45,7 @@ def build(
     `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
     `InputError` for a mesh or texture that cannot be used.
     """
-    if not mi.variant().startswith("scalar"):
+    if not is_scalar(mi):
         load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
     assets = read_assets(scene, folder)
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
@@ -85,7 +85,7 @@ def _numbers_as_data(mi: Any, loaded: Any) -> None:
 
     Scenes of the same kinds of things then share their kernels. Scalar mode compiles none.
     """
-    if mi.variant().startswith("scalar"):
+    if is_scalar(mi):
         return
     dr, parameters = load_drjit(), mi.traverse(loaded)
     for name in parameters.keys():  # noqa: SIM118 (it is no dict)

@@ -110,12 +110,15 @@ class Sweep:
         A scene that is not there is named too, before there is any folder.
         """
         first = self.values(0)
-        self._recipe_with(first)
+        scenes = [self._recipe_with(first).scene]
         for axis in self.axes:
             # Of a range the ends decide: what whole numbers may be is bounded from below and above.
             ends = isinstance(axis.values, range)
             for value in (axis.values[0], axis.values[-1]) if ends else axis.values:
-                find_scene(self._recipe_with(first | {axis.field: value}).scene, self.near)
+                scenes.append(self._recipe_with(first | {axis.field: value}).scene)
+        if self.axes:
+            for scene in dict.fromkeys(scenes):
+                find_scene(scene, self.near)
 
 
 def load_sweep(
