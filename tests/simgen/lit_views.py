@@ -1,14 +1,10 @@
 """Scenes in colours or in spectra: what one small camera sees of them, dense or photon by photon."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
@@ -116,17 +112,3 @@ def sky(folder: Path, pixels: np.ndarray, **light: Any) -> dict[str, Any]:
     """An environment light of these pixels (H, W, 3)."""
     write_exr_safely(folder / SKY, pixels.astype(np.float32))
     return {"type": "environment", "file": SKY, "luminance_cd_m2": 1.0, **light}
-
-
-def in_scalar_mode(*tests: str) -> None:
-    """Run tests, as pytest names them, once more in scalar mode, where they must pass too."""
-    if SCALAR:
-        pytest.skip("this is scalar mode")
-    run = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests],
-        env=os.environ | {"SIMGEN_BACKEND": "scalar"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert run.returncode == 0, run.stdout[-3000:]

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, thinned, white
+from lit_views import SCALAR, card, film, made, seen, thinned, white
 
 from pcii.core.bayer import colour_index
 from simgen.renderer import backend
@@ -56,12 +56,12 @@ def matt(reflectance: Any) -> dict[str, Any]:
 @pytest.mark.parametrize("reflectance", [[1, 1, 1], TELLS_NOTHING], ids=["sRGB", "spectrum"])
 def test_what_absorbs_nothing_is_as_bright_as_its_surroundings(reflectance: Any, spectral: bool) -> None:
     built = made(things(matt(reflectance)), [EVERYWHERE], spectral=spectral, max_depth=DEPTH)
-    view = seen(built, GRID, 1536 if SCALAR else 4096)
-    # A path varies by 0.3, so that the mean of a million and a half is known to 2e-4.
-    np.testing.assert_allclose(view.mean(axis=(0, 1)), 1, atol=5e-4)
+    view = seen(built, GRID, 512)
+    # A path varies by 0.3, so that the mean of half a million is known to 4e-4.
+    np.testing.assert_allclose(view.mean(axis=(0, 1)), 1, atol=1e-3)
     # Each corner of the view has one thing in it, or the card alone.
     quarters = view.reshape(2, 16, 2, 16, 3).mean(axis=(1, 3))
-    np.testing.assert_allclose(quarters, 1, atol=2 * 5e-4)
+    np.testing.assert_allclose(quarters, 1, atol=2 * 1e-3)
 
 
 @both_modes
@@ -112,7 +112,3 @@ def test_glass_in_the_furnace_cannot_be_seen(pane: bool, spectral: bool) -> None
     if not pane:  # the fault: paths that end within the glass bring nothing
         short = seen(made([glass], [EVERYWHERE], spectral=spectral), GRID, 64)
         assert (short.mean(axis=(0, 1)) < 0.9).all()
-
-
-def test_scalar_mode_passes_the_tests_of_this_file() -> None:
-    in_scalar_mode(__file__)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, in_scalar_mode, made, seen, sky, surprise, thinned
+from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, srgb_to_linear
@@ -141,8 +141,3 @@ def test_surroundings_that_shine_only_from_ahead_give_the_plane_nothing(tmp_path
     # Turned round they shine from behind the cameras.
     turned = sky(tmp_path, pixels, turn_deg=180.0)
     made([FLAT], [turned], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
-
-
-@pytest.mark.slow
-def test_scalar_mode_passes_the_tests_of_this_file() -> None:
-    in_scalar_mode(__file__)

@@ -4,11 +4,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import lit_views
 import numpy as np
 import pytest
 from lit_scenes import LAMP, ball
 
-from pcii.core.bayer import colour_index
+from pcii.core.bayer import colour_index, mosaic
 from simgen.dataset.prepared import capture_of
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
@@ -102,15 +103,14 @@ def integrated(camera: str, lamp: str) -> np.ndarray:
     )
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize("lamp", ["D65", "A"])
+@pytest.mark.parametrize(("camera", "lamp"), list(zip(CAMERAS, ("D65", "A"), strict=True)))
 def test_raw_channels_of_a_colour_chart_are_those_of_spectral_integration(camera: str, lamp: str) -> None:
     built, made = chart(lamp, camera)
-    grid, samples = made.grid.camera_grid(), 4096
+    grid, samples = made.grid.camera_grid(), 2048
     view = render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=5).astype(np.float64)
     found, expected = by_patch(view), integrated(camera, lamp)
-    # Ratios to the green of the white patch, so that exposure does not matter. 262 000 paths a patch
-    # leave 0.05 to 0.2 % of noise.
+    # Ratios to the green of the white patch, so that exposure does not matter. 131 000 paths a patch
+    # leave 0.07 to 0.3 % of noise.
     found, expected = found / found[18, 1], expected / expected[18, 1]
     np.testing.assert_allclose(found, expected, rtol=5e-3)
     # The fault: the other lamp's light.
@@ -150,7 +150,7 @@ def photon_time_s() -> float:
     return 1e-8 if backend.choose().kind == "scalar" else 3e-7
 
 
-@pytest.mark.parametrize("camera", [None, *CAMERAS])
+@pytest.mark.parametrize("camera", [None, CAMERAS[0]])
 def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     """At 500 lux: E rho / pi cd/m^2, pi / (4 N^2) of it on the sensor, times area, time and photons."""
     built, made = chart("D65", camera)
@@ -158,7 +158,7 @@ def test_a_grey_card_gives_the_photons_by_hand(camera: str | None) -> None:
     assert exposure is not None
     gain = capture_of(made, made.seed).photons_per_radiance
     assert gain is not None
-    view = render_view(built, grid, 0, 0, samples_per_pixel=1024, seed=6).astype(np.float64)
+    view = render_view(built, grid, 0, 0, samples_per_pixel=512, seed=6).astype(np.float64)
     seen = by_patch(view)[21] * gain  # neutral 5
     per_lux = np.pi / (4 * F_NUMBER**2) * (PIXEL_MM * 1e-3) ** 2 * exposure.time_s / np.pi
     np.testing.assert_allclose(seen, photons_of_grey(camera) * per_lux * LUX, rtol=5e-3)
@@ -190,32 +190,14 @@ def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> 
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.3}
     gold = ball("gold", 150.0, 700.0, (0, 0, 0))
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.3}}
-    values = {
-        "title": "test",
-        "objects": [plastic, gold],
-        "lights": [LAMP | {"illuminant": "A"}, {"type": "uniform", "luminance_cd_m2": 50.0}],
-        "backdrop": {"z_mm": 1500.0, "reflectance": "blue sky"},
-    }
-    made = recipe(CAMERAS[0], photons={"scope": "exposure"})
-    grid = made.grid.camera_grid()
-    mi = backend.load(spectral=True)
-    built = build(mi, Scene.model_validate(values), Path(), 3, sensitivities(made.sensor, Path()))
-    view = render_view(built, grid, 0, 0, samples_per_pixel=1024, seed=6).astype(np.float64)
-    scalar = backend.choose().kind == "scalar"
-    wanted = 2e4 if scalar else 2e5
-    colours = colour_index(grid.height, grid.width, made.cfa)
-    seen = np.take_along_axis(view, colours[..., None], axis=2)[..., 0]
-    gain = wanted / seen.sum()
-    setup = Setup(built, grid, made.cfa, 3)
-    photons, log = thin_photons(setup, made.photons, seed=3, photons_per_radiance=gain)
-    blocks = (photons.i // 6 * 12 + photons.j // 6) * 3 + colours[photons.i, photons.j]
-    rows, cols = np.indices(seen.shape)
-    number = ((rows // 6 * 12 + cols // 6) * 3 + colours).ravel()
-    found = np.bincount(blocks, minlength=288)
-    expected = gain * np.bincount(number, seen.ravel(), minlength=288)
-    score = (found - expected) / np.sqrt(expected)
-    assert abs((score**2).sum() - 288) < 5 * np.sqrt(2 * 288)
-    assert abs(score).max() < 5
+    lights = [LAMP | {"illuminant": "A"}, {"type": "uniform", "luminance_cd_m2": 50.0}]
+    wall = {"z_mm": 1500.0, "reflectance": "blue sky"}
+    built = lit_views.made([plastic, gold], lights, spectral=True, max_depth=3, backdrop=wall)
+    grid = recipe(CAMERAS[0]).grid.camera_grid()
+    view = lit_views.seen(built, grid, 1024, seed=6) * lit_views.white(built)
+    gain = (2e4 if lit_views.SCALAR else 2e5) / mosaic(view, "GRBG").sum()
+    photons, log = lit_views.thinned(built, grid, 3, gain, seed=3)
+    assert abs(lit_views.surprise(photons, view, grid, gain, block_px=6)) < 5
     assert log["overshoot_photons"] <= max(1e-4 * photons.k.size, 3)
 
 

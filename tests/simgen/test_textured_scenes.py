@@ -9,12 +9,11 @@ import pytest
 from pcii.base.errors import InputError
 from simgen.assets.texture_pixels import paint
 from simgen.base.strict_models import validate
-from simgen.dataset.generation import generate
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
-from simgen.spec.recipe import Grid, Recipe
-from simgen.spec.scene import Scene, load_scene
+from simgen.spec.recipe import Grid
+from simgen.spec.scene import Scene
 from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text
 
 
@@ -46,28 +45,6 @@ def test_a_camera_sees_a_cards_texture_as_it_was_painted() -> None:
     assert np.abs(seen - painted).mean() < 0.01
     assert np.abs(seen - painted[:, ::-1]).mean() > 0.05
     assert np.abs(seen - painted[::-1]).mean() > 0.05
-
-
-@pytest.mark.renders
-def test_a_dataset_of_a_painted_scene_is_finished_and_known_again(tmp_path: Path) -> None:
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    lines = (
-        'title = "t"\n[[lights]]\ntype = "uniform"\nluminance_cd_m2 = 1.0\n'
-        '[[objects]]\nname = "a"\nposition_mm = [0, 0, 500]\n'
-        'shape = { type = "card", width_mm = 60, height_mm = 60 }\n'
-        'material = { texture = { type = "noise", pixels = 32, seed = %d } }\n'
-    )
-    (folder / "scene.toml").write_text(lines % 1)
-    assert isinstance(load_scene(str(folder))[0].objects[0].material.texture, Noise)
-    grid = {"rows": 1, "cols": 2, "pixel_mm": 1.0, "height": 8, "width": 8}
-    values = {"scene": str(folder), "grid": grid, "photons": {"budget": 20}, "products": {"radiance": "none"}}
-    recipe = validate(Recipe, values, "r")
-    made = generate(recipe, tmp_path, tmp_path / "out")
-    assert generate(recipe, tmp_path, tmp_path / "out")["identity"] == made["identity"]
-    (folder / "scene.toml").write_text(lines % 2)
-    with pytest.raises(InputError, match="another recipe or scene"):
-        generate(recipe, tmp_path, tmp_path / "out")
 
 
 @pytest.mark.parametrize(

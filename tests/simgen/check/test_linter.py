@@ -368,8 +368,10 @@ def test_sizes_and_times_read_well() -> None:
     ]
 
 
-def probed(objects: list[dict[str, Any]], lights: list[dict[str, Any]], recipe: dict[str, Any]) -> Facts:
-    scene = Scene.model_validate({"title": "test", "objects": objects, "lights": lights})
+def probed(
+    objects: list[dict[str, Any]], lights: list[dict[str, Any]], recipe: dict[str, Any], **more: Any
+) -> Facts:
+    scene = Scene.model_validate({"title": "test", "objects": objects, "lights": lights} | more)
     return probe_scene(Prepared(Recipe.model_validate({"scene": "test"} | recipe), scene, Path(), None))
 
 
@@ -430,6 +432,10 @@ def test_the_probe_sees_the_share_of_light() -> None:
     # are counted by their centres, which is wrong by some per cent on so coarse a film.
     expected = white.film_share / (1 - black.film_share)
     np.testing.assert_allclose(white.light_share, expected, rtol=0.05)
+    walled = probed(objects, [SKY], {"grid": GRID}, backdrop={"z_mm": 900.0}).elsewhere
+    assert walled["backdrop"].min() > 0.005  # a dark wall, beside a white ball
+    assert not walled["nothing"].any()
+    assert not walled["a lamp in view"].any()
 
 
 @pytest.mark.renders

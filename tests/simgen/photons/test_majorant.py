@@ -75,42 +75,34 @@ def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) 
 
 
 @pytest.mark.parametrize("reach", [1, 3])
-def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, reach: int) -> None:
+@pytest.mark.parametrize("is_listed", [True, False])
+def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, is_listed: bool, reach: int) -> None:
+    lifted = majorant if is_listed else Majorant(GRID, majorant.layers, DIM)
     over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
     over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
-    majorant.lift(over, reach)
-    _, row, col = majorant.layers.layer_row_col(majorant.layers.tiles_of(over))
-    bright = np.flatnonzero(majorant.bound[:, 1] > 40)
-    apart = np.maximum(abs(majorant.row[bright] - row), abs(majorant.col[bright] - col))
+    lifted.lift(over, reach)
+    _, row, col = lifted.layers.layer_row_col(lifted.layers.tiles_of(over))
+    bright = np.flatnonzero(lifted.bound[:, 1] > 40)
+    apart = np.maximum(abs(lifted.row[bright] - row), abs(lifted.col[bright] - col))
     assert bright.size == (2 * reach + 1) ** 2
     assert apart.max() == reach
 
 
-def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(majorant: Majorant) -> None:
+@pytest.mark.parametrize("shear_px", [(0.0, 0.0), (9.5, -6.0)])
+def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(shear_px: tuple[float, float]) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.
-    layers = majorant.layers
+    sheared = replace(GRID, shear_px=shear_px)
+    layers = layers_for(sheared, tile_px_for(GRID, MOST_RAYS), np.array([300.0, 420.0, np.inf]))
+    assert layers.row_shift.min() == layers.col_shift.min() == 0
     k, l = (index.ravel() for index in np.indices((3, 4)))
-    row = 47.5 + 100 * (10.0 - (k - 1) * 5.0) / 300
-    col = 63.5 + 100 * (-20.0 - (l - 1.5) * 8.0) / 300
+    row = 47.5 + shear_px[1] * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 300
+    col = 63.5 + shear_px[0] * (l - 1.5) + 100 * (-20.0 - (l - 1.5) * 8.0) / 300
     layer = layers.layer_of(np.array([300.0]))[0]
     at_row = (row + layers.row_shift[layer, k]) / layers.tile_px
     at_col = (col + layers.col_shift[layer, l]) / layers.tile_px
     # Half a tile of blur by the layer's thickness, and shifts are even: half of 2 px more.
     assert np.ptp(at_row) <= 1 + 2 / layers.tile_px
     assert np.ptp(at_col) <= 1 + 2 / layers.tile_px
-
-
-def test_tiles_follow_a_sheared_grid_too() -> None:
-    sheared = replace(GRID, shear_px=(9.5, -6.0))
-    layers = layers_for(sheared, tile_px_for(GRID, MOST_RAYS), np.array([300.0, 420.0, np.inf]))
-    assert layers.row_shift.min() == layers.col_shift.min() == 0
-    k, l = (index.ravel() for index in np.indices((3, 4)))
-    layer = layers.layer_of(np.array([420.0]))[0]
-    row = 47.5 - 6.0 * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 420
-    col = 63.5 + 9.5 * (l - 1.5) + 100 * (-20.0 - (l - 1.5) * 8.0) / 420
-    # As without shear: half a tile of blur, and half of 2 px.
-    assert np.ptp((row + layers.row_shift[layer, k]) / layers.tile_px) <= 1 + 2 / layers.tile_px
-    assert np.ptp((col + layers.col_shift[layer, l]) / layers.tile_px) <= 1 + 2 / layers.tile_px
 
 
 def test_a_gap_in_a_surface_is_listed_with_the_bound_of_what_is_around_it() -> None:

@@ -16,7 +16,6 @@ from pcii.core.bayer import colour_index
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
-from pcii.io.verification import verify
 from simgen.dataset.prepared import capture_of, least_samples
 from simgen.photons import counting_plan as module
 from simgen.photons import photon_counting
@@ -31,7 +30,6 @@ from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene, load_scene
 
-COMPILED = backend.choose().kind != "scalar"
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 BUDGETS = (120, 40, 8)
 HEIGHT, WIDTH = 8, 10
@@ -131,19 +129,6 @@ def test_totals_of_nested_budgets_are_poisson(scope: str, draws: int) -> None:
 
 
 @pytest.mark.renders
-@pytest.mark.skipif(not COMPILED, reason="takes minutes, and the renderer has no part in it")
-def test_totals_of_thinned_nested_budgets_are_poisson(two_objects: RenderScene) -> None:
-    made = recipe(20, 30)  # 600 views, whose photons know nothing of each other
-    arrivals = thin(made, two_objects)
-    found = {budget: by_scope(counted(subset(arrivals, made, budget), made), "view") for budget in BUDGETS}
-    for budget in BUDGETS:
-        assert is_poisson(found[budget], budget)
-        assert not is_poisson(2 * found[budget], budget)
-    for budget, larger in ((40, 120), (8, 40)):
-        assert not is_poisson(np.rint(found[larger] * budget / larger), budget)  # the fault: always a part
-
-
-@pytest.mark.renders
 @pytest.mark.parametrize("scope", ["view", "channel", "scene"])
 @pytest.mark.parametrize("thins", [True, False])
 def test_multinomial_totals_of_nested_budgets_are_exact(
@@ -156,20 +141,17 @@ def test_multinomial_totals_of_nested_budgets_are_exact(
         assert totals.tolist() == [budget] * {"view": 4, "channel": 12, "scene": 1}[scope]
 
 
-@pytest.mark.renders
 @pytest.mark.parametrize("statistics", ["poisson", "multinomial"])
-@pytest.mark.parametrize("thins", [True, False])
-def test_each_budget_is_a_subset_of_the_next(two_objects: RenderScene, statistics: str, thins: bool) -> None:
+def test_each_budget_is_a_subset_of_the_next(statistics: str) -> None:
     made = recipe(photons=nested(statistics=statistics))
-    arrivals = thin(made, two_objects) if thins else dense(made)
+    arrivals = dense(made)
     belongs = [nested_subset(arrivals, arrivals, made.photons, budget, made.seed) for budget in (8, 40)]
     assert 0 < belongs[0].sum() < belongs[1].sum() < belongs[1].size
     assert (belongs[0] <= belongs[1]).all()
     larger = counted(arrivals.take(belongs[1]), made)
     # Budgets that are nearly the same: 100 times the smaller one might get more than the larger.
-    side = 4 if thins and not COMPILED else 10
-    near = recipe(side, side, photons={"budget": 120, "nested": [38, 40], "statistics": statistics})
-    many = thin(near, two_objects) if thins else dense(near)
+    near = recipe(10, 10, photons={"budget": 120, "nested": [38, 40], "statistics": statistics})
+    many = dense(near)
     less, more = (nested_subset(many, many, near.photons, budget, near.seed) for budget in (38, 40))
     assert (less <= more).all()
     independent = counted(subset(dense(recipe(seed=2)), made, 8), made)
@@ -206,15 +188,6 @@ def test_smaller_budgets_do_not_change_the_whole(statistics: str) -> None:
     one_by_one = dense(together)
     assert (one_by_one.n == 1).all()
     np.testing.assert_array_equal(counted(dense(alone), alone), counted(one_by_one, together))
-
-
-def test_counts_at_low_light_keep_their_mean() -> None:
-    # A thousandth of a photon per pixel in 2500 views of 80 pixels: 200 in all.
-    made = recipe(50, 50, photons={"budget": 1e-3 * HEIGHT * WIDTH})
-    flat = np.full((HEIGHT, WIDTH), 3.0)
-    counts = counted(draw_from_views(capture_of(made, made.seed), lambda *_: flat, PLAN, silent)[0], made)
-    assert abs(counts.mean() - 1e-3) < 4 * np.sqrt(1e-3 / counts.size)
-    assert abs(2 * counts.mean() - 1e-3) > 4 * np.sqrt(1e-3 / counts.size)  # the fault: doubled
 
 
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
@@ -350,7 +323,7 @@ def test_what_is_made_in_either_way_is_exact_at_every_budget(
     for scene in (two_objects, wall):
         for kind in ("llvm", "scalar"):
             assert planned(recipe(grid=PROBED, photons={"budget": 10}), scene, kind).thins
-            for budget in (1e3, 1e5, 1e7, 1e9):
+            for budget in (1e3, 1e7, 1e9):
                 made = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
                 assert made.thins or made.noise <= NOISE_SHARE
                 assert made.keeps_origins == (6 * budget <= module.MOST_SINGLE_PHOTONS)
@@ -375,7 +348,7 @@ def test_more_photons_than_can_be_exact_are_refused_with_how_many_can(
 def test_photons_that_are_too_many_to_be_kept_are_the_same_but_for_their_origins(
     two_objects: RenderScene,
 ) -> None:
-    made = recipe(photons={"budget": 2000})
+    made = recipe(photons={"budget": 500})
     kept, summed = thin(made, two_objects), thin(made, two_objects, replace(PLAN, keeps_origins=False))
     assert kept.object_id is not None
     assert summed.object_id is None
@@ -426,13 +399,6 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
         made.samples - 1
     )  # and one sample less would be too few for this or for the counts
     assert error * np.sqrt(share) > NORMALISER_ERROR or made.noise * share > NOISE_SHARE
-
-
-@pytest.mark.renders
-@pytest.mark.parametrize(("scope", "share"), [("view", 1.0), ("channel", 3.0), ("scene", 1 / 6)])
-def test_a_plan_expects_the_photons_of_its_scope(two_objects: RenderScene, scope: str, share: float) -> None:
-    made = planned(recipe(grid=PROBED, photons={"budget": 600, "scope": scope}), two_objects, "llvm")
-    assert made.photons_per_view == pytest.approx(600 * share, rel=1e-9)
 
 
 def exposed(built: RenderScene, photons_per_view: float, **changes: Any) -> Recipe:
@@ -499,16 +465,14 @@ def test_a_dataset_opens_at_each_of_its_budgets(nested_dataset: Path) -> None:
         expected = 6 * (budget + 0.01 * 64 * 60)
         assert abs(views.sum() - expected) < 5 * np.sqrt(expected)
     np.testing.assert_array_equal(whole, views_of(dataset))
-
-
-@pytest.mark.renders
-def test_from_one_budget_another_can_be_reached(nested_dataset: Path) -> None:
-    whole = open_dataset(nested_dataset)
-    small = whole.at_budget(30)
-    assert (whole.budget, small.budget) == (None, 30)
-    assert small.counts.total < whole.counts.total
-    assert small.at_budget(400).counts.total == whole.counts.total
-    assert small.at_budget(30).counts.total == small.counts.total
+    reached = dataset.at_budget(30)  # from which another can be
+    assert (dataset.budget, reached.budget) == (None, 30)
+    np.testing.assert_array_equal(views_of(reached.at_budget(400)), whole)
+    manifest = json.loads((nested_dataset / MANIFEST).read_text())
+    assert {"counts.zarr", "counts-30.zarr", "counts-120.zarr"} <= {
+        name.split("/")[0] for name in manifest["files"]
+    }
+    assert [entry["budget"] for entry in manifest["photons"]["nested"]] == [30, 120]
 
 
 @pytest.mark.renders
@@ -524,15 +488,6 @@ def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None
         assert abs(dark.sum() - 230.4) < 4 * np.sqrt(230.4)
         assert np.isinf(photons.z_mm[dark]).all()
         assert set(np.unique(photons.object_id)) == {-1, 0, 1, 2}
-
-
-@pytest.mark.renders
-def test_every_budget_is_listed_and_hashed(nested_dataset: Path) -> None:
-    manifest = json.loads((nested_dataset / MANIFEST).read_text())
-    parts = {name.split("/")[0] for name in manifest["files"]}
-    assert parts >= {"counts.zarr", "counts-30.zarr", "counts-120.zarr"}
-    assert [entry["budget"] for entry in manifest["photons"]["nested"]] == [30, 120]
-    assert verify(nested_dataset) == len(manifest["files"])
 
 
 @pytest.mark.renders

@@ -13,7 +13,7 @@ from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import as_rig
 from simgen.dataset.prepared import prepare
-from simgen.photons.candidates import Setup, even_film_points
+from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, plan
 from simgen.photons.exploration import Exploration, explore, pairs_allowed
 from simgen.photons.majorant import Majorant, fit
@@ -26,12 +26,13 @@ from simgen.renderer.radiance import render_view
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons, load_recipe
 from simgen.spec.scene import Scene
+from simgen.truth.first_hits import first_hits_of_view
 
 pytestmark = pytest.mark.renders
 COMPILED = backend.choose().kind != "scalar"
 # A photon takes 2 us with a compiled backend, 80 us without: fewer of them there, to see larger faults.
-DRAWS = 200 if COMPILED else 25
-MANY = 1_250_000 if COMPILED else 50_000
+DRAWS = 100 if COMPILED else 25
+MANY = 400_000 if COMPILED else 50_000
 COLOUR_BIAS = 0.01 if COMPILED else 0.05
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(20.0, 15.0), focal_mm=50.0, pixel_mm=2.0, height=32, width=32)
 
@@ -43,9 +44,9 @@ def scene() -> RenderScene:
 
 @pytest.fixture(scope="module")
 def radiance(scene: RenderScene) -> np.ndarray:
-    """Mosaics (V, H, W) from 4096 samples per pixel: good to about 1 % per pixel, 0.1 % per tile."""
+    """Mosaics (V, H, W) from 2048 samples per pixel: good to about 1.4 % per pixel, 0.14 % per tile."""
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=2048, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     return mosaic(np.stack(views).astype(np.float64), "GRBG")
@@ -166,8 +167,8 @@ def colour_p_value(found: np.ndarray, radiance: np.ndarray, bias: np.ndarray) ->
     """Of a chi-square test with two degrees of freedom of photons (3,) against biased colours."""
     share = np.array([rates_of(radiance, 1.0)[:, colour_of_pixel == c].sum() for c in range(3)]) * bias
     expected = found.sum() * share / share.sum()
-    # The reference is good to 0.02 % of a colour, which adds about half to the variance of 5 million.
-    square = ((found - expected) ** 2 / expected).sum() / (1 + 0.5 * MANY / 1_250_000)
+    # The reference is good to 0.03 % of a colour, which adds a third to the variance of 1.6 million.
+    square = ((found - expected) ** 2 / expected).sum() / (1 + MANY / 1_250_000)
     return float(stats.chi2.sf(square, 2))
 
 
@@ -183,14 +184,6 @@ def test_colours_are_true_to_a_percent(scene: RenderScene, radiance: np.ndarray)
     found = photons_by_colour(scene, 3)
     assert colour_p_value(found, radiance, UNBIASED) > 1e-3
     assert colour_p_value(found, radiance, biased(0)) < 1e-3
-
-
-@pytest.mark.slow
-def test_a_colour_off_by_a_percent_is_caught_twenty_times_of_twenty(
-    scene: RenderScene, radiance: np.ndarray
-) -> None:
-    for seed in range(20):
-        assert colour_p_value(photons_by_colour(scene, 50 + seed), radiance, biased(seed % 3)) < 1e-3
 
 
 def test_views_are_independent(scene: RenderScene, radiance: np.ndarray) -> None:
@@ -213,9 +206,9 @@ def test_totals_are_those_of_the_scope(scene: RenderScene, scope: str) -> None:
         ] * 4
     else:
         assert exact.sum() == 500
-    totals = [counted(draw(scene, seed, budget=500, scope=scope)).sum() for seed in range(12)]
+    totals = [counted(draw(scene, seed, budget=500, scope=scope)).sum() for seed in range(6)]
     expected = {"view": 2000, "channel": 6000, "scene": 500}[scope]
-    assert abs(np.mean(totals) - expected) < 4 * np.sqrt(expected / 12)
+    assert abs(np.mean(totals) - expected) < 4 * np.sqrt(expected / 6)
     assert np.std(totals) > 0
 
 
@@ -235,17 +228,27 @@ RAYS_ACROSS = 32
 """Rays through a pixel along each axis."""
 
 
+def seen_in_pixels(scene: RenderScene, drawn: PhotonTable) -> tuple[np.ndarray, np.ndarray]:
+    """Object id and planar depth (N, M) that rays evenly spread over each photon's pixel hit first."""
+    across = RAYS_ACROSS * 32
+    fine = replace(GRID, height=across, width=across, pixel_mm=GRID.pixel_mm / RAYS_ACROSS)
+    views = [first_hits_of_view(scene, fine, k, l) for k, l in np.ndindex(2, 2)]
+    cells = np.indices((RAYS_ACROSS, RAYS_ACROSS)).reshape(2, 1, -1)
+    view, i, j = (index[:, None] for index in (2 * drawn.k + drawn.l, drawn.i, drawn.j))
+    ray = view, RAYS_ACROSS * i + cells[0], RAYS_ACROSS * j + cells[1]
+    return np.stack([hits.object_id for hits in views])[ray], np.stack([hits.z_mm for hits in views])[ray]
+
+
 def test_each_photon_knows_what_it_came_from(scene: RenderScene) -> None:
-    drawn = draw(scene, 7, budget=4000)
+    drawn = draw(scene, 7, budget=1000)
     assert drawn.object_id is not None
     assert drawn.z_mm is not None
-    pixels, of_photon = np.unique(np.stack([drawn.k, drawn.l, drawn.i, drawn.j]), axis=1, return_inverse=True)
-    object_id, z_mm = seen_in_pixels(scene, pixels)
+    object_id, z_mm = seen_in_pixels(scene, drawn)
 
     def agrees(own_id: np.ndarray, own_z_mm: np.ndarray) -> np.ndarray:
-        same = object_id[of_photon] == own_id[:, None]
+        same = object_id == own_id[:, None]
         near, far = (
-            pick(np.where(same, z_mm[of_photon], beyond), axis=1)
+            pick(np.where(same, z_mm, beyond), axis=1)
             for pick, beyond in ((np.min, np.inf), (np.max, -np.inf))
         )
         # Rays are 0.75 mm apart at 600 mm: a ball's depth changes more only within 1 mm of its outline.
@@ -257,50 +260,17 @@ def test_each_photon_knows_what_it_came_from(scene: RenderScene) -> None:
     assert (~agrees(np.roll(drawn.object_id, 1), np.roll(drawn.z_mm, 1))).sum() > 50
 
 
-def seen_in_pixels(scene: RenderScene, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Object id and planar depth (N, M) that rays evenly spread over pixels (4, N) hit first.
-
-    From the contract's formulas, in double precision up to the ray itself.
-    """
-    k, l, i, j = (index[:, None] for index in pixels)
-    cells = np.indices((RAYS_ACROSS, RAYS_ACROSS)).reshape(2, 1, -1)
-    down, right = (cells + 0.5) / RAYS_ACROSS - 0.5
-    across = (j + right - 15.5) * GRID.pixel_mm / GRID.focal_mm
-    down = (i + down - 15.5) * GRID.pixel_mm / GRID.focal_mm
-    direction = np.stack([across, down, np.ones_like(down)]) / np.sqrt(1 + across**2 + down**2)
-    x_mm, y_mm = (l - 0.5) * GRID.pitch_mm[0], (k - 0.5) * GRID.pitch_mm[1]
-    origin = np.stack(np.broadcast_arrays(x_mm, y_mm, 0.0 * across)).copy()
-    origin[2] = 0
-    found = hit_by(scene, origin.reshape(3, -1), direction.reshape(3, -1))
-    return found[0].reshape(across.shape), found[1].reshape(across.shape)
-
-
-def hit_by(scene: RenderScene, origin: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Object id and planar depth (N,) that rays (3, N) hit first."""
-    mi = scene.mi
-    if COMPILED:
-        hit = scene.scene.ray_intersect(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)))
-        shapes = load_drjit().reinterpret_array(mi.UInt32, hit.shape)
-        return scene.object_of_shape[np.array(shapes)], np.array(hit.p.z)
-    hits = [
-        scene.scene.ray_intersect(mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*along)))
-        for start, along in zip(origin.T.tolist(), direction.T.tolist(), strict=True)
-    ]
-    found = [scene.scene.shapes().index(hit.shape) for hit in hits]
-    return scene.object_of_shape[np.array(found) + 1], np.array([hit.p.z for hit in hits])
-
-
 def test_highlights_of_glossy_things_are_as_bright_as_they_should_be() -> None:
     lamp = LAMP | {"width_mm": 20, "height_mm": 20, "luminance_cd_m2": 2e5}
     plastic, gold = ball("plastic", -130.0, 600.0, (0.8, 0.2, 0.1)), ball("gold", 150.0, 700.0, (0, 0, 0))
     plastic["material"]["finish"] = {"type": "plastic", "roughness": 0.1}
     gold["material"] = {"finish": {"type": "metal", "name": "Au", "roughness": 0.1}}
     scene = lit([plastic, gold], [lamp, EVENLY])
-    budget = 30_000 if COMPILED else 6000
+    budget = 15_000 if COMPILED else 6000
     drawn, log = draw_with_log(scene, 1, budget=budget)
     assert log["clump_pairs"] <= log["clump_pairs_allowed"]
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=8192, seed=3 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=3 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
     rates = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), budget)
@@ -348,14 +318,13 @@ def test_fine_stripes_of_pure_colours_keep_their_colours() -> None:
         for number in range(16)
     ]
     scene = lit(stripes)
-    draws = 3 if COMPILED else 1
-    counts = np.sum([counted(draw(scene, seed, budget=50_000)) for seed in range(draws)], axis=0)
+    counts = counted(draw(scene, 0, budget=50_000))
     # Stripes' edges vary most within pixels: with fewer samples the rates' own noise would show.
     views = [
-        render_view(scene, GRID, k, l, samples_per_pixel=16384, seed=7 + 2 * k + l)
+        render_view(scene, GRID, k, l, samples_per_pixel=4096, seed=7 + 2 * k + l)
         for k, l in np.ndindex(2, 2)
     ]
-    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), draws * 50_000)
+    expected = rates_of(mosaic(np.stack(views).astype(np.float64), "GRBG"), 50_000.0)
     for colour in range(3):
         found, own = (
             counts[:, colour_of_pixel == colour].ravel(),
@@ -380,7 +349,7 @@ def test_a_small_bright_lamp_in_the_picture_does_not_break_it() -> None:
         "luminance_cd_m2": 1e6,
     }
     scene = lit([ball("grey", -150.0, 600.0, (0.5, 0.5, 0.5))], [lamp])
-    drawn, log = draw_with_log(scene, 10, budget=30_000 if COMPILED else 4000)
+    drawn, log = draw_with_log(scene, 10, budget=10_000 if COMPILED else 4000)
     assert log["overshoot_photons"] <= max(1e-4 * log["kept"], 3)
     view = mosaic(render_view(scene, GRID, 0, 0, samples_per_pixel=4096, seed=1).astype(float), "GRBG")
     share = view / view.sum()
@@ -509,23 +478,6 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
         made = plan(capture, setup, backend.choose().kind)
         assert (made.thins, made.is_unbounded) == (is_bounded, not is_bounded)
         assert made.noise <= NOISE_SHARE
-
-
-@pytest.mark.parametrize(("size", "number"), [((32, 32), 4096), ((30, 50), 1000), ((1, 7), 3), ((5, 5), 1)])
-def test_points_of_a_pilot_are_spread_evenly_over_film_and_views(size: tuple[int, int], number: int) -> None:
-    grid = replace(GRID, height=size[0], width=size[1])
-    view, i, j = even_film_points(grid, number, np.random.default_rng(1))
-    assert 0.7 * number <= i.size <= 1.4 * number  # whole rows and columns of cells
-    assert i.min() >= 0
-    assert j.min() >= 0
-    assert i.max() < size[0]
-    assert j.max() < size[1]
-    per_view = np.bincount(view, minlength=4)
-    assert per_view.max() - per_view.min() <= 1
-    # One in each cell: no quarter of the film has more than its share, but for cells on the borders.
-    rows = max(1, round(np.sqrt(number * size[0] / size[1])))
-    in_rows = np.bincount((i * rows / size[0]).astype(int), minlength=rows)
-    assert in_rows.max() == in_rows.min()
 
 
 def test_photons_per_radiance_are_asked_for_with_an_exposure_and_no_budget(scene: RenderScene) -> None:

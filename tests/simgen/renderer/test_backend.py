@@ -114,11 +114,3 @@ def test_a_library_that_kills_its_process_does_not_kill_ours(monkeypatch: pytest
     works, detail = backend._probe("llvm", "/nowhere/libLLVM.so")
     assert not works
     assert "no such library" in detail
-
-
-@pytest.mark.parametrize(
-    ("name", "major"),
-    [("libLLVM-15.so.1", 15), ("libLLVM.so.19.1", 19), ("libLLVM-14.0.6.so.1", 14), ("libLLVM.so", None)],
-)
-def test_versions_are_read_from_file_names(name: str, major: int | None, tmp_path: Path) -> None:
-    assert backend._major_version(tmp_path / name) == major

@@ -249,14 +249,6 @@ def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
     assert bits == 32 or (wrong != expected).any()
 
 
-@pytest.mark.parametrize("bits", [1, 2, 4])
-def test_no_total_exceeds_the_counter_and_none_below_changes(bits: int) -> None:
-    arrivals = poisson(4.0, seed=bits)
-    counts = counted(saturate(arrivals, GRID, bits, seed=1))
-    assert counts.max() <= 2**bits - 1
-    np.testing.assert_array_equal(counts, np.minimum(counted(arrivals), 2**bits - 1))
-
-
 def test_a_counter_of_32_bits_stops_at_four_thousand_million() -> None:
     zero = np.zeros(1, dtype=np.int64)
     many = PhotonTable(zero, zero, zero, zero, np.array([1 << 33]))
@@ -375,8 +367,3 @@ def test_the_converter_tells_the_nearest_of_its_steps() -> None:
     np.testing.assert_allclose(steps.ravel(), np.rint(7 * share), atol=1e-5)  # single precision
     assert np.unique(np.rint(steps)).tolist() == list(range(8))
     assert (np.floor(7 * share) != np.rint(7 * share)).any()  # the fault: what lies below is told
-
-
-def test_one_bit_of_a_converter_is_black_or_white() -> None:
-    image = told(even(250.0), FullLight(adc_bits=1))  # half of the full well
-    assert set(np.unique(image)) == {0.0, 500.0}

@@ -142,6 +142,8 @@ def test_a_picture_is_upright_and_not_mirrored(shape: str, turn: Vector, tmp_pat
     assert lit[top, right].tolist() == [False, True, False]
     assert lit[bottom, left].tolist() == [False, False, True]
     assert lit[bottom, right].tolist() == [True, True, True]
+    if shape == "card":  # its uppermost row, where the bottom's blue must not leak in
+        assert image[10, 30:60, 2].max() < 0.02 * image.max()
 
 
 def test_a_picture_needs_texture_coordinates(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from property_settings import at_least
 from pydantic import ValidationError
 
 from pcii.base.srgb import srgb_to_linear
-from simgen.assets.pattern_areas import half_plane, square_wave
+from simgen.assets.pattern_areas import square_wave
 from simgen.assets.texture_pixels import paint
 from simgen.base.asset_names import MeshName
 from simgen.renderer.mitsuba_surfaces import aspect_of
@@ -29,20 +29,7 @@ def share_of_second(texture: Texture, aspect: float = 1.0) -> np.ndarray:
     return paint(type(texture).model_validate(told), aspect)[..., 0].astype(float)
 
 
-def line_by_brute_force(distance: np.ndarray, span_x: float, span_y: float, side: int = 400) -> np.ndarray:
-    inside = (np.arange(side) + 0.5) / side - 0.5
-    offsets = (inside[:, None] * span_x + inside * span_y).ravel()
-    return np.array([(one + offsets > 0).mean() for one in distance])
-
-
 # A 400 x 400 raster is off by at most one row of its points, 1 in 400.
-@pytest.mark.parametrize(("span_x", "span_y"), [(1.0, 0.0), (0.0, 2.0), (0.8, 0.6), (0.03, 1.0)])
-def test_the_share_beyond_a_line_is_that_of_many_points(span_x: float, span_y: float) -> None:
-    distance = np.linspace(-1.1, 1.1, 45)
-    exact = half_plane(distance, span_x, span_y)
-    np.testing.assert_allclose(exact, line_by_brute_force(distance, span_x, span_y), atol=1 / 400)
-    assert exact[0] == 0
-    assert exact[-1] == 1
 
 
 @pytest.mark.parametrize(("span_x", "span_y"), [(0.3, 0.0), (0.11, 0.07), (0.4, 1.9), (1e-3, 1e-12)])

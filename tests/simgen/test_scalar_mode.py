@@ -1,0 +1,42 @@
+"""The renderer without a compiled backend: light, photons and truth are what they are with one."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from lit_views import SCALAR
+
+HERE = Path(__file__).parent
+TESTS = {
+    "light": [
+        "test_lamps.py::test_a_points_light_falls_off_with_the_square_and_the_cosine",
+        "test_lamps.py::test_a_points_light_in_spectra_is_that_in_colours",
+    ],
+    "photons": [
+        "test_furnace.py::test_thinned_photons_see_nothing_in_the_furnace",
+        "test_lamps.py::test_photons_of_a_points_light_fall_off_likewise",
+    ],
+    "truth": [
+        "test_truth_passes.py::test_normals_are_the_surfaces_own_and_face_the_camera",
+        "test_truth_passes.py::test_coverage_is_the_area_that_the_object_has_of_the_pixel",
+        "test_truth_passes.py::test_visibility_is_what_a_loop_over_cameras_and_shapes_counts",
+    ],
+}
+"""Tests that are run once more."""
+
+
+@pytest.mark.renders
+@pytest.mark.skipif(SCALAR, reason="this is scalar mode")
+@pytest.mark.parametrize("what", TESTS)
+def test_scalar_mode_gives_the_same(what: str) -> None:
+    run = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *TESTS[what]],
+        cwd=HERE,
+        env=os.environ | {"SIMGEN_BACKEND": "scalar"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout[-3000:]
