@@ -28,6 +28,7 @@ ROOMS = {
         "removal.three_step",
         "removal.likelihood",
         "removal",
+        "baselines",
         "metrics",
         "evaluation",
         "app",

@@ -8,8 +8,8 @@ crew              Who does a job: this process, several of this machine, or a Da
 dask_cluster      A job's pieces as tasks of a Dask cluster, all of whose workers see the same file
                   system.
 errors            The exception that is raised for invalid input.
-extensions        What others add: entry points of installed packages, by name, and calls of functions of
-                  theirs.
+extensions        Methods by name: built-in ones and entry points of installed packages; calls of functions
+                  of theirs.
 jobs              Jobs of many pieces.
 plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
                   visible.

@@ -1,10 +1,10 @@
-"""What others add: entry points of installed packages, by name, and calls of functions of theirs."""
+"""Methods by name: built-in ones and entry points of installed packages; calls of functions of theirs."""
 
 import inspect
 import re
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import is_dataclass
+from dataclasses import dataclass, is_dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,55 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 NONE: Mapping[str, str] = MappingProxyType({})
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class MethodDoor:
+    """Where methods are asked for by name.
+
+    `group` is that of entry points by which other packages register theirs; `built_in` has functions, or
+    "module:function" of those that are loaded only when they are asked for. `checked` makes a method of a
+    function that may do anything, of the label with which errors begin, and of its name in the group or None.
+    """
+
+    group: str
+    built_in: Mapping[str, Function | str]
+    checked: Callable[[Function, str, str | None], Function]
+
+    def names(self, offered: Collection[str] | None = None) -> tuple[str, ...]:
+        """Built-in names, or those of them that are `offered`, then those of packages.
+
+        Raises `InputError` for a registered name that is already taken or no file name.
+        """
+        return (*(self.built_in if offered is None else offered), *registered(self.group, self.built_in))
+
+    def point_of(self, name: str) -> "EntryPoint | None":
+        """Where another package has a method; None for a built-in name and for one that nobody has."""
+        return None if name in self.built_in else registered(self.group, self.built_in).get(name)
+
+    def find(
+        self, method: str | Function, noun: str, offered: Mapping[str, Function | str] | None = None
+    ) -> Function:
+        """The method of this name, or a function, checked.
+
+        Raises `InputError`, which lists the known names, if there is no such `noun` among those `offered`.
+        """
+        if callable(method):
+            return self.checked(method, f"method: {name_of(method)!r}", None)
+        known = self.built_in if offered is None else offered
+        if isinstance(method, str) and method in known:
+            return self._loaded(known[method])
+        point = self.point_of(method) if isinstance(method, str) else None
+        if point is None:
+            raise InputError(f"method: no {noun} named {method!r}; use {', '.join(self.names(known))}")
+        label = f"method: {method!r} of {package_of(point)}"
+        return self.checked(load_function(point, label), label, method)
+
+    def _loaded(self, function: Function | str) -> Function:
+        from importlib.metadata import EntryPoint
+
+        return EntryPoint("", function, self.group).load() if isinstance(function, str) else function
 
 
 def registered(group: str, taken: Collection[str], own: Mapping[str, str] = NONE) -> dict[str, "EntryPoint"]:

@@ -4,15 +4,11 @@ chain_kernels    Compiled: posterior probabilities along chains of blocks, by pa
                  backward.
 depth_planes     Planes that a search of depth compares, and the depth between planes where a measure is
                  largest.
-epipolar_slopes  Depth from the slope of lines in epipolar images, by the structure tensor: a textbook
-                 estimator.
 focus_labels     Depth by focus evidence: a plane for each cell, with a cost of changes, and its posterior
                  probability.
 methods          Estimators of depth by name: a depth for each pixel of the virtual centre.
 network_inputs   What the network of depth is given: evidence, the posterior of a surface, brightness,
                  coverage.
-plane_sweeps     Textbook estimators of depth to compare others with: plane sweeps with windows of one
-                 size.
 posterior_depth  Depth from its posterior probability: evidence of texture, smooth surfaces, and a network
                  that corrects it.
 smooth_surface   The posterior probability of depth of a piecewise smooth surface.

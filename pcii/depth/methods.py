@@ -14,32 +14,30 @@ from collections.abc import Callable
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import called, load_function, name_of, package_of, registered
+from pcii.base.extensions import MethodDoor, called
 from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.focal_planes import check_data
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
-from pcii.depth.epipolar_slopes import structure_tensor
 from pcii.depth.focus_labels import focus_depth
-from pcii.depth.plane_sweeps import likelihood_sweep, variance_sweep
 from pcii.depth.posterior_depth import PosteriorDepth
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]
 
-FOR_COUNTS: dict[str, Method] = {
+FOR_COUNTS: dict[str, Method | str] = {
     "posterior": PosteriorDepth(),
     "focus": focus_depth,
-    "likelihood-sweep": likelihood_sweep,
-    "variance-sweep": variance_sweep,
+    "likelihood-sweep": "pcii.baselines.plane_sweeps:likelihood_sweep",
+    "variance-sweep": "pcii.baselines.plane_sweeps:variance_sweep",
 }
-FOR_VIEWS: dict[str, Method] = {
+FOR_VIEWS: dict[str, Method | str] = {
     "posterior": FOR_COUNTS["posterior"],
-    "variance-sweep": variance_sweep,
-    "structure-tensor": structure_tensor,
+    "variance-sweep": FOR_COUNTS["variance-sweep"],
+    "structure-tensor": "pcii.baselines.epipolar_slopes:structure_tensor",
 }
-"""The built-in methods by what they take."""
+"""The built-in methods by what they take; those to compare with are loaded when they are asked for."""
 DEFAULT_METHOD = "posterior"
 """Of photon counts and of radiance."""
 BUILT_IN = FOR_COUNTS | FOR_VIEWS
@@ -71,12 +69,7 @@ def estimate_depth(
     ((16, 16), True, 0.0)
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
-    if method is None:
-        method = DEFAULT_METHOD
-    if callable(method):
-        estimate = _checked(method, f"method: {name_of(method)!r}")
-    else:
-        estimate = find_depth_method(method, data)
+    estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
     return estimate(data, z_range_mm)
 
 
@@ -105,24 +98,16 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     >>> depth_methods()
     ('posterior', 'focus', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
     """
-    return (*_built_in(data), *registered(GROUP, BUILT_IN))
+    return DOOR.names(_built_in(data))
 
 
-def find_depth_method(name: str, data: PhotonCounts | Views) -> Method:
-    """The method of this name; `InputError` listing the known names if there is none for such data."""
-    known = _built_in(data)
-    if name in known:
-        return known[name]
-    others = {} if name in BUILT_IN else registered(GROUP, BUILT_IN)
-    if name not in others:
-        kind = "photon counts" if isinstance(data, PhotonCounts) else "radiance"
-        names = ", ".join(depth_methods(data))
-        raise InputError(f"method: no estimator of depth from {kind} is named {name!r}; use {names}")
-    label = f"method: {name!r} of {package_of(others[name])}"
-    return _checked(load_function(others[name], label), label)
+def find_depth_method(method: str | Method, data: PhotonCounts | Views) -> Method:
+    """The method of this name, or a function, checked; `InputError` listing the names for such data."""
+    kind = "photon counts" if isinstance(data, PhotonCounts) else "radiance"
+    return DOOR.find(method, f"estimator of depth from {kind}", _built_in(data))
 
 
-def _checked(estimate: Callable[..., object], label: str) -> Method:
+def _checked(estimate: Callable[..., object], label: str, name: str | None) -> Method:
     """The method of a function that may do anything: it raises `InputError`, which begins with `label`."""
 
     def method(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
@@ -140,7 +125,10 @@ def _checked(estimate: Callable[..., object], label: str) -> Method:
     return method
 
 
-def _built_in(data: PhotonCounts | Views | None) -> dict[str, Method]:
+def _built_in(data: PhotonCounts | Views | None) -> dict[str, Method | str]:
     if data is None:
         return BUILT_IN
     return FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS
+
+
+DOOR = MethodDoor(GROUP, BUILT_IN, _checked)

@@ -18,11 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pcii.base
-from pcii.base.extensions import registered
 from pcii.depth import methods as depth
 from pcii.evaluation.method_names import estimator_of
-from pcii.removal import plugins
-from pcii.removal.methods import METHODS
+from pcii.removal import methods as removal
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -91,10 +89,7 @@ def machine() -> str:
 def _entry_point(method: str) -> "EntryPoint | None":
     """Where another package has the method; None for a built-in one."""
     estimator = estimator_of(method)
-    if estimator is None:
-        return None if method in METHODS else registered(plugins.GROUP, METHODS).get(method)
-    known = depth.BUILT_IN
-    return None if estimator in known else registered(depth.GROUP, known).get(estimator)
+    return removal.DOOR.point_of(method) if estimator is None else depth.DOOR.point_of(estimator)
 
 
 @cache

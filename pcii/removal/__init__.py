@@ -1,10 +1,8 @@
-"""Removal of defocused points: methods by name, simple ones, and those of other packages.
+"""Removal of defocused points: methods by name, and those of other packages.
 
 likelihood/     Removal by likelihood: regions, duels of depths, opaque layers, outlines.
 methods         Removal methods by name: which points of each section are in focus.
 plugins         Removal methods registered by other packages: entry points of the group `pcii.methods`.
 posterior_masks Removal by the posterior probability of depth.
-simple_methods  Textbook methods of removal to compare others with: by brightness, by variance, by
-                sharpness.
 three_step/     The paper's removal in three steps: threshold, boundary, entropy (Eqs. 7-9).
 """

@@ -1,14 +1,12 @@
 """Removal methods by name: which points of each section are in focus."""
 
-from pcii.base.errors import InputError
-from pcii.base.extensions import name_of, registered
+from pcii.base.extensions import MethodDoor
 from pcii.core.estimates import Segmented
 from pcii.core.focal_planes import check_depth_counts
 from pcii.core.photon_counts import PhotonCounts
 from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import PosteriorMasks
-from pcii.removal.simple_methods import brightness, shape_from_focus, variance
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.reconstruction import reconstruct
 
@@ -41,10 +39,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     ((2, 64, 64), [True, False])
     """
     check_depth_counts(counts)
-    if callable(method):
-        remove = plugins.checked(method, f"method: {name_of(method)!r}")
-    else:
-        remove = find_method(method)
+    remove = find_method(method)
     return remove(counts, reconstruct(counts, z_mm))
 
 
@@ -56,28 +51,23 @@ def removal_methods() -> tuple[str, ...]:
     >>> removal_methods()[:2]
     ('three-step', 'likelihood')
     """
-    return (*METHODS, *registered(plugins.GROUP, METHODS))
+    return DOOR.names()
 
 
-def find_method(name: str) -> plugins.Method:
-    """The removal method of this name; `InputError` listing the known names if there is none."""
-    if not isinstance(name, str) or name not in METHODS:
-        others = registered(plugins.GROUP, METHODS)
-        if name not in others:
-            names = ", ".join((*METHODS, *others))
-            raise InputError(f"method: no removal named {name!r}; use {names}")
-        return plugins.load(others[name])
-    return METHODS[name]
+def find_method(method: str | plugins.Method) -> plugins.Method:
+    """The removal of this name, or a function, checked; `InputError` listing the known names."""
+    return DOOR.find(method, "removal")
 
 
-METHODS: dict[str, plugins.Method] = {
+METHODS: dict[str, plugins.Method | str] = {
     "three-step": ThreeStep(),
     "likelihood": remove_by_likelihood,
     "posterior": PosteriorMasks(),
-    "brightness": brightness,
-    "variance": variance,
-    "shape-from-focus": shape_from_focus,
+    "brightness": "pcii.baselines.simple_removals:brightness",
+    "variance": "pcii.baselines.simple_removals:variance",
+    "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",
 }
-"""The built-in methods."""
+"""The built-in methods; those to compare with are loaded when they are asked for."""
+DOOR = MethodDoor(plugins.GROUP, METHODS, plugins.checked)
 DEFAULT_METHODS = ("three-step", "likelihood")
 """The methods of `pcii run` without `--method`."""

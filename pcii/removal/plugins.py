@@ -11,27 +11,17 @@ Entry points are read, and the package imported, only when a method is requested
 """
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import called, load_function, package_of
+from pcii.base.extensions import called
 from pcii.core.estimates import Segmented
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 
-if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
-
 GROUP = "pcii.methods"
 Method = Callable[[PhotonCounts, Sections], Segmented]
-
-
-def load(point: "EntryPoint") -> Method:
-    """The method of an entry point, `checked`; raises `InputError` if it cannot be imported or called."""
-    label = f"method: {point.name!r} of {package_of(point)}"
-    return checked(load_function(point, label), label, point.name)
 
 
 def checked(remove: Callable[..., object], label: str, name: str | None = None) -> Method:

@@ -121,7 +121,7 @@ def test_the_default_follows_the_data() -> None:
 @pytest.mark.parametrize(
     ("method", "sentence"),
     [
-        ("structure-tensor", "no estimator of depth from photon counts is named 'structure-tensor'"),
+        ("structure-tensor", "no estimator of depth from photon counts named 'structure-tensor'"),
         ("nearest", "named 'nearest'; use posterior, focus, likelihood-sweep, variance-sweep$"),
     ],
 )

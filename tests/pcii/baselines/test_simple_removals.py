@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from twins import even_light, intersection_over_union, unit_grid
 
+from pcii.baselines.simple_removals import sum_modified_laplacian
 from pcii.core.photon_counts import PhotonCounts
 from pcii.removal.methods import segment
-from pcii.removal.simple_methods import sum_modified_laplacian
 
 OFFSETS = np.arange(7) - 3
 
@@ -38,8 +38,8 @@ def test_brightness_claims_nothing_of_an_even_dark():
 
 @pytest.mark.parametrize("method", ["brightness", "variance", "shape-from-focus"])
 @pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("count", [3, 255, 65535, 2**40])
-@pytest.mark.parametrize("size", [(1, 1), (1, 5), (3, 2), (40, 44)])
+@pytest.mark.parametrize("count", [3, 2**40])
+@pytest.mark.parametrize("size", [(1, 1), (40, 44)])
 def test_an_even_section_has_one_class_and_it_is_dark(method, cfa, count, size):
     # A saturated counter. Roundings of the root of a large count are too small a range for a histogram.
     grid = unit_grid(3, 3, *size)
