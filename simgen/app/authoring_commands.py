@@ -1,11 +1,11 @@
 """Commands that write files to start from: a scene, a recipe, one draw of a distribution of scenes."""
 
-from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from pcii.base.command_output import say, say_next
+from simgen.app.scene_commands import Out
 
 
 def new_scene(name: str, *, from_: Annotated[str | None, Parameter(name="--from")] = None) -> None:
@@ -51,12 +51,7 @@ def new_recipe(name: str, *, scene: str | None = None) -> None:
     say_next("simgen", "check", path)
 
 
-def draw(
-    target: str,
-    *,
-    scene: int,
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
-) -> None:
+def draw(target: str, *, scene: int, out: Out) -> None:
     """Write one draw of a distribution of scenes as a scene of its own, with the files that it names.
 
     Example of use:

@@ -10,7 +10,7 @@ from pcii.base.command_output import answer, answer_json, complain, results_fold
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, new_recipe, new_scene
-from simgen.app.scene_commands import Json, check, preview, recipes, scenes, schema
+from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
 
 app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
@@ -63,8 +63,8 @@ def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
 def generate(
     recipe: str,
     *,
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
-    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+    out: Out,
+    set: Overrides = (),
     seeds: int | None = None,
     scenes: int | None = None,
     crew: Annotated[Crew, Parameter(name="*")] = ALONE,
@@ -138,7 +138,7 @@ def _made(folder: Path, manifest: dict[str, Any]) -> str:
 
 
 @app.command
-def sheet(dataset: Path, *, out: Annotated[Path, Parameter(name=("--out", "-o"))]) -> None:
+def sheet(dataset: Path, *, out: Out) -> None:
     """Draw a contact sheet of a finished dataset: truth, photons of all views, full light, facts.
 
     Example of use:
@@ -164,7 +164,7 @@ def export(
     dataset: Path,
     *,
     format: Literal["hci", "saii", "events", "exr"],
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
+    out: Out,
     budget: float | None = None,
 ) -> None:
     """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.

@@ -9,6 +9,8 @@ from cyclopts import Parameter
 from pcii.base.command_output import answer, answer_json, say, say_next
 
 Json = Annotated[bool, Parameter(name="--json")]
+Out = Annotated[Path, Parameter(name=("--out", "-o"))]
+Overrides = Annotated[tuple[str, ...], Parameter(name="--set")]
 
 
 def scenes(*, json: Json = False) -> None:
@@ -84,7 +86,7 @@ def schema(what: Literal["scene", "recipe"]) -> None:
 def check(
     target: str,
     *,
-    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+    set: Overrides = (),
     scene: int | None = None,
     json: Json = False,
 ) -> int:
@@ -131,8 +133,8 @@ def check(
 def preview(
     target: str,
     *,
-    out: Annotated[Path, Parameter(name=("--out", "-o"))],
-    set: Annotated[tuple[str, ...], Parameter(name="--set")] = (),
+    out: Out,
+    set: Overrides = (),
     scene: int | None = None,
     samples_per_pixel: int = 32,
 ) -> None:
