@@ -165,7 +165,7 @@ def test_maps_of_another_size_are_refused() -> None:
         score(segmented(np.zeros((2, 24, 32), dtype=bool)), None, other)
 
 
-def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
+def photon_score(kept: list[bool] | None, kind: str = "pixel") -> tuple[float | None, float | None]:
     """Precision and recall of four events of 3, 1, 2 and 1 photons; the third sent one photon of each kind.
 
     They are in view (0, 0), which the section at 540 mm moves by floor(-4.5 x 13.15 + 1/2) = -59 px, so
@@ -192,7 +192,7 @@ def photon_score(kept: list[bool] | None) -> tuple[float | None, float | None]:
     focus = Segmented(masks, "by hand", reconstruct(counts, Z[:1]), photon_in_focus=said)
     rows = score(focus, None, true).planes
     assert all(row["iou"] is not None for row in rows)
-    row = next(row for row in rows if row["truth"] == "pixel")
+    row = next(row for row in rows if row["truth"] == kind)
     return row["photon_precision"], row["photon_recall"]
 
 
@@ -205,6 +205,8 @@ def test_what_is_said_of_events_goes_before_the_mask() -> None:
     assert photon_score([False, True, True, True]) == (1 / 3, 1 / 4)
     assert photon_score([True, False, True, False]) == (4 / 5, 1.0)
     assert photon_score([False] * 4) == (None, 0.0)
+    # Both objects belong to the only plane.
+    assert photon_score([True, False, True, False], "object") == (1.0, 5 / 6)
 
 
 def test_photons_of_other_events_are_refused() -> None:
