@@ -40,7 +40,7 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
     dataset = save_dataset(tmp_path / "d", images, truth, z_mm=[500, 700], **texts)
     outcome = single_run.run(dataset, tmp_path / "out", None, methods=["brightness"])
-    assert outcome.depth is not None
+    assert outcome.z_range_mm == (0.8 * 500, 1.25 * 700)
     page = (tmp_path / "out" / "report.html").read_text()
     assert all(
         text in page for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16])
