@@ -6,6 +6,7 @@ import zlib
 
 import numpy as np
 from PIL import Image
+from png_files import png_file
 
 
 def scene_toml(
@@ -48,18 +49,12 @@ def obj(*lines: str) -> bytes:
     return "\n".join(["v 0 0 0", "v 10 0 0", "v 0 10 0", "f 1 2 3", *lines, ""]).encode()
 
 
-def chunk(name: bytes, content: bytes) -> bytes:
-    """A chunk of a PNG file."""
-    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
-
-
 def png(
     *, width: int = 4, height: int = 4, bits: int = 8, kind: int = 2, extra: bytes = b"", data: bytes = b""
 ) -> bytes:
     """A PNG file with this header, whatever its pixels are."""
-    header = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, kind, 0, 0, 0))
     pixels = data or zlib.compress(bytes(height * (1 + width * 3)) if width * height < 1 << 20 else b"")
-    return b"\x89PNG\r\n\x1a\n" + header + extra + chunk(b"IDAT", pixels) + chunk(b"IEND", b"")
+    return png_file(width, height, bits, kind, pixels, extra)
 
 
 def picture(mode: str, form: str, **options: object) -> bytes:

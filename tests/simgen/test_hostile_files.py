@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from hostile_files import BOMB, animation, binary_ply, chunk, obj, picture, ply, png, scene_toml
+from hostile_files import BOMB, animation, binary_ply, obj, picture, ply, png, scene_toml
+from png_files import chunk
 
 from pcii.base.errors import InputError
 from simgen.assets import asset_files as assets

@@ -1,14 +1,12 @@
 """Folders of small pictures in any format, whose numbers say of which view they are."""
 
-import struct
-import zlib
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tifffile
 from PIL import Image
+from png_files import png16
 
 from pcii.importing.camera_order import Optics
 
@@ -45,24 +43,6 @@ def write_exr(path: Path, image: np.ndarray) -> None:
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with OpenEXR.File(header, planes) as file:
         file.write(str(path))
-
-
-def png16(image: np.ndarray) -> bytes:
-    """A PNG file of 16 bits by the specification, without a library that might share a fault."""
-    height, width, channels = image.shape
-    return png_file(width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], image.astype(">u2"))
-
-
-def png_file(width: int, height: int, bits: int, colour_type: int, rows: Iterable[np.ndarray]) -> bytes:
-    """A PNG file with this header and these rows."""
-    header = struct.pack(">IIBBBBB", width, height, bits, colour_type, 0, 0, 0)
-    pixels = zlib.compress(b"".join(b"\0" + row.tobytes() for row in rows))
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND")
-
-
-def chunk(name: bytes, content: bytes = b"") -> bytes:
-    check = zlib.crc32(name + content)
-    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", check)
 
 
 def make_folder(

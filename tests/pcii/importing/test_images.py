@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import OPTICS, H, W, make_folder, numbers, png_file, write
+from picture_folders import OPTICS, H, W, make_folder, numbers, write
 from PIL import Image
+from png_files import compressed, png_file
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
@@ -76,16 +77,9 @@ def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: 
 
 def test_png_of_few_bits_and_palettes_are_as_bright(tmp_path: Path) -> None:
     share = np.linspace(0, 1, H * W).reshape(H, W)
-    four = png_file(
-        W,
-        H,
-        4,
-        0,
-        [
-            np.packbits(np.unpackbits(row[:, None], axis=1)[:, 4:])
-            for row in np.rint(share * 15).astype(np.uint8)
-        ],
-    )
+    bits = np.unpackbits(np.rint(share * 15).astype(np.uint8)[..., None], axis=2)[..., 4:]
+    rows = np.packbits(bits.reshape(H, -1), axis=1)
+    four = png_file(W, H, 4, 0, compressed(rows))
     (tmp_path / "0_0.png").write_bytes(four)
     seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)[..., 0]
     np.testing.assert_allclose(seen, np.rint(share * 15) / 15, rtol=1e-6)

@@ -4,7 +4,6 @@
 import io
 import re
 import shutil
-import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Iterable
@@ -14,8 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
-from picture_folders import H, W, chunk, make_folder, numbers, write
+from picture_folders import H, W, make_folder, numbers, write
 from PIL import Image
+from png_files import chunk, png_file
 from rendered_cards import Card, render
 from test_other_sources import PARAMETERS, hci_folder, pfm
 
@@ -192,9 +192,7 @@ def picture(mode: str) -> Make:
 
 
 def png_of(width: int, height: int, bits: int = 8) -> bytes:
-    header = struct.pack(">IIBBBBB", width, height, bits, 2, 0, 0, 0)
-    pixels = zlib.compress(b"\0" * 1000)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", pixels) + chunk(b"IEND")
+    return png_file(width, height, bits, 2, zlib.compress(b"\0" * 1000))
 
 
 def content(name: str, data: bytes) -> Make:
