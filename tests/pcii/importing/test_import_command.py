@@ -105,10 +105,12 @@ def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) ->
         np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
 
 
-def test_pages_of_photon_counts_are_views(tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [[], ["--swap-axes"]])
+def test_pages_of_photon_counts_are_views(tmp_path: Path, options: list[str]) -> None:
     counts = np.random.default_rng(1).poisson(2, (2, 3, H, W)).astype(np.uint16)
-    tifffile.imwrite(tmp_path / "in.tif", counts.reshape(6, H, W), photometric="minisblack")
-    told = ["--counts", "--grid", 2, 3, *CAMERAS]
+    stored = counts.swapaxes(0, 1) if options else counts  # down the columns
+    tifffile.imwrite(tmp_path / "in.tif", stored.reshape(6, H, W), photometric="minisblack")
+    told = ["--counts", "--grid", 2, 3, *CAMERAS, *options]
     assert run("import", tmp_path / "in.tif", "-o", tmp_path / "out", *told) == 0
     seen = open_dataset(tmp_path / "out").counts
     np.testing.assert_array_equal([[seen.view(k, l) for l in range(3)] for k in range(2)], counts)
