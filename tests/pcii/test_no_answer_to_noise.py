@@ -54,8 +54,8 @@ def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, s
     return PhotonCounts.from_dense(film, grid, cfa=None)
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("rate", LIGHT)
+@pytest.mark.parametrize("size", SIZES[::2])
+@pytest.mark.parametrize("rate", LIGHT[::2])
 def test_even_light_is_not_answered(size, rate):
     draws = [noise(views, size, rate, cfa, 0) for views, cfa in zip(GRIDS, itertools.cycle(["GRBG", None]))]
     depth, claimed = np.mean([answered(counts) for counts in draws], axis=0)
@@ -64,15 +64,14 @@ def test_even_light_is_not_answered(size, rate):
 
 
 @pytest.mark.parametrize("everywhere", [False, True])
-@pytest.mark.parametrize("pixels", [1, 4])
-@pytest.mark.parametrize("rate", [0.0, 0.01, 1.0])
-def test_hot_pixels_are_not_answered(rate, pixels, everywhere):
+@pytest.mark.parametrize("rate", [0.0, 1.0])
+def test_hot_pixels_are_not_answered(rate, everywhere):
     for views in ((5, 5), (2, 1)):
-        counts = hot(views, rate, pixels, everywhere=everywhere, seed=0)
+        counts = hot(views, rate, 4, everywhere=everywhere, seed=0)
         assert max(answered(counts)) <= MOST_FALSE
 
 
-BUDGETS = [1e3, 1e5, 1e7, None]  # photons per view; None is full light
+BUDGETS = [1e3, 1e7, None]  # photons per view; None is full light
 
 
 def without_depth(kind: str, grid: CameraGrid) -> np.ndarray:
@@ -126,8 +125,8 @@ def test_hot_pixels_are_answered_as_seldom_as_is_said():
 
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("count", [3, 255, 65535, 2**40])
-@pytest.mark.parametrize("size", [(1, 1), (3, 2), (20, 24)])
+@pytest.mark.parametrize("count", [1, 2**40])
+@pytest.mark.parametrize("size", [(1, 1), (1, 9), (20, 24)])
 def test_saturated_counters_tell_nothing_and_can_be_scored(count, size, cfa):
     grid = grid_of((3, 3), size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa=cfa)

@@ -69,8 +69,9 @@ def test_what_is_no_number_is_refused_wherever_it_is(
     for pixel in ((0, 0, 0, 0), (1, 1, 3, 3), (0, 1, 2, 1)):
         light = np.ones((*GRID.shape_KLHW, 1), np.float32)
         light[pixel] = value
-        with pytest.raises(pcii.InputError, match=r"^radiance: view \(\d, \d\) holds NaN or infinity"):
-            pcii.reconstruct(pcii.Views(light, GRID), z_mm, **options)
+        for radiance in (light, Reader(light)):
+            with pytest.raises(pcii.InputError, match=r"^radiance: view \(\d, \d\) holds NaN or infinity"):
+                pcii.reconstruct(pcii.Views(radiance, GRID), z_mm, **options)
     with pytest.raises(pcii.InputError, match=r"^radiance: "):
         pcii.limit_photons(pcii.Views(light, GRID), 10, seed=0)
 

@@ -12,7 +12,7 @@ from pcii.core.arrays import LARGEST_COUNT
 from pcii.core.focal_planes import FocalPlanes
 from pcii.sections.photon_statistics import view_samples
 
-BUDGETS = [0, *(10**power for power in range(13))]
+BUDGETS = [0, 1, 10**3, 10**6, 10**12]
 
 
 def film_of(budget: int, shape: tuple[int, ...], seed: int = 0) -> np.ndarray:
@@ -44,7 +44,7 @@ def test_sums_of_any_budget_are_those_of_python_integers(budget: int, cfa: str |
         assert np.isfinite(sections.estimate).all()
 
 
-@pytest.mark.parametrize("budget", BUDGETS[:8])
+@pytest.mark.parametrize("budget", BUDGETS[:4])
 def test_variances_of_counts_are_exact(budget: int) -> None:
     grid = unit_grid(3, 2, 4, 4, (0.9, 1.6))
     film = film_of(budget, grid.shape_KLHW)
@@ -78,15 +78,6 @@ def test_a_pixel_holds_2_to_the_40_photons_however_they_come() -> None:
         pcii.PhotonCounts.from_events(zero, zero, zero, zero, np.array([LARGEST_COUNT, 1]), grid)
     with pytest.raises(pcii.InputError, match=r"^counts: more than 2\^40 photons in a pixel"):
         pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), LARGEST_COUNT + 1), grid)
-
-
-@pytest.mark.parametrize("number", [-1, 0.5, np.nan, np.inf, -np.inf, 1e300])
-def test_what_is_no_number_of_photons_is_refused(number: float) -> None:
-    grid = unit_grid(1, 1, 1, 1)
-    with pytest.raises(pcii.InputError, match=r"^counts: "):
-        pcii.PhotonCounts.from_dense(np.full((1, 1, 1, 1), number), grid)
-    with pytest.raises(pcii.InputError, match=r"^n: "):
-        pcii.PhotonCounts.from_events(*np.zeros((4, 1), int), np.array([number]), grid)
 
 
 @pytest.mark.parametrize("most", [-1, np.nan, -np.inf])

@@ -115,17 +115,6 @@ def test_radiance_gives_finite_sections_or_is_refused(light: np.ndarray, z_mm: f
 # Photons
 
 
-@given(grids, SEEDS)
-def test_all_photons_are_in_the_views(grid: pcii.CameraGrid, seed: int) -> None:
-    film = film_of(grid, seed)
-    counts = pcii.PhotonCounts.from_dense(film, grid)
-    events = counts.events
-    again = pcii.PhotonCounts.from_events(events.k, events.l, events.i, events.j, events.n, grid)
-    views = [again.view(k, l) for k, l in np.ndindex(grid.rows, grid.cols)]
-    np.testing.assert_array_equal(np.reshape(views, grid.shape_KLHW), film)
-    assert again.total == counts.total == int(film.sum())
-
-
 @given(SEEDS, st.floats(0, 1e6))
 def test_a_subsample_has_no_photon_that_was_not_there(seed: int, most: float) -> None:
     film = film_of(SMALL, seed)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rational_sections import samples_of
-from twins import Reader, even_light, unit_grid
+from twins import Reader, unit_grid
 
 import pcii
 
@@ -120,16 +120,3 @@ def test_single_and_double_precision_and_fractions_agree(cfa: str | None) -> Non
         exact = float(sum(samples))
         np.testing.assert_allclose(double.counts[0][where], exact, rtol=12 * 1.2e-16)
         np.testing.assert_allclose(single.counts[0][where], exact, rtol=6.1e-8)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.int32, np.uint16])
-def test_whole_numbers_give_the_same_sums_whatever_they_are_kept_as(dtype: type) -> None:
-    grid = unit_grid(3, 3, 6, 6, (1.2, 0.9))
-    counts = even_light(grid, 30.0, seed=4)
-    photons = pcii.reconstruct(counts, 1.0)
-    same = pcii.reconstruct(pcii.PhotonCounts.from_dense(counts.dense.astype(dtype), grid), 1.0)
-    np.testing.assert_array_equal(same.counts, photons.counts)
-    if dtype is np.uint16:
-        return  # as light refused: it may be sRGB
-    radiance = pcii.reconstruct(pcii.Views(counts.dense.astype(dtype)[..., None], grid), 1.0)
-    np.testing.assert_array_equal(radiance.counts, photons.counts)

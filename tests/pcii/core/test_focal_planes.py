@@ -128,12 +128,6 @@ def test_shifts_of_several_planes_are_those_of_each():
             np.testing.assert_array_equal(shifts[plane], alone)
 
 
-@pytest.mark.parametrize("bad", [0, -1.0, np.nan, np.inf, [], [540, 0], "near", [[1.0]]])
-def test_a_depth_that_is_none_is_refused(bad):
-    with pytest.raises(InputError, match="z_mm"):
-        FocalPlanes.at_depths(paper_grid(), bad)
-
-
 def test_a_plane_whose_shifts_no_integer_holds_is_refused():
     with pytest.raises(InputError, match="z_mm: 1e-09 mm is so near"):
         FocalPlanes.at_depths(paper_grid(), [540.0, 1e-9])

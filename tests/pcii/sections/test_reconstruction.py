@@ -12,7 +12,7 @@ from pcii.core.bayer import PATTERNS, mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.sections.reconstruction import reconstruct, reconstruct_each
+from pcii.sections.reconstruction import reconstruct
 
 patterns = st.sampled_from([*PATTERNS, None])
 # Depths whose disparity is exact, so that the twin's order of operations cannot matter.
@@ -49,18 +49,6 @@ def test_sections_are_eq_3_to_the_bit(grid, cfa, z, subpixel, seed):
     assert sections.counts.dtype.kind == "i"
     mean = [t / c if c else 0.0 for t, c in zip(total.ravel(), coverage.ravel(), strict=True)]
     np.testing.assert_array_equal(sections.estimate.ravel(), mean)
-
-
-@pytest.mark.parametrize("shape", [(1, 1, 1, 1), (1, 5, 4, 7), (5, 1, 7, 4), (3, 3, 5, 5), (2, 4, 6, 4)])
-@pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("subpixel", [1, 2, 3])
-def test_sections_are_eq_3_for_grids_of_every_kind(shape, cfa, subpixel):
-    grid = unit_grid(*shape, pitch_mm=(1.7, 0.6))
-    dense = random_counts(grid, seed=1)
-    sections = reconstruct(photons(dense, grid, cfa), [0.5, 1, 2], subpixel=subpixel)
-    total, coverage = section_twin(dense, grid, cfa, [0.5, 1, 2], subpixel)
-    np.testing.assert_array_equal(sections.counts, total)
-    np.testing.assert_array_equal(sections.coverage, coverage)
 
 
 @given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 3), seed=st.integers(0, 999))
@@ -109,29 +97,6 @@ def test_a_photon_goes_to_its_fine_voxel_by_hand():
 
 
 @given(
-    K=st.integers(1, 4),
-    L=st.integers(1, 4),
-    cfa=patterns,
-    z=st.floats(1.0, 50.0),
-    subpixel=st.integers(1, 3),
-    seed=st.integers(0, 999),
-)
-@at_least(100)
-def test_no_photon_is_lost_or_doubled_inside_the_frame(K, L, cfa, z, subpixel, seed):
-    grid = unit_grid(K, L, 16, 17, pitch_mm=(2.0, 3.0))
-    margin = 6  # the largest shift is 3/2 x 3 px at z = 1, and a rounding
-    dense = np.zeros(grid.shape_KLHW, dtype=int)
-    inner = (..., slice(margin, -margin), slice(margin, -margin))
-    dense[inner] = random_counts(grid, seed)[inner]
-    section = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel).counts[0]
-    assert section.sum() == dense.sum()
-    if cfa is not None:
-        for colour, cell in enumerate("RGB"):
-            sites = np.array([[cfa[2 * (i % 2) + j % 2] == cell for j in range(17)] for i in range(16)])
-            assert section[..., colour].sum() == dense[..., sites].sum()
-
-
-@given(
     pitch=st.tuples(st.integers(1, 64), st.integers(1, 64)),
     cfa=patterns,
     subpixel=st.sampled_from([2, 3, 5]),
@@ -146,26 +111,6 @@ def test_fine_voxels_of_a_pixel_add_up_to_its_coarse_voxel(pitch, cfa, subpixel,
     for name in ("counts", "coverage"):
         blocks = getattr(fine, name)[0].reshape(6, subpixel, 7, subpixel, -1)
         np.testing.assert_array_equal(blocks.sum(axis=(1, 3)), getattr(coarse, name)[0])
-
-
-@given(grid=grids, cfa=patterns, z=depths, seed=st.integers(0, 999))
-@at_least(50)
-def test_sections_of_a_sum_are_the_sum_of_sections(grid, cfa, z, seed):
-    a, b = random_counts(grid, seed), random_counts(grid, seed + 1)
-    parts = [reconstruct(photons(dense, grid, cfa), z).counts for dense in (a, b, a + 3 * b)]
-    np.testing.assert_array_equal(parts[0] + 3 * parts[1], parts[2])
-
-
-@given(grid=grids, cfa=patterns, z=depths, subpixel=st.integers(1, 2), seed=st.integers(0, 999))
-@at_least(50)
-def test_events_and_dense_counts_give_the_same_sections(grid, cfa, z, subpixel, seed):
-    dense = random_counts(grid, seed, rate=0.3)
-    k, l, i, j = np.nonzero(dense)
-    sparse = PhotonCounts.from_events(k, l, i, j, dense[k, l, i, j], grid, cfa=cfa)
-    from_events = reconstruct(sparse, z, subpixel=subpixel)
-    from_dense = reconstruct(photons(dense, grid, cfa), z, subpixel=subpixel)
-    np.testing.assert_array_equal(from_events.counts, from_dense.counts)
-    np.testing.assert_array_equal(from_events.coverage, from_dense.coverage)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.uint32, np.int64])
@@ -185,34 +130,7 @@ def test_a_voxel_is_divided_by_the_samples_that_reach_it():
     assert sections.coverage[0, 0, 0] == 2  # only cameras (0, 0) and (0, 1) reach the corner
 
 
-def test_a_streamed_stack_is_the_stack():
-    grid = unit_grid(3, 3, 8, 8)
-    counts = PhotonCounts.from_dense(random_counts(grid, 4), grid, cfa="GRBG")
-    z = [0.7, 1.0, 3.0]
-    whole, parts = reconstruct(counts, z), list(reconstruct_each(counts, z))
-    assert [float(part.z_mm[0]) for part in parts] == z
-    np.testing.assert_array_equal(np.concatenate([part.counts for part in parts]), whole.counts)
-    np.testing.assert_array_equal(np.concatenate([part.coverage for part in parts]), whole.coverage)
-
-
-def test_planes_do_not_influence_each_other():
-    grid = unit_grid(3, 3, 7, 7)
-    counts = photons(random_counts(grid, 5), grid, "BGGR")
-    together = reconstruct(counts, [2.0, 0.5, 2.0])
-    for plane, z in enumerate([2.0, 0.5, 2.0]):
-        alone = reconstruct(counts, z)
-        np.testing.assert_array_equal(together.counts[plane], alone.counts[0])
-        np.testing.assert_array_equal(together.coverage[plane], alone.coverage[0])
-
-
 # Defined answers at the edges
-
-
-@pytest.mark.parametrize("bad", [0, -540, float("nan"), float("inf"), [], [540, 0], None])
-def test_a_depth_that_cannot_be_is_refused(bad):
-    grid = unit_grid(1, 1, 2, 2)
-    with pytest.raises(InputError, match=r"^z_mm: "):
-        reconstruct(photons(np.zeros(grid.shape_KLHW, dtype=int), grid), bad)
 
 
 BAD_DIVISIONS: list[Any] = [0, -1, 1.0, True, None, "2"]
@@ -317,20 +235,6 @@ def test_a_plane_is_exact_in_a_sheared_grid(cfa, shear):
     straight = unit_grid(3, 5, 20, 21, pitch_mm=(3.0, 2.0))
     fault = reconstruct(Views(views.radiance, straight, cfa), 1.0)
     assert (fault.estimate[0] != pattern)[fault.coverage[0] > 1].mean() > 0.5
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-@pytest.mark.parametrize("cfa", ["GRBG", "BGGR", None])
-@pytest.mark.parametrize("subpixel", [1, 3])
-def test_a_mirrored_scene_gives_mirrored_sections(axis, cfa, subpixel):
-    # An odd size keeps the Bayer pattern under a mirror; 1.3 and 0.7 px put no sample on an edge of a
-    # voxel (an even division would: the middle camera's samples lie between two fine voxels).
-    grid = unit_grid(4, 3, 9, 11, pitch_mm=(1.3, 0.7))
-    dense = random_counts(grid, seed=8)
-    plain = reconstruct(photons(dense, grid, cfa), 1.0, subpixel=subpixel).counts
-    mirrored = np.flip(dense, axis=(axis, axis + 2))
-    flipped = reconstruct(photons(mirrored, grid, cfa), 1.0, subpixel=subpixel).counts
-    np.testing.assert_array_equal(np.flip(flipped, axis=axis + 1), plain)
 
 
 def test_the_estimate_is_the_rate_of_the_photons():
