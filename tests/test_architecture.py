@@ -15,6 +15,7 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
+        "store",
         "imaging",
         "pictures",
         "figures",
@@ -51,10 +52,10 @@ ROOMS = {
         "app",
     ],
 }
-# What simgen may share with pcii: image tools, types, masks, file formats and how commands behave. Not its
-# geometry or anything built on it, so that simulation and reconstruction cannot share a sign mistake. Figures
-# make pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "imaging", "pictures", "figures", "core", "io", "exporting"}
+# What simgen may share with pcii: the store of files, image tools, types, masks, file formats and how commands
+# behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
+# mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
+SHARED_ROOMS = {"base", "store", "imaging", "pictures", "figures", "core", "io", "exporting"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

@@ -20,8 +20,8 @@ from pcii.base import command_line
 from pcii.evaluation.rows import all_rows, key_of
 from pcii.io.dataset_layout import MANIFEST
 from pcii.io.results_list import read_results
-from pcii.io.sealed_json import hash_file
 from pcii.io.verification import verify
+from pcii.store.hashes import hash_file
 from simgen.app import commands as simgen_commands
 
 pytestmark = pytest.mark.renders

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 import pcii
-from pcii.base.safe_files import write_bytes_safely
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
@@ -23,6 +22,7 @@ from pcii.core.truth import Truth
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.io.dataset import Dataset
+from pcii.store.safe_files import write_bytes_safely
 
 LEAST_PHOTONS = 60.0
 NEAR, FAR = (0.75, 0.95), (1.05, 1.4)

@@ -124,8 +124,6 @@ def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False
     from pcii.metrics.scoring import score as compare
 
     data = opened(dataset, budget)
-    if not out.is_dir():
-        raise InputError(f"{out}: there is no such folder of results")
     results = Results(out, data)
     results.check()
     focus, depth_map = results.load_segmented(), results.load_depth()

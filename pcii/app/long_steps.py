@@ -4,8 +4,6 @@ A result follows from the dataset's files, the photon budget, the step with its 
 its method (see `pcii.evaluation.provenance`).
 """
 
-import hashlib
-import json
 import time
 from collections.abc import Callable, Collection
 from threading import Lock
@@ -16,6 +14,7 @@ from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.section_stack import Sections
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.provenance import software_of
+from pcii.store.hashes import hash_json
 
 DEPTH_STEP = "depth"
 Made = TypeVar("Made")
@@ -121,4 +120,4 @@ class KeptSteps(Steps):
         data = self._results.dataset
         seen = {name: data.manifest[name] for name in ("files", "grid", "cfa")}
         content = {"dataset": seen, "budget": data.budget, "software": software_of(method), **step}
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return hash_json(content)

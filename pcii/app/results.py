@@ -25,7 +25,15 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import (
+from pcii.core.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
+from pcii.core.estimates import DepthMap, Score, Segmented
+from pcii.core.section_stack import Sections
+from pcii.io.dataset import Dataset
+from pcii.io.results_list import FINISH, LOCK, RESULTS, RESULTS_FOLDER, read_results
+from pcii.io.zarr_groups import read_array, write_arrays
+from pcii.sections.reconstruction import reconstruct
+from pcii.store.file_list import list_files, lists_part
+from pcii.store.safe_files import (
     locked,
     named_in_errors,
     replace_folder,
@@ -34,18 +42,8 @@ from pcii.base.safe_files import (
     temporary_folder,
     write_json_safely,
 )
-from pcii.core.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.section_stack import Sections
-from pcii.io.dataset import Dataset
-from pcii.io.dataset_layout import lists_part
-from pcii.io.results_list import FINISH, RESULTS, read_results, write_results
-from pcii.io.sealed_json import list_files
-from pcii.io.zarr_groups import read_array, write_arrays
-from pcii.sections.reconstruction import reconstruct
 
 REMEDY = "make it again"
-LOCK = ".results.lock"
 DEPTH = "depth.zarr"
 SECTIONS = "sections.zarr"
 SCORE = "score.json"
@@ -81,16 +79,9 @@ class Results:
     def check(self) -> None:
         """Raise `InputError` unless the folder is new, empty, or has results of this dataset and budget."""
         out = self.path
-        if out.exists() and not out.is_dir():
-            raise InputError(f"{out}: this is a file; name a folder for the results")
         if out.resolve() == self.dataset.path.resolve():
             raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-        if not (out / RESULTS).exists():
-            if out.is_dir() and any(path.name != LOCK for path in out.iterdir()):
-                raise InputError(f"{out}: holds something else; name a new or empty folder")
-            return
-        held = read_results(out)
-        if {name: held[name] for name in self._origin} != self._origin:
+        if RESULTS_FOLDER.guard(out) and not self._origin.items() <= read_results(out).items():
             raise InputError(
                 f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
             )
@@ -118,7 +109,7 @@ class Results:
             new = temporary / name
             yield new
             held = read_results(self.path)
-            files, made, due = held["files"], held.get("made", {}), set(held.get("due", ()))
+            files, made, due = held["files"], held["made"], set(held["due"])
             remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
             made = {part: how for part, how in made.items() if part != name}
             listed = list_files(temporary, [name])
@@ -138,17 +129,17 @@ class Results:
     def begin(self, parts: Iterable[str]) -> None:
         """List parts as due before the first of them is made; each is until it is made."""
         held = read_results(self.path)
-        self._list(held["files"], held.get("made", {}), {*held.get("due", ()), *parts})
+        self._list(held["files"], held["made"], {*held["due"], *parts})
 
     def keep(self, name: str) -> None:
         """Say that the part that is there already is the one to be made."""
         held = read_results(self.path)
-        self._list(held["files"], held.get("made", {}), {*held.get("due", ())} - {name})
+        self._list(held["files"], held["made"], {*held["due"]} - {name})
 
     def _list(self, files: Mapping[str, Any], made: Mapping[str, Any], due: Collection[str]) -> None:
         """Write results.json, the same whatever order the files were made in."""
         in_order = {"files": dict(sorted(files.items())), "made": dict(sorted(made.items()))}
-        write_results(self.path, self._origin | in_order | ({"due": sorted(due)} if due else {}))
+        RESULTS_FOLDER.write(self.path, self._origin | in_order | ({"due": sorted(due)} if due else {}))
 
     def save_sections(self, sections: Sections) -> Path:
         """Write the counts and the coverage, whose quotient is the estimate."""
@@ -248,7 +239,7 @@ class Results:
         """How long it took to make a part, in s; None if it was not made by `key`, or is not there."""
         if not (self.path / RESULTS).is_file():
             return None
-        made = read_results(self.path).get("made", {}).get(name)
+        made = read_results(self.path)["made"].get(name)
         return made["seconds"] if made is not None and made["key"] == key else None
 
     def load_depth(self) -> DepthMap | None:
@@ -258,7 +249,7 @@ class Results:
     def _current_files(self) -> Mapping[str, Any]:
         """Listed files; raises `InputError` if masks or a depth map are older than an unfinished run."""
         held = read_results(self.path)
-        estimates = (part for part in held.get("due", ()) if SCORE in _made_from(part))
+        estimates = (part for part in held["due"] if SCORE in _made_from(part))
         older = [part for part in estimates if lists_part(held["files"], part)]
         if older:
             raise InputError(

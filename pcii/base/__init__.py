@@ -1,4 +1,4 @@
-"""Tools that know nothing of cameras: errors, progress, commands, safe files, compiled loops, sRGB.
+"""Tools that know nothing of cameras: errors, progress, commands, compiled loops, sRGB.
 
 command_line      Running of command lines: help, error messages of one sentence, exit codes, --quiet, and
                   Ctrl-C.
@@ -14,7 +14,6 @@ jobs              Jobs of many pieces.
 plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
                   visible.
 progress          Progress of long work, compilation included: bars on a terminal, plain lines in a log.
-safe_files        Atomic writing of files and folders: whatever has its final name is complete.
 short_form        Short representations of objects that hold large arrays: one line; in notebooks a table and
                   pictures.
 srgb              sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values,

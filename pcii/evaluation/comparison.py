@@ -12,7 +12,6 @@ from typing import Any
 from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.base.safe_files import named_in_errors
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -42,6 +41,7 @@ from pcii.metrics.bounds import object_bounds
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.safe_files import named_in_errors
 
 
 def evaluate(

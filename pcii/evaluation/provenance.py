@@ -21,6 +21,7 @@ import pcii.base
 from pcii.depth import methods as depth
 from pcii.evaluation.method_names import estimator_of
 from pcii.removal import methods as removal
+from pcii.store.hashes import hash_bytes, hash_file
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -136,13 +137,12 @@ def _hash_of(places: Iterable[Path]) -> str:
         for file in [place] if place.is_file() else sorted(place.rglob("*")):
             name = file.relative_to(place.parent)
             if file.is_file() and not any(part.startswith((".", "__pycache__")) for part in name.parts):
-                digest = hashlib.sha256(file.read_bytes()).hexdigest()
-                content.update(f"{name.as_posix()}\0{digest}\0".encode())
+                content.update(f"{name.as_posix()}\0{hash_file(file)}\0".encode())
     return content.hexdigest()[:16]
 
 
 def _digest(texts: Iterable[str]) -> str:
-    return hashlib.sha256("\0".join(texts).encode(errors="backslashreplace")).hexdigest()
+    return hash_bytes("\0".join(texts).encode(errors="backslashreplace"))
 
 
 def _processor() -> str:

@@ -2,10 +2,9 @@
 
 A row belongs to a dataset (by its identity), a photon budget or full light, and a method. What is measured
 again, since other software made it, is added below, and the last row counts. Each ends in a checksum of its
-line (see `pcii.io.sealed_json`).
+line (see `pcii.store.sealed_json`).
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import locked, named_in_errors
 from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
-from pcii.io.evaluation_layout import ROWS
-from pcii.io.sealed_json import check_seal, sealed
+from pcii.io.evaluation_layout import EVALUATION_FOLDER, ROWS
+from pcii.store.hashes import hash_json
+from pcii.store.safe_files import locked, named_in_errors
+from pcii.store.sealed_json import check_seal, sealed
 
 Row = dict[str, Any]
 Key = tuple[str, Budget, str, tuple[float, ...]]
@@ -48,7 +48,7 @@ def by_light(budget: Budget) -> tuple[int, float]:
 
 def identity_of(manifest: Mapping[str, Any]) -> str:
     """Identity of a dataset: that in its manifest, else a hash of its files' hashes."""
-    return manifest.get("identity") or _hash(manifest["files"])
+    return manifest.get("identity") or hash_json(manifest["files"])
 
 
 def recipe_of(manifest: Mapping[str, Any]) -> str:
@@ -56,11 +56,7 @@ def recipe_of(manifest: Mapping[str, Any]) -> str:
     recipe = {name: value for name, value in manifest.get("recipe", {}).items() if name != "seed"}
     if not recipe:
         return identity_of(manifest)[:16]
-    return _hash({"recipe": recipe, "scene": manifest.get("scene")})[:16]
-
-
-def _hash(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return hash_json({"recipe": recipe, "scene": manifest.get("scene")})[:16]
 
 
 def described(dataset: Dataset, z_mm: Sequence[float]) -> Row:
@@ -79,7 +75,10 @@ def described(dataset: Dataset, z_mm: Sequence[float]) -> Row:
     }
     if not z_mm:
         return row
-    apart = {"settings": settings | {"analysis.z_mm": [*z_mm]}, "recipe": _hash([row["recipe"], *z_mm])[:16]}
+    apart = {
+        "settings": settings | {"analysis.z_mm": [*z_mm]},
+        "recipe": hash_json([row["recipe"], *z_mm])[:16],
+    }
     return row | apart | {"z_mm": [*z_mm]}
 
 
@@ -99,10 +98,7 @@ def key_of(row: Mapping[str, Any]) -> Key:
 
 def claim_rows(out: Path) -> None:
     """Make `out` the folder of an evaluation; `InputError` if it holds something else."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the evaluation")
-    if out.is_dir() and any(out.iterdir()) and not (out / ROWS).is_file():
-        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    EVALUATION_FOLDER.guard(out)
     out.mkdir(parents=True, exist_ok=True)
     (out / ROWS).touch()
 

@@ -4,14 +4,12 @@ They depend on the data and the terms alone: no dates, nothing of the run. No ma
 other terms do not make another dataset; `simgen verify` compares them by the checksum in croissant.json.
 """
 
-import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
 from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.exporting.croissant_document import MANIFESTS, Description, ManifestField, croissant
 from pcii.exporting.dataset_card import (
@@ -32,7 +30,10 @@ from pcii.io.dataset_layout import (
     TRUTH,
     read_manifest,
 )
-from pcii.io.sealed_json import list_files, read_sealed, write_sealed
+from pcii.store.file_list import list_files
+from pcii.store.hashes import hash_bytes
+from pcii.store.safe_files import write_bytes_safely
+from pcii.store.sealed_json import read_sealed, write_sealed
 
 JSON, JSON_LINES, ZARR, EXR = (
     "application/json",
@@ -58,7 +59,7 @@ def write_card(root: Path, terms: Terms) -> None:
     """
     card, said = (_of_collection if is_collection(root) else _of_dataset)(root, terms)
     content = card.encode(errors="backslashreplace")
-    entry = {"bytes": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+    entry = {"bytes": len(content), "sha256": hash_bytes(content)}
     document = croissant(replace(said, files={CARD: entry, **said.files}), terms)
     if _is_written(root, content, document):
         return
@@ -104,7 +105,7 @@ def _of_collection(root: Path, terms: Terms) -> tuple[str, Description]:
     said = Description(
         title=title,
         text=collection_summary(rows),
-        identity=hashlib.sha256(identities.encode()).hexdigest(),
+        identity=hash_bytes(identities.encode()),
         files=list_files(root, [COLLECTION]),
         file_sets={
             MANIFESTS: (f"*/{MANIFEST}", JSON),

@@ -6,7 +6,6 @@ from typing import Literal, get_args
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.base.safe_files import named_in_errors, new_folder_safely
 from pcii.exporting.event_archive import write_events
 from pcii.exporting.exr_parts import write_exr_parts
 from pcii.exporting.hci_layout import write_hci
@@ -14,6 +13,8 @@ from pcii.exporting.sub_aperture_images import write_sub_aperture_images
 from pcii.io.collection import Collection, open_collection
 from pcii.io.collection_layout import is_collection
 from pcii.io.dataset import Dataset, open_dataset
+from pcii.store.folder_kind import check_free
+from pcii.store.safe_files import named_in_errors, new_folder_safely
 
 Format = Literal["hci", "saii", "events", "exr"]
 WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
@@ -47,7 +48,7 @@ def export_dataset(
     if isinstance(dataset, str | Path):
         dataset = open_collection(dataset) if is_collection(Path(dataset)) else open_dataset(dataset)
     folder = Path(out)
-    _check_free(folder, dataset.path)
+    _check_place(folder, dataset.path)
     folder.parent.mkdir(parents=True, exist_ok=True)
 
     def write(data: Dataset, place: Path) -> None:
@@ -67,11 +68,8 @@ def export_dataset(
     return folder
 
 
-def _check_free(folder: Path, source: Path) -> None:
+def _check_place(folder: Path, source: Path) -> None:
     """Raise `InputError` unless the folder is new or empty, and no part of the dataset or collection."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: this is a file; name a folder for the export")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder}: holds something else; name a new or empty folder")
+    check_free(folder, "export")
     if folder.resolve().is_relative_to(source.resolve()):
         raise InputError(f"{folder}: is in {source}, which lists all its files; name a folder elsewhere")

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import json_bytes
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.exporting.view_names import number_width
 from pcii.io.dataset import Dataset
 from pcii.pictures.written_pixels import write_png
+from pcii.store.safe_files import json_bytes
 
 CAMERA = "camera.json"
 MOST = {8: 255, 16: 65535}

@@ -21,8 +21,8 @@ from pcii.exporting.hci_layout import INFINITY_M
 from pcii.importing.camera_order import Optics
 from pcii.importing.image_folders import import_images
 from pcii.importing.light_encoding import Encoding
-from pcii.io.sealed_json import read_small
 from pcii.pictures.picture_files import decode, picture_of
+from pcii.store.sealed_json import read_small
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"

@@ -96,8 +96,6 @@ def open_collection(path: str | Path) -> Collection:
     Reads the index only. Raises `InputError` for a folder that is no collection, or whose index was changed.
     """
     root = Path(path)
-    if not root.is_dir():
-        raise InputError(f"{root}: there is no such folder")
     document, rows = read_collection(root), read_index(root)
     return Collection(root, tuple(document["fields"]), tuple(rows))
 

@@ -9,22 +9,28 @@ The index is written when the work on the collection ends or is interrupted. It 
 all the manifests, and the hash of each.
 """
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
 from pcii.io.dataset_layout import MANIFEST
-from pcii.io.sealed_json import hash_file, read_sealed, write_sealed
+from pcii.store.folder_kind import FolderKind
+from pcii.store.hashes import hash_bytes, hash_file
+from pcii.store.safe_files import write_bytes_safely
 
-FORMAT = "photon-integral-imaging collection"
-FORMAT_VERSION = 1
 COLLECTION = "collection.json"
 INDEX = "index.jsonl"
 REMEDY = "the same `simgen generate` command makes it again from the datasets"
+COLLECTION_FOLDER = FolderKind(
+    "collection",
+    COLLECTION,
+    version=1,
+    absent=f"not a collection (no {COLLECTION}); make one with `simgen generate`",
+    remedy=REMEDY,
+    marks=frozenset({COLLECTION}),
+)
 Split = Literal["train", "validation", "test"]
 
 
@@ -59,21 +65,12 @@ def index_row(
     }
 
 
-def write_collection(root: Path, document: Mapping[str, Any]) -> None:
-    """Write what the datasets of a collection have in common."""
-    write_sealed(root / COLLECTION, {"format": FORMAT, "format_version": FORMAT_VERSION, **document})
-
-
 def read_collection(root: Path) -> dict[str, Any]:
     """What the datasets of a collection have in common; `InputError` if that is missing or was changed."""
-    path = root / COLLECTION
-    if not path.is_file():
-        raise InputError(f"{root}: not a collection (no {COLLECTION}); make one with `simgen generate`")
-    document = read_sealed(path, REMEDY)
-    if document.get("format") != FORMAT or document.get("format_version") != FORMAT_VERSION:
-        raise InputError(
-            f"{path}: not of a {FORMAT} of version {FORMAT_VERSION}, which this release reads; {REMEDY}"
-        )
+    from pcii.io.manifest_schema import CollectionDocument, validate
+
+    document = COLLECTION_FOLDER.read(root)
+    validate(CollectionDocument, document, root / COLLECTION, REMEDY)
     return document
 
 
@@ -90,7 +87,7 @@ def index_bytes(rows: Iterable[Mapping[str, Any]]) -> bytes:
 
 def _seal(lines: bytes) -> bytes:
     """The last line of an index of these lines."""
-    return json.dumps({"sha256": hashlib.sha256(lines).hexdigest()}).encode() + b"\n"
+    return json.dumps({"sha256": hash_bytes(lines)}).encode() + b"\n"
 
 
 def read_index(root: Path) -> list[dict[str, Any]]:

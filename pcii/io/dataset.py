@@ -22,14 +22,13 @@ from pcii.io.dataset_layout import (
     RADIANCE,
     REMEDY,
     TRUTH,
-    lists_part,
     nested_name,
     radiance_name,
     read_manifest,
 )
-from pcii.io.sealed_json import check_file
 from pcii.io.stored_radiance import StoredRadiance
 from pcii.io.zarr_groups import read_array
+from pcii.store.file_list import check_file, check_files, lists_part
 
 FULL_LIGHT: Final = "full-light"
 """Stands for the photon budget where the radiance is looked at."""
@@ -247,6 +246,5 @@ def open_dataset(path: str | Path) -> Dataset:
     """
     root = Path(path)
     manifest = read_manifest(root)
-    for name, entry in manifest["files"].items():
-        check_file(root, name, entry, REMEDY, content=False)
+    check_files(root, manifest["files"], REMEDY, content=False)
     return Dataset(root, manifest, CameraGrid(**manifest["grid"]), manifest["cfa"])

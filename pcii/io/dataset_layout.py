@@ -1,7 +1,7 @@
 """The dataset folder on disk: its files, their arrays and its manifest.
 
     manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
-                             its own checksum (see `pcii.io.sealed_json`)
+                             its own checksum (see `pcii.store.sealed_json`)
     counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
     counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
     photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
@@ -13,18 +13,16 @@ unfinished, a file whose hash differs is damaged, and what is not listed is not 
 """
 
 import io
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
-from pcii.io.sealed_json import read_sealed, write_sealed
+from pcii.store.folder_kind import FolderKind
+from pcii.store.safe_files import write_bytes_safely
 
-FORMAT = "photon-integral-imaging dataset"
-FORMAT_VERSION = 2
 MANIFEST = "manifest.json"
 CARD, CROISSANT = "README.md", "croissant.json"
 """What people and search engines read of a dataset or collection. No manifest lists them, since they may be
@@ -36,6 +34,14 @@ TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"
 REMEDY = "generate the dataset again"
+DATASET_FOLDER = FolderKind(
+    "dataset",
+    MANIFEST,
+    version=2,
+    absent=f"not a finished dataset (no {MANIFEST}); make one with `simgen generate`",
+    remedy=REMEDY,
+    marks=frozenset({MANIFEST, MARKER}),
+)
 
 
 def radiance_name(k: int, l: int) -> str:
@@ -60,8 +66,8 @@ def nested_name(part: str, budget: float | None) -> str:
 
 
 def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
-    """Write the manifest of a dataset, with its checksum, which makes the dataset a finished one."""
-    write_sealed(root / MANIFEST, {"format": FORMAT, "format_version": FORMAT_VERSION, **manifest})
+    """Write the manifest of a dataset, which makes the dataset a finished one."""
+    DATASET_FOLDER.write(root, manifest)
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
@@ -83,26 +89,9 @@ def read_written_manifest(root: Path) -> dict[str, Any]:
     """
     from pcii.io.manifest_schema import DatasetManifest, validate
 
-    path = root / MANIFEST
-    if not root.is_dir():
-        raise InputError(f"{root}: there is no such dataset folder")
-    if not path.is_file():
-        raise InputError(f"{root}: not a finished dataset (no {MANIFEST}); make one with `simgen generate`")
-    manifest = read_sealed(path, REMEDY)
-    if manifest.get("format") != FORMAT:
-        raise InputError(f"{path}: not the manifest of a {FORMAT}")
-    if manifest.get("format_version") != FORMAT_VERSION:
-        raise InputError(
-            f"{path}: format version {manifest.get('format_version')!r} is not supported; "
-            f"this release reads version {FORMAT_VERSION}"
-        )
-    validate(DatasetManifest, manifest, path, REMEDY)
+    manifest = DATASET_FOLDER.read(root)
+    validate(DatasetManifest, manifest, root / MANIFEST, REMEDY)
     return manifest
-
-
-def lists_part(files: Iterable[str], part: str) -> bool:
-    """Whether any of the listed files is `part`, or lies in the folder of this name."""
-    return any(name == part or name.startswith(f"{part}/") for name in files)
 
 
 def write_exr_safely(path: Path, image: np.ndarray) -> None:

@@ -1,7 +1,5 @@
 """Datasets written from images and truth in memory: whole folders that `open_dataset` opens."""
 
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
@@ -11,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import named_in_errors, replace_folder, temporary_folder
 from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 from pcii.core.arrays import MOST_DEPTHS, check_z_mm
 from pcii.core.images import Views
@@ -20,8 +17,7 @@ from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import (
     COUNTS,
-    MANIFEST,
-    MARKER,
+    DATASET_FOLDER,
     PHOTON_TRUTH,
     RADIANCE,
     REMEDY,
@@ -31,8 +27,10 @@ from pcii.io.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.io.sealed_json import check_file, list_files
 from pcii.io.zarr_groups import DTYPES, write_arrays_safely
+from pcii.store.file_list import check_files, list_files
+from pcii.store.hashes import hash_json
+from pcii.store.safe_files import named_in_errors, replace_folder, temporary_folder
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
@@ -133,24 +131,22 @@ def held_dataset(out: Path, identity: str | None, *, content: bool = True) -> di
     Its files are compared by their hashes, without `content` by their sizes. Raises `InputError` for a file,
     a folder that holds anything else, a dataset of another `identity` (if that is given), or a damaged one.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the dataset")
-    if not out.is_dir() or not any(out.iterdir()):
+    if not DATASET_FOLDER.guard(out):
         return None
-    if not (out / MANIFEST).is_file() and not (out / MARKER).is_file():
-        raise InputError(f"{out}: holds something else; name a new or empty folder")
     manifest = read_manifest(out)
     if identity is not None and manifest.get("identity") != identity:
         found = "the dataset of other images, or of another recipe or scene"
         raise InputError(f"{out}: holds {found}; name a new or empty folder")
-    check_files(out, manifest, content=content)
+    check_held(out, manifest, content=content)
     return manifest
 
 
-def check_files(out: Path, manifest: Mapping[str, Any], *, content: bool) -> None:
-    """Raise `InputError` for a listed file that is missing or has another size, or, if `content`, hash."""
-    for name, entry in manifest["files"].items():
-        check_file(out, name, entry, f"{REMEDY}, after deleting {out}", content=content)
+def check_held(out: Path, manifest: Mapping[str, Any], *, content: bool) -> None:
+    """Raise `InputError` for a listed file that is missing or has another size, or, if `content`, hash.
+
+    The folder has to be deleted, since what is in it is kept as long as it is there.
+    """
+    check_files(out, manifest["files"], f"{REMEDY}, after deleting {out}", content=content)
 
 
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:
@@ -270,11 +266,7 @@ def _content(
         "objects": {} if truth is None else {str(key): name for key, name in truth.names.items()},
         "files": list_files(root, [COUNTS, TRUTH, PHOTON_TRUTH, RADIANCE]),
     }
-    return {"identity": _hash(content), **content}
-
-
-def _hash(content: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    return {"identity": hash_json(content), **content}
 
 
 def _versions() -> dict[str, str]:

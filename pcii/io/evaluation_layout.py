@@ -11,16 +11,22 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from pcii.base.errors import InputError
-from pcii.io.sealed_json import list_files, read_sealed, write_sealed
+from pcii.store.file_list import list_files
+from pcii.store.folder_kind import FolderKind
 
 ROWS = "rows.jsonl"
 EVALUATION = "evaluation.json"
-FORMAT = "photon-integral-imaging evaluation"
-FORMAT_VERSION = 1
 REMEDY = "repeat the `pcii evaluate` command, which writes it again or names rows that are damaged"
-LARGEST_EVALUATION_BYTES = 1 << 27
-"""Some kB for each scene, budget and method: enough for ten thousand drawn scenes."""
+EVALUATION_FOLDER = FolderKind(
+    "evaluation",
+    EVALUATION,
+    version=1,
+    absent="unfinished; the same `pcii evaluate` command goes on from here",
+    remedy=REMEDY,
+    marks=frozenset({ROWS}),
+    # Some kB for each scene, budget and method: enough for ten thousand drawn scenes.
+    largest_bytes=1 << 27,
+)
 
 
 def is_evaluation(path: Path) -> bool:
@@ -33,20 +39,13 @@ def seal_evaluation(out: Path, summary: Mapping[str, Any], pages: Sequence[str])
 
     No row may be added meanwhile.
     """
-    files = list_files(out, [ROWS, *pages])
-    document = {"format": FORMAT, "format_version": FORMAT_VERSION, **summary, "files": files}
-    write_sealed(out / EVALUATION, document)
+    EVALUATION_FOLDER.write(out, {**summary, "files": list_files(out, [ROWS, *pages])})
 
 
 def read_evaluation(out: Path) -> dict[str, Any]:
     """Content of evaluation.json; raises `InputError` if it is missing, not yet there or was changed."""
     from pcii.io.manifest_schema import FileList, validate
 
-    path = out / EVALUATION
-    if not path.is_file():
-        raise InputError(f"{out}: unfinished; the same `pcii evaluate` command goes on from here")
-    content = read_sealed(path, REMEDY, largest_bytes=LARGEST_EVALUATION_BYTES)
-    if content.get("format") != FORMAT or content.get("format_version") != FORMAT_VERSION:
-        raise InputError(f"{path}: not of a {FORMAT} of version {FORMAT_VERSION}; {REMEDY}")
-    validate(FileList, content, path, REMEDY)
+    content = EVALUATION_FOLDER.read(out)
+    validate(FileList, content, out / EVALUATION, REMEDY)
     return content

@@ -150,6 +150,14 @@ class DatasetManifest(_Model):
     files: dict[FileName, FileEntry]
 
 
+class CollectionDocument(_Model):
+    """What the datasets of a collection have in common."""
+
+    fields: list[str]
+    recipe: dict[str, Any] = {}
+    versions: dict[str, Text] = {}
+
+
 class FileList(_Model):
     """A list of the files of a folder."""
 

@@ -3,9 +3,9 @@
 import shutil
 from pathlib import Path
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import new_folder_safely
 from pcii.io.dataset import Dataset, open_dataset
+from pcii.store.folder_kind import check_free
+from pcii.store.safe_files import new_folder_safely
 
 SAMPLE = Path(__file__).resolve().parents[1] / "_shipped" / "sample"
 
@@ -27,8 +27,7 @@ def sample() -> Dataset:
 
 def copy_sample(out: Path) -> None:
     """Copy the sample dataset to the folder `out`; raises `InputError` unless that is new or empty."""
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise InputError(f"{out}: name a new or empty folder for the dataset")
+    check_free(out, "dataset")
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
         shutil.copytree(SAMPLE, new, dirs_exist_ok=True)

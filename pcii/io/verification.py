@@ -8,7 +8,6 @@ from pcii.base.command_output import answer_json, say
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, Stages, silent
-from pcii.io import dataset_layout, evaluation_layout
 from pcii.io.collection_layout import (
     COLLECTION,
     INDEX,
@@ -17,10 +16,12 @@ from pcii.io.collection_layout import (
     read_collection,
     read_index,
 )
-from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, MARKER, read_manifest
-from pcii.io.evaluation_layout import EVALUATION, is_evaluation, read_evaluation
-from pcii.io.results_list import FINISH, RESULTS, read_results
-from pcii.io.sealed_json import check_file, read_sealed, strays
+from pcii.io.dataset_layout import CARD, CROISSANT, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
+from pcii.io.evaluation_layout import EVALUATION_FOLDER, is_evaluation, read_evaluation
+from pcii.io.results_list import FINISH, RESULTS, RESULTS_FOLDER, read_results
+from pcii.store.file_list import check_file, strays
+from pcii.store.folder_kind import FolderKind
+from pcii.store.sealed_json import read_sealed
 
 Item = TypeVar("Item")
 CARD_REMEDY = "the same `simgen generate` command writes it again"
@@ -75,27 +76,31 @@ def _verify_collection(path: Path, report: Report) -> int:
 
 
 def _verify_folder(path: Path, report: Report) -> int:
-    due = list[str]()
-    if (path / RESULTS).exists() and not (path / MANIFEST).exists():
-        name, remedy, held = RESULTS, "make them again", read_results(path)
-        files, due = held["files"], held.get("due", due)
-    elif is_evaluation(path) and not (path / MANIFEST).exists():
-        name, remedy, files = EVALUATION, evaluation_layout.REMEDY, read_evaluation(path)["files"]
-    else:
-        name, remedy, files = MANIFEST, dataset_layout.REMEDY, read_manifest(path)["files"]
+    kind, held = _kind_and_document(path)
+    files = held["files"]
 
     def check(listed: tuple[str, Mapping[str, Any]]) -> int:
-        check_file(path, *listed, remedy, content=True)
+        check_file(path, *listed, kind.remedy, content=True)
         return 1
 
     number = _all_of(list(files.items()), check, "files", report)
     card = _verify_card(path, files)
-    _refuse(path, strays(path, [name, *files, *card]), name)
-    if due:
+    _refuse(path, strays(path, [kind.document, *files, *card]), kind.document)
+    if kind is RESULTS_FOLDER and (due := held["due"]):
         raise InputError(
             f"{path}: not finished: {_named(due)} are missing, or older than the other results here; {FINISH}"
         )
     return number + len(card)
+
+
+def _kind_and_document(path: Path) -> tuple[FolderKind, dict[str, Any]]:
+    """What a folder that is no collection is taken for, and the document that lists its files."""
+    if not (path / MANIFEST).exists():
+        if (path / RESULTS).exists():
+            return RESULTS_FOLDER, read_results(path)
+        if is_evaluation(path):
+            return EVALUATION_FOLDER, read_evaluation(path)
+    return DATASET_FOLDER, read_manifest(path)
 
 
 def _verify_card(path: Path, files: Mapping[str, Any]) -> list[str]:

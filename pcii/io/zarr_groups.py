@@ -16,9 +16,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
-from pcii.base.safe_files import new_folder_safely
 from pcii.core.array_labels import Label
-from pcii.io.sealed_json import check_file, parse_json, read_small
+from pcii.store.file_list import check_file
+from pcii.store.safe_files import new_folder_safely
+from pcii.store.sealed_json import parse_json, read_small
 
 CHUNK_ELEMENTS = 1 << 20
 """One chunk is at most this many elements: a view, or a million events."""

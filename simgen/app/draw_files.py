@@ -5,8 +5,8 @@ from pathlib import Path
 
 import tomli_w
 
-from pcii.base.errors import InputError
-from pcii.base.safe_files import new_folder_safely
+from pcii.store.folder_kind import check_free
+from pcii.store.safe_files import new_folder_safely
 from simgen.base.asset_names import asset
 from simgen.spec.scene import load_scene, scene_files
 
@@ -17,8 +17,7 @@ def write_drawn_scene(name_or_path: str, number: int, out: Path) -> Path:
     Raises `InputError` for what is no distribution, or a folder that holds anything.
     """
     scene, folder = load_scene(name_or_path, number=number)
-    if out.exists() and not (out.is_dir() and not any(out.iterdir())):
-        raise InputError(f"{out}: name a new or empty folder for the scene")
+    check_free(out, "scene")
     values = scene.model_dump(mode="json", exclude_unset=True, exclude_none=True)
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as temporary:

@@ -4,11 +4,11 @@ Each purpose has a stage of its own. The key is a `SeedSequence.spawn_key` of fi
 as lists of numbers collide when one list is another with zeros appended.
 """
 
-import hashlib
-import json
 from typing import Any, Literal, get_args
 
 import numpy as np
+
+from pcii.store.hashes import hash_json
 
 Stage = Literal[
     "radiance",
@@ -42,8 +42,7 @@ def seed_of_draw(seed: int, drawn: Any) -> int:
 
     `drawn` holds the values, as JSON has them, that determine the draw.
     """
-    digest = hashlib.sha256(json.dumps(drawn, sort_keys=True).encode()).digest()
-    return int.from_bytes(digest[:16], "big") << _SEED_BITS | seed
+    return int(hash_json(drawn)[:32], 16) << _SEED_BITS | seed
 
 
 def _sequence(

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import locked
 from pcii.io.collection_layout import (
     COLLECTION,
+    COLLECTION_FOLDER,
     INDEX,
     check_manifest,
     index_bytes,
@@ -16,10 +16,10 @@ from pcii.io.collection_layout import (
     is_collection,
     read_collection,
     read_index,
-    write_collection,
     write_index,
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
+from pcii.store.safe_files import locked
 from simgen.dataset.software import decisive_versions, other_versions
 from simgen.spec.sweeps import Sweep
 
@@ -33,8 +33,6 @@ def begin(sweep: Sweep, out: Path) -> None:
     way to another. `InputError` for a file, a dataset, the
     collection of another recipe or other software, or a folder that holds something else.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out}: this is a file; name a folder for the collection")
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
     document = {
@@ -42,16 +40,12 @@ def begin(sweep: Sweep, out: Path) -> None:
         "recipe": {name: value for name, value in sweep.base.items() if name != "publication"},
         "versions": decisive_versions(),
     }
+    COLLECTION_FOLDER.guard(out)
     out.mkdir(parents=True, exist_ok=True)
-    others = [
-        entry.name for entry in out.iterdir() if not entry.name.startswith((COLLECTION, f".{COLLECTION}."))
-    ]
-    if others and not is_collection(out):
-        raise InputError(f"{out}: holds something else; name a new or empty folder")
     if _is_free(out):  # else nothing is written, not even for the lock: a finished one may be read-only
         with locked(out / COLLECTION, wait=True):
             if _is_free(out):
-                write_collection(out, document)
+                COLLECTION_FOLDER.write(out, document)
     known = read_collection(out)
     if any(known.get(name) != document[name] for name in ("fields", "recipe")):
         raise InputError(

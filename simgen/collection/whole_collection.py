@@ -5,7 +5,7 @@ from pathlib import Path
 
 from pcii.base.crew import ALONE, Crew
 from pcii.base.progress import Report, silent
-from pcii.base.safe_files import named_in_errors
+from pcii.store.safe_files import named_in_errors
 from simgen.collection.collection_folder import Row, begin, write_whole_index
 from simgen.collection.dataset_job import DatasetJob
 from simgen.renderer import backend

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import BusyError, InputError
-from pcii.base.safe_files import locked
-from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
-from pcii.io.dataset_writer import check_files
+from pcii.io.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
+from pcii.io.dataset_writer import check_held
+from pcii.store.safe_files import locked
 from simgen.dataset.software import DECISIVE, other_versions, versions
 
 
@@ -20,17 +20,9 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
     folder that holds anything else.
     """
-    try:
-        entries = {entry.name for entry in out.iterdir()}
-    except FileNotFoundError:
-        return None
-    except NotADirectoryError:
-        raise InputError(f"{out}: this is a file; name a folder for the dataset") from None
     # In this order, since another run may finish it meanwhile: the manifest is there before the mark is gone.
-    if entries <= {MARKER} or (out / MARKER).is_file():
+    if DATASET_FOLDER.guard(out) <= {MARKER} or (out / MARKER).is_file():
         return None
-    if not (out / MANIFEST).is_file():
-        raise InputError(f"{out}: holds something else; name a new or empty folder")
     return whole(out, identity, content=content)
 
 
@@ -39,7 +31,7 @@ def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     manifest = read_written_manifest(out)
     if manifest.get("identity") != identity:
         raise _other(out, "dataset", manifest.get("versions", {}))
-    check_files(out, manifest, content=content)
+    check_held(out, manifest, content=content)
     return manifest
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.progress import Report, silent
-from pcii.base.safe_files import named_in_errors, sweep_temporaries
 from pcii.io.dataset_layout import (
     COUNTS,
     MANIFEST,
@@ -21,7 +20,8 @@ from pcii.io.dataset_layout import (
     read_written_manifest,
     write_manifest,
 )
-from pcii.io.sealed_json import list_files
+from pcii.store.file_list import list_files
+from pcii.store.safe_files import named_in_errors, sweep_temporaries
 from simgen.dataset.dataset_folder import claimed, finished, whole
 from simgen.dataset.manifest_entries import description, skipped
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare

@@ -1,7 +1,5 @@
 """A recipe with all that it names, and the parts of it that each stage of the work takes."""
 
-import hashlib
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pcii.io.dataset_layout import FORMAT_VERSION
-from pcii.io.sealed_json import hash_file
+from pcii.io.dataset_layout import DATASET_FOLDER
+from pcii.store.hashes import hash_file, hash_json
 from simgen.base import random_streams as seeds
 from simgen.base.asset_names import asset
 from simgen.cameras.calibration import rig_of
@@ -76,10 +74,10 @@ class Prepared:
         """
         content = self.scene_content | {
             "recipe": self.recipe_of_data,
-            "format_version": FORMAT_VERSION,
+            "format_version": DATASET_FOLDER.version,
             "software": decisive_versions(),
         }
-        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return hash_json(content)
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""

@@ -5,14 +5,13 @@ differ in their seed alone also what is found out about the light before photons
 depends on which of them is made first.
 """
 
-import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pcii.base.safe_files import new_folder_safely
+from pcii.store.hashes import hash_json
+from pcii.store.safe_files import new_folder_safely
 from simgen.dataset.prepared import Prepared, least_samples
 from simgen.photons.counting_plan import Plan
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -81,17 +80,13 @@ def in_common(reuse: Reuse, prepared: Prepared, engine: dict[str, Any]) -> InCom
     """What a dataset may have in common with those before it; `engine` describes the backend."""
     recipe = prepared.recipe
     values = recipe.model_dump(mode="json")
-    scene = _key(prepared.scene_content, recipe.render.max_depth, engine["variant"])
+    scene = hash_json([prepared.scene_content, recipe.render.max_depth, engine["variant"]])
     # Errors of cameras are drawn from the seed.
-    cameras = _key(scene, values["grid"], None if recipe.grid.errors is None else recipe.seed)
+    cameras = hash_json([scene, values["grid"], None if recipe.grid.errors is None else recipe.seed])
     light = "sensor", "photons", "exposure"
     return InCommon(
         reuse,
         scene_key=scene,
-        truth_key=_key(cameras, values["products"], values["analysis"]["z_mm"]),
-        light_key=_key(cameras, *(values[part] for part in light), least_samples(recipe)),
+        truth_key=hash_json([cameras, values["products"], values["analysis"]["z_mm"]]),
+        light_key=hash_json([cameras, [values[part] for part in light], least_samples(recipe)]),
     )
-
-
-def _key(*parts: Any) -> str:
-    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

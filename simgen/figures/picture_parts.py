@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import write_bytes_safely
 from pcii.figures.maps import draw_depth
 from pcii.figures.object_maps import draw_objects
 from pcii.figures.panels import hide_frame
+from pcii.store.safe_files import write_bytes_safely
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

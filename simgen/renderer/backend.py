@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import write_json_safely
+from pcii.store.safe_files import write_json_safely
 from simgen.renderer.installation import check_installed
 
 Kind = Literal["cuda", "llvm", "scalar"]

@@ -4,7 +4,6 @@ A field that takes one value may have a list, any field `{ each = [...] }`, and 
 `{ range = [first, end] }` or `{ range = [first, end, step] }`, without the end as in Python.
 """
 
-import hashlib
 import json
 import math
 import re
@@ -19,6 +18,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
+from pcii.store.hashes import hash_json
 from simgen.base.overrides import override
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Recipe, read_recipe, recipe_file
@@ -47,7 +47,7 @@ class Axis:
         parts = value if isinstance(value, list | tuple) else [value]
         text = "x".join(f"{part:.15g}" if type(part) is float else str(part) for part in parts)
         if not re.fullmatch(PLAIN, text):
-            digest = hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()[:8]
+            digest = hash_json(value)[:8]
             stem = "-".join(re.findall(r"\w+", text, re.ASCII))[-LONGEST_STEM:].strip("-_")
             text = f"{stem}-{digest}" if stem else digest
         return f"{self.label}_{text}"

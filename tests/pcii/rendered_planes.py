@@ -10,8 +10,8 @@ from pcii.core.array_labels import TRUTH_LABELS
 from pcii.core.bayer import mosaic
 from pcii.core.camera_grid import CameraGrid
 from pcii.io.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
-from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
+from pcii.store.file_list import list_files
 
 ABOVE_MM, BELOW_MM = 500.0, 800.0
 

@@ -19,8 +19,8 @@ from pcii.io.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
+from pcii.store.file_list import list_files
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)

@@ -8,13 +8,14 @@ from threading import Event
 import pytest
 
 import pcii
-from pcii.app import long_steps, pipeline, results, single_run
+from pcii.app import long_steps, pipeline, single_run
 from pcii.app.results import masks_name
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.io.dataset import Dataset
 from pcii.io.results_list import read_results
 from pcii.io.verification import verify
+from pcii.store import folder_kind
 
 METHODS = ("brightness", "variance")
 REMOVALS = tuple(long_steps.removal_step(method) for method in METHODS)
@@ -136,16 +137,16 @@ def test_masks_of_a_single_step_are_not_taken_for_those_of_a_run(dataset: Datase
 def test_steps_that_end_together_do_not_take_each_other_for_strangers(
     dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    begun, write = Event(), results.write_results
+    begun, write = Event(), folder_kind.write_sealed
 
-    def slowly(out: Path, content: dict[str, object]) -> None:
-        """As `write_results`, with its temporary file there for long enough to be met."""
-        temporary = out / "temporary"
+    def slowly(path: Path, content: dict[str, object]) -> None:
+        """As `write_sealed`, with its temporary file there for long enough to be met."""
+        temporary = path.with_name("temporary")
         temporary.touch()
         begun.set()
         time.sleep(0.3)
         temporary.unlink()
-        write(out, content)
+        write(path, content)
 
     def once_the_other_writes() -> DepthMap:
         begun.wait(10)
@@ -153,7 +154,7 @@ def test_steps_that_end_together_do_not_take_each_other_for_strangers(
 
     focus = pcii.segment(dataset.counts, z_mm=[540, 620], method="brightness")
     depth = pcii.estimate_depth(dataset.counts, z_range_mm=(450, 750), method="variance-sweep")
-    monkeypatch.setattr(results, "write_results", slowly)
+    monkeypatch.setattr(folder_kind, "write_sealed", slowly)
     steps = long_steps.KeptSteps(single_run.Results(tmp_path / "out", dataset))
     with ThreadPoolExecutor(1) as beside:
         mapped = beside.submit(steps.depth, "variance-sweep", (450, 750), once_the_other_writes)

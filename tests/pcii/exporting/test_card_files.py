@@ -16,10 +16,10 @@ from stored_datasets import make_dataset, one_sentence
 import pcii
 from pcii.exporting.card_files import write_card
 from pcii.exporting.publication_terms import CITATION, CREATOR, LICENCE, Terms
-from pcii.io.collection_layout import index_row, write_collection, write_index
+from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
 from pcii.io.dataset_layout import CARD, CROISSANT, MANIFEST, read_manifest
-from pcii.io.sealed_json import write_sealed
 from pcii.io.verification import verify
+from pcii.store.sealed_json import write_sealed
 
 TABLE = ("table", "thead", "tbody", "tr", "th", "td")
 ROOT = Path(__file__).resolve().parents[3]
@@ -36,7 +36,7 @@ def make_collection(root: Path) -> Path:
         make_dataset(folder, recipe=recipe, identity=f"{budget}", photons={"total": 5})
         values = {"photons.budget": budget}
         rows.append(index_row(folder.name, values, read_manifest(folder), folder / MANIFEST))
-    write_collection(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
+    COLLECTION_FOLDER.write(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
     write_index(root, rows)
     return root
 

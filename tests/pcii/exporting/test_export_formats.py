@@ -17,11 +17,11 @@ from twins import unit_grid
 import pcii
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.exporting.export_formats import WRITERS, export_dataset
-from pcii.io.collection_layout import index_row, write_collection, write_index
+from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
 from pcii.io.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest, write_manifest
-from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import write_arrays_safely
 from pcii.pictures.written_pixels import write_png
+from pcii.store.file_list import list_files
 
 
 def dataset_of(root, dense, **members):
@@ -196,7 +196,7 @@ def collection(tmp_path):
         recipe = {"scene": "two", "seed": seed, "photons": {"scope": "view", "budget": 10.0, "nested": []}}
         path = make_dataset(root / f"seed_{seed}", recipe=recipe, identity=f"no. {seed}")
         rows.append(index_row(path.name, {"seed": seed}, read_manifest(path), path / MANIFEST))
-    write_collection(root, {"fields": ["seed"]})
+    COLLECTION_FOLDER.write(root, {"fields": ["seed"]})
     write_index(root, rows)
     return root
 

@@ -9,7 +9,7 @@ import pytest
 
 from pcii.base.errors import InputError
 from pcii.io.collection import Collection, open_collection
-from pcii.io.collection_layout import COLLECTION, INDEX, index_row, split_of, write_collection, write_index
+from pcii.io.collection_layout import COLLECTION, COLLECTION_FOLDER, INDEX, index_row, split_of, write_index
 from pcii.io.dataset_layout import MANIFEST, read_manifest, write_manifest
 from pcii.io.verification import verify
 
@@ -34,7 +34,7 @@ def folder(tmp_path: Path) -> Path:
             manifest = {"grid": GRID, "cfa": None, "files": {}, "recipe": recipe, "identity": name}
             write_manifest(root / name, manifest)
             rows.append(index_row(name, values, read_manifest(root / name), root / name / MANIFEST))
-    write_collection(root, {"fields": FIELDS})
+    COLLECTION_FOLDER.write(root, {"fields": FIELDS})
     write_index(root, rows)
     return root
 
@@ -143,7 +143,7 @@ def test_a_dataset_that_the_index_does_not_know_is_not_opened(folder: Path) -> N
 
 
 def test_what_is_no_collection_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="there is no such folder"):
+    with pytest.raises(InputError, match="there is no such collection folder"):
         open_collection(tmp_path / "none")
     with pytest.raises(InputError, match="not a collection"):
         open_collection(tmp_path)

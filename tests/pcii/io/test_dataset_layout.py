@@ -15,7 +15,6 @@ from stored_datasets import (
     one_sentence,
 )
 
-from pcii.base.safe_files import write_bytes_safely
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.photon_counts import PhotonCounts
 from pcii.io.dataset import open_dataset
@@ -31,8 +30,9 @@ from pcii.io.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.io.sealed_json import check_file, list_files
 from pcii.io.zarr_groups import new_array
+from pcii.store.file_list import check_file, list_files
+from pcii.store.safe_files import write_bytes_safely
 
 # A dataset, read back
 
@@ -146,7 +146,7 @@ def test_a_manifest_that_was_changed_is_refused(tmp_path):
 
 def test_a_manifest_of_something_else_is_refused(tmp_path):
     root = make_dataset(tmp_path / "d", format="something else")
-    assert "not the manifest" in one_sentence(lambda: read_manifest(root), root / MANIFEST)
+    assert "not of a photon-integral" in one_sentence(lambda: read_manifest(root), root / MANIFEST)
 
 
 @pytest.mark.parametrize("version", [0, 1, None, "2"])

@@ -18,8 +18,8 @@ from pcii.core.truth import PhotonTruth, Truth
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import COUNTS, MANIFEST
 from pcii.io.dataset_writer import save_dataset
-from pcii.io.sealed_json import strays
 from pcii.io.verification import verify
+from pcii.store.file_list import strays
 
 LIGHT = np.random.default_rng(1).random((*GRID.shape_KLHW, 3)).astype(np.float32)
 COUNTED = PhotonCounts.from_dense(DENSE, GRID, cfa="GRBG")

@@ -35,7 +35,7 @@ def test_a_copy_is_a_dataset_of_its_own(tmp_path: Path, capsys: pytest.CaptureFi
     assert command_line.run(pcii_cli.app, ["sample", "-o", str(out)]) == 0
     assert verify(out) == verify(SAMPLE)
     assert command_line.run(pcii_cli.app, ["sample", "-o", str(out)]) == 2
-    assert f"error: {out}: name a new or empty folder" in capsys.readouterr().err
+    assert f"error: {out}: holds something else; name a new or empty folder" in capsys.readouterr().err
 
 
 @pytest.mark.slow

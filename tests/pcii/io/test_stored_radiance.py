@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.core.images import Views
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import RADIANCE, radiance_name, write_exr_safely, write_manifest
-from pcii.io.sealed_json import list_files
+from pcii.store.file_list import list_files
 
 SHAPE = (*GRID.shape_KLHW, 3)
 WHOLE = np.random.default_rng(1).random(SHAPE).astype(np.float32)

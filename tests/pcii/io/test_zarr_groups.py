@@ -14,7 +14,6 @@ from property_settings import at_least
 from stored_datasets import one_sentence
 
 from pcii.core.array_labels import Label
-from pcii.io.sealed_json import list_files
 from pcii.io.zarr_groups import (
     CHUNK_ELEMENTS,
     METADATA,
@@ -23,6 +22,7 @@ from pcii.io.zarr_groups import (
     unpacked_bytes,
     write_arrays_safely,
 )
+from pcii.store.file_list import list_files
 
 Y = Label(("step",), "three numbers", "mm")
 MAP = Label(("row", "col"), "a map")

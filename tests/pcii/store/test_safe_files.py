@@ -7,7 +7,9 @@ import threading
 import pytest
 from stored_datasets import DENSE, make_dataset
 
-from pcii.base.safe_files import (
+from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import COUNTS, RADIANCE
+from pcii.store.safe_files import (
     locked,
     new_folder_safely,
     replace_folder,
@@ -15,8 +17,6 @@ from pcii.base.safe_files import (
     write_bytes_safely,
     write_json_safely,
 )
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import COUNTS, RADIANCE
 
 
 def disk_is_full(handle: int) -> None:

@@ -1,18 +1,17 @@
-"""JSON documents that list the files of a folder and end in a checksum of the document itself.
+"""JSON documents that end in a checksum of themselves, and JSON of strangers.
 
 The last member of such a document is "sha256": the SHA-256 of its bytes with 64 zeros in the place of that.
 """
 
-import hashlib
 import json
-import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.base.safe_files import json_bytes, write_bytes_safely
+from pcii.store.hashes import hash_bytes
+from pcii.store.safe_files import json_bytes, write_bytes_safely
 
 LARGEST_DOCUMENT_BYTES = 1 << 24
 """JSON takes up to 30 times its length in memory; a list of 100 000 files is shorter than this."""
@@ -29,7 +28,7 @@ def sealed(document: Mapping[str, Any], to_bytes: Callable[[Mapping[str, Any]], 
     """What `to_bytes` makes of a document, on one line or indented, with its checksum."""
     blank = to_bytes({**document, "sha256": _BLANK.decode()})
     start = blank.rindex(_BLANK)
-    checksum = hashlib.sha256(blank).hexdigest().encode()
+    checksum = hash_bytes(blank).encode()
     return blank[:start] + checksum + blank[start + len(_BLANK) :]
 
 
@@ -39,7 +38,7 @@ def check_seal(content: bytes) -> None:
     if found is None:
         raise ValueError("damaged or of another release, it does not end in its checksum")
     blank = content[: found.start(1)] + _BLANK + content[found.end(1) :]
-    if hashlib.sha256(blank).hexdigest().encode() != found[1]:
+    if hash_bytes(blank).encode() != found[1]:
         raise ValueError("changed since it was written, its checksum does not match")
 
 
@@ -81,55 +80,3 @@ def parse_json(content: bytes, path: Path, remedy: str) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise InputError(f"{path}: damaged, it is not a JSON object; {remedy}")
     return document
-
-
-def hash_file(path: Path) -> str:
-    """SHA-256 of a file, in hex."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def list_files(root: Path, parts: Iterable[str]) -> dict[str, dict[str, Any]]:
-    """Size and SHA-256 of every file of the named parts (files or folders), by path relative to `root`."""
-    entries: dict[str, dict[str, Any]] = {}
-    for part in parts:
-        top = root / part
-        files = [top] if top.is_file() else sorted(p for p in top.rglob("*") if p.is_file())
-        for file in files:
-            name = file.relative_to(root).as_posix()
-            entries[name] = {"bytes": file.stat().st_size, "sha256": hash_file(file)}
-    return entries
-
-
-def check_file(root: Path, name: str, entry: Mapping[str, Any], remedy: str, *, content: bool) -> None:
-    """Raise `InputError` if a listed file is missing, has another size, or (`content`) another hash."""
-    path = root / name
-    try:
-        if not path.is_file():
-            raise InputError(f"{path}: listed in the manifest but missing; {remedy}")
-        size = path.stat().st_size
-        if size != entry["bytes"]:
-            raise InputError(
-                f"{path}: truncated or changed, {size} bytes where the manifest says {entry['bytes']}; "
-                f"{remedy}"
-            )
-        if content and hash_file(path) != entry["sha256"]:
-            raise InputError(f"{path}: its content does not match the manifest's SHA-256; {remedy}")
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror}); {remedy}") from None
-
-
-def strays(root: Path, listed: Iterable[str]) -> list[str]:
-    """Files and folders in `root` that are not listed and have no listed files in them, as relative paths."""
-    files = set(listed)
-    folders = {parent.as_posix() for name in files for parent in Path(name).parents}
-    found: list[str] = []
-    for top, inner, names in os.walk(root):
-        folder_path = Path(top).relative_to(root)
-        found += [name for name in ((folder_path / n).as_posix() for n in names) if name not in files]
-        for folder in list(inner):
-            name = (folder_path / folder).as_posix()
-            if name not in folders or (root / name).is_symlink():
-                inner.remove(folder)
-                found.append(f"{name}/")
-    return sorted(found)
