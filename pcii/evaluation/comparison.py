@@ -18,7 +18,7 @@ from pcii.core.section_stack import Sections
 from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import Function, Method, estimator_of, named_functions
-from pcii.evaluation.provenance import differences, machine, software_of
+from pcii.evaluation.provenance import machine, software_of
 from pcii.evaluation.rows import (
     Budget,
     Key,
@@ -42,6 +42,7 @@ from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.safe_files import named_in_errors
+from pcii.store.software import differences
 
 
 def evaluate(
@@ -64,7 +65,7 @@ def evaluate(
     of depth take. `z_mm` are depths to look at instead of those that recipes name. `crew` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
-    unless other software made them (see `pcii.evaluation.provenance`): `again` in the result says how many
+    unless other software made them (see `pcii.store.software`): `again` in the result says how many
     were, of which methods, and why. evaluation.json, .html and .md summarise the last row of each. The
     seconds of a row are the wall time of the method alone, after a warm-up call, in a call in which no code
     was compiled or imported; where several processes work at a time, each is slower. Raises `InputError` for

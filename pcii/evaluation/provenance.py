@@ -4,32 +4,21 @@
 software made is made again.
 """
 
-import hashlib
 import os
 import platform
-import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
-from importlib.util import find_spec
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import pcii.base
 from pcii.depth import methods as depth
 from pcii.evaluation.method_names import estimator_of
 from pcii.removal import methods as removal
-from pcii.store.hashes import hash_bytes, hash_file
+from pcii.store.hashes import hash_bytes
+from pcii.store.software import own_software, software_of_entry_point
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
-
-PACKAGE = "photon-integral-imaging"
-COMPUTING = ("numpy", "scipy", "scikit-image", "numba", "llvmlite", "onnxruntime")
-"""Other packages by which this one computes: another version may give another result."""
-_SOURCE = "source of "
 
 
 def software_of(method: str) -> dict[str, str]:
@@ -39,26 +28,7 @@ def software_of(method: str) -> dict[str, str]:
     is every file of a package, so also the weights of a network.
     """
     point = _entry_point(method)
-    return dict(_own()) if point is None else _own() | _of_plugin(point)
-
-
-def differences(before: Mapping[str, str] | None, now: Mapping[str, str] | None) -> str:
-    """How the software that made something differs from that of now, in words; empty if it does not.
-
-    >>> differences({"numpy": "2.1", "source of mine": "a"}, {"numpy": "2.2", "source of mine": "b"})
-    'numpy 2.1 is now 2.2, the source of mine has changed'
-    >>> differences(None, {"numpy": "2.2"})
-    'what makes them is not known'
-    """
-    if before is None or now is None:
-        return "what makes them is not known"
-    changes: list[str] = []
-    for name in sorted({*before, *now}):
-        old, new = before.get(name, "absent"), now.get(name, "absent")
-        if old != new:
-            is_source = name.startswith(_SOURCE)
-            changes.append(f"the {name} has changed" if is_source else f"{name} {old} is now {new}")
-    return ", ".join(changes)
+    return own_software() | ({} if point is None else software_of_entry_point(point))
 
 
 def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -71,6 +41,7 @@ def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     for row in rows:
         for name, number in (row.get("software") or {}).items():
             software[name][number] += 1
+    identities = sorted({row["identity"] for row in rows})
     days = sorted(row["date"] for row in rows if "date" in row)
     return {
         "software": {name: dict(counter) for name, counter in software.items()},
@@ -78,7 +49,7 @@ def record(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "unknown": sum(not row.get("software") for row in rows),
         "machines": dict(Counter(row["machine"] for row in rows if "machine" in row)),
         "days": [days[0], days[-1]] if days else None,
-        "datasets": _digest(sorted({row["identity"] for row in rows})),
+        "datasets": hash_bytes("\0".join(identities).encode(errors="backslashreplace")),
     }
 
 
@@ -91,58 +62,6 @@ def _entry_point(method: str) -> "EntryPoint | None":
     """Where another package has the method; None for a built-in one."""
     estimator = estimator_of(method)
     return removal.DOOR.point_of(method) if estimator is None else depth.DOOR.point_of(estimator)
-
-
-@cache
-def _own() -> dict[str, str]:
-    return {
-        PACKAGE: version(PACKAGE),
-        f"{_SOURCE}{PACKAGE}": _hash_of([Path(pcii.base.__file__).parents[1]]),
-        "python": platform.python_version(),
-        **{name: version(name) for name in COMPUTING},
-    }
-
-
-def _of_plugin(point: "EntryPoint") -> dict[str, str]:
-    """Not kept for a second call: the source may be changed and loaded again while Python runs."""
-    package = point.dist
-    modules = {point.module.partition(".")[0]}
-    if package is None:
-        return {f"{_SOURCE}{point.module}": _hash_of(_places(modules))}
-    modules |= set((package.read_text("top_level.txt") or "").split())
-    found = {package.name: package.version, f"{_SOURCE}{package.name}": _hash_of(_places(modules))}
-    for requirement in package.requires or ():
-        name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
-        with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
-
-
-def _places(modules: Iterable[str]) -> list[Path]:
-    """Files and folders of modules at the top level, without importing them."""
-    places: list[Path] = []
-    for name in sorted(modules):
-        spec = find_spec(name)
-        if spec is not None and spec.submodule_search_locations is not None:
-            places += map(Path, spec.submodule_search_locations)
-        elif spec is not None and spec.has_location and spec.origin is not None:
-            places.append(Path(spec.origin))
-    return places
-
-
-def _hash_of(places: Iterable[Path]) -> str:
-    """Hash of all files of these folders and files, but for hidden and compiled ones."""
-    content = hashlib.sha256()
-    for place in places:
-        for file in [place] if place.is_file() else sorted(place.rglob("*")):
-            name = file.relative_to(place.parent)
-            if file.is_file() and not any(part.startswith((".", "__pycache__")) for part in name.parts):
-                content.update(f"{name.as_posix()}\0{hash_file(file)}\0".encode())
-    return content.hexdigest()[:16]
-
-
-def _digest(texts: Iterable[str]) -> str:
-    return hash_bytes("\0".join(texts).encode(errors="backslashreplace"))
 
 
 def _processor() -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +30,7 @@ from pcii.io.zarr_groups import DTYPES, write_arrays_safely
 from pcii.store.file_list import check_files, list_files
 from pcii.store.hashes import hash_json
 from pcii.store.safe_files import named_in_errors, replace_folder, temporary_folder
+from pcii.store.software import PACKAGE, versions
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
@@ -97,7 +97,8 @@ def save_dataset(
             if truth is not None:
                 _write_truth(new, truth, counts)
             manifest = _content(new, counts, views, truth)
-            told = {"analysis": analysis, "photon_budget": photon_budget, "versions": _versions()}
+            software = versions(PACKAGE, "numpy", "zarr")
+            told = {"analysis": analysis, "photon_budget": photon_budget, "versions": software}
             write_manifest(new, texts | manifest | told)
             held = held_dataset(out, manifest["identity"])
             if held is None:
@@ -267,7 +268,3 @@ def _content(
         "files": list_files(root, [COUNTS, TRUTH, PHOTON_TRUTH, RADIANCE]),
     }
     return {"identity": hash_json(content), **content}
-
-
-def _versions() -> dict[str, str]:
-    return {name: version(name) for name in ("photon-integral-imaging", "numpy", "zarr")}

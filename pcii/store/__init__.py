@@ -6,4 +6,5 @@ folder_kind  Kinds of folders: what says that a folder is of one, and the sealed
 hashes       SHA-256 of bytes, of files and of what JSON can say.
 safe_files   Atomic writing of files and folders: whatever has its final name is complete.
 sealed_json  JSON documents that end in a checksum of themselves, and JSON of strangers.
+software     The software that a result follows from: versions, hashes of sources, and how those differ.
 """

@@ -54,8 +54,8 @@ def begin(sweep: Sweep, out: Path) -> None:
     differ = other_versions(known.get("versions", {}))
     if differ:
         raise InputError(
-            f"{out}: holds the collection that was made with {differ}; name a new folder, or install those "
-            "versions"
+            f"{out}: holds the collection of other software, whose photons may differ ({differ}); name a new "
+            "folder, or install that software"
         )
 
 

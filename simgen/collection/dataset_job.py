@@ -34,7 +34,7 @@ class DatasetJob:
         differ = other_versions(self.versions)
         if differ:
             raise InputError(
-                f"{self.name(piece)}: the collection is made with {differ}; install those versions"
+                f"{self.name(piece)}: the collection is made with other software ({differ}); install that"
             )
         prepared = prepare(self.sweep.recipe(piece), self.sweep.near)
         folder = self.out / self.sweep.folder(piece)

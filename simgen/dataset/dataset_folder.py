@@ -76,8 +76,8 @@ def _other(out: Path, what: str, made_with: Mapping[str, str]) -> InputError:
     differ = other_versions(made_with)
     if differ:
         return InputError(
-            f"{out}: holds the {what} that was made with {differ}; name a new or empty folder, or install "
-            "those versions"
+            f"{out}: holds the {what} of other software, whose photons may differ ({differ}); name a new or "
+            "empty folder, or install that software"
         )
     return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
 

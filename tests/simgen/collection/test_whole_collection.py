@@ -20,10 +20,10 @@ from pcii.io.collection_layout import COLLECTION, INDEX
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import CARD, CROISSANT, MARKER
 from pcii.io.verification import verify
+from pcii.store import software
 from simgen.app import commands as cli
 from simgen.collection import dataset_job
 from simgen.collection.whole_collection import generate_collection
-from simgen.dataset import software
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
 from simgen.spec.sweeps import Sweep, load_sweep
@@ -162,9 +162,9 @@ def test_other_software_neither_extends_a_collection_nor_works_on_it(
 ) -> None:
     job, original = dataset_job.DatasetJob(sweep_of(recipe_file), tmp_path), software.version
     monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
-    with pytest.raises(InputError, match=r"holds the collection that was made with .* mitsuba 9\.9"):
+    with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)
-    with pytest.raises(InputError, match=r"is made with .* mitsuba 9\.9.*; install those versions"):
+    with pytest.raises(InputError, match=r"other software \(mitsuba .* is now 9\.9\); install"):
         job(0)
     assert list(tmp_path.iterdir()) == []
 
