@@ -52,7 +52,7 @@ ROOMS = {
         "app",
     ],
 }
-# What simgen may share with pcii: the store of files, image tools, types, masks, file formats and how commands
+# What simgen may share with pcii: store of files, image tools, types, masks, file formats and how commands
 # behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
 # mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
 SHARED_ROOMS = {"base", "store", "imaging", "pictures", "figures", "core", "io", "exporting"}

@@ -1,5 +1,7 @@
 """Datasets on disk: what is read back, and which faults are errors."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray
@@ -79,31 +81,27 @@ def test_xarray_opens_every_group_with_named_axes_and_units(tmp_path, part, spar
 # Damage
 
 
-@pytest.mark.parametrize("part", [COUNTS, TRUTH, RADIANCE])
-def test_a_truncated_file_is_found_on_opening(tmp_path, part):
-    root = make_dataset(tmp_path / "d")
-    file = largest_file(root, part)
+def cut(file):
     file.write_bytes(file.read_bytes()[:-1])
-    assert "truncated" in one_sentence(lambda: open_dataset(root), file)
 
 
 @pytest.mark.parametrize("part", [COUNTS, TRUTH, RADIANCE])
-def test_a_missing_file_is_found_on_opening(tmp_path, part):
+@pytest.mark.parametrize(("damage", "words"), [(cut, "truncated"), (Path.unlink, "missing")])
+def test_a_file_that_is_cut_or_lost_is_found_on_opening(tmp_path, part, damage, words):
     root = make_dataset(tmp_path / "d")
     file = largest_file(root, part)
-    file.unlink()  # a deleted Zarr chunk would read as zeros
-    assert "missing" in one_sentence(lambda: open_dataset(root), file)
+    damage(file)  # a deleted Zarr chunk would read as zeros
+    assert words in one_sentence(lambda: open_dataset(root), file)
 
 
-@pytest.mark.parametrize("bit", [0, 77, 1234, 4321])
 @pytest.mark.parametrize(
     ("part", "read"),
     [(COUNTS, lambda d: d.counts), (TRUTH, lambda d: d.truth), (RADIANCE, lambda d: d.views.view(1, 2))],
 )
-def test_a_flipped_bit_is_found_on_reading(tmp_path, part, read, bit):
+def test_a_flipped_bit_is_found_on_reading(tmp_path, part, read):
     root = make_dataset(tmp_path / "d")
     file = root / radiance_name(1, 2) if part == RADIANCE else largest_file(root, part)
-    flip_a_bit(file, bit)
+    flip_a_bit(file, 1234)
     dataset = open_dataset(root)
     assert "SHA-256" in one_sentence(lambda: read(dataset), file)
 
@@ -128,32 +126,6 @@ def test_a_file_that_the_manifest_does_not_list_is_refused(tmp_path):
 
 
 # Manifests
-
-
-def test_a_missing_folder_and_a_missing_manifest_have_different_errors(tmp_path):
-    assert "no such dataset folder" in one_sentence(lambda: open_dataset(tmp_path / "no"), tmp_path / "no")
-    assert "not a finished dataset" in one_sentence(lambda: open_dataset(tmp_path), tmp_path)
-
-
-def test_a_manifest_that_was_changed_is_refused(tmp_path):
-    root = make_dataset(tmp_path / "d")
-    path = root / MANIFEST
-    text = path.read_text()
-    path.write_text(text.replace('"focal_mm": 1.0', '"focal_mm": 2.0'))
-    assert path.read_text() != text
-    assert "changed since it was written" in one_sentence(lambda: open_dataset(root), path)
-
-
-def test_a_manifest_of_something_else_is_refused(tmp_path):
-    root = make_dataset(tmp_path / "d", format="something else")
-    assert "not of a photon-integral" in one_sentence(lambda: read_manifest(root), root / MANIFEST)
-
-
-@pytest.mark.parametrize("version", [0, 1, None, "2"])
-def test_a_format_version_of_another_release_is_refused(tmp_path, version):
-    root = make_dataset(tmp_path / "d", format_version=version)
-    message = one_sentence(lambda: open_dataset(root), root / MANIFEST)
-    assert repr(version) in message
 
 
 @pytest.mark.parametrize("name", ["grid", "cfa", "files"])
@@ -193,12 +165,6 @@ WRONG = [
 def test_a_wrong_member_of_a_manifest_is_named(tmp_path, members, words):
     root = make_dataset(tmp_path / "d", **members)
     assert words in one_sentence(lambda: open_dataset(root), root / MANIFEST)
-
-
-def test_a_manifest_too_large_to_be_one_is_refused(tmp_path):
-    with (tmp_path / MANIFEST).open("wb") as file:
-        file.truncate((1 << 24) + 1)  # 16 MiB are 100 000 files
-    assert "larger than" in one_sentence(lambda: read_manifest(tmp_path), tmp_path / MANIFEST)
 
 
 def test_what_no_manifest_lists_is_not_read(tmp_path):

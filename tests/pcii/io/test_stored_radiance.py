@@ -57,10 +57,3 @@ def test_what_is_on_disk_is_not_in_memory_without_a_copy(views: Views) -> None:
 def test_an_error_for_other_indices_says_how_to_read_views(views: Views, index: object) -> None:
     with pytest.raises(InputError, match=r"radiance: read one view of 2 x 2 by \[k, l\], or all by numpy"):
         views.radiance[index]
-
-
-def test_a_view_that_was_changed_is_found_by_both(views: Views, dataset: Dataset) -> None:
-    write_exr_safely(dataset.path / radiance_name(1, 1), WHOLE[0, 0])
-    for read in (np.asarray, lambda stack: stack[1, 1]):
-        with pytest.raises(InputError, match="manifest"):
-            read(views.radiance)

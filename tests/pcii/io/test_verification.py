@@ -1,4 +1,4 @@
-"""Whatever happens to the files of a dataset, of results or of an evaluation is found."""
+"""Whatever happens to the files of a dataset, a collection, results or an evaluation is found."""
 
 import shutil
 from collections.abc import Callable
@@ -13,7 +13,9 @@ from pcii.app.results import Results
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
 from pcii.evaluation.comparison import evaluate
+from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
 from pcii.io.dataset import open_dataset
+from pcii.io.dataset_layout import MANIFEST, read_manifest
 from pcii.io.verification import verify
 
 
@@ -34,6 +36,17 @@ def make_evaluation(root: Path) -> Path:
     for seed in (3, 4):
         write_dataset(data / f"seed_{seed}", seed, {OWN: 5 + seed})
     evaluate([data], root, methods=["brightness", "variance"])
+    return root
+
+
+def make_collection(root: Path) -> Path:
+    """Two datasets and their index."""
+    rows = []
+    for seed in (3, 4):
+        folder = write_dataset(root / f"seed_{seed}", seed, {OWN: 5 + seed})
+        rows.append(index_row(folder.name, {"seed": seed}, read_manifest(folder), folder / MANIFEST))
+    COLLECTION_FOLDER.write(root, {"fields": ["seed"]})
+    write_index(root, rows)
     return root
 
 
@@ -61,14 +74,14 @@ def append(path: Path, rng: np.random.Generator) -> None:
     path.write_bytes(path.read_bytes() + b"\n")
 
 
-@pytest.mark.parametrize("make", [make_dataset, make_results, make_evaluation])
+@pytest.mark.parametrize("make", [make_dataset, make_collection, make_results, make_evaluation])
 @pytest.mark.parametrize("damage", [flip, truncate, delete, add, add_a_folder, append])
 def test_every_damage_to_every_file_is_found(
     tmp_path: Path, make: Callable[[Path], Path], damage: Callable[[Path, np.random.Generator], None]
 ) -> None:
     root, rng = make(tmp_path / "whole"), np.random.default_rng(5)
     names = [path.relative_to(root) for path in sorted(root.rglob("*")) if path.is_file()]
-    assert verify(root) == len(names) - 1
+    assert verify(root) == len(names) - (make is not make_collection)  # a manifest is not in its own list
     for name in names:
         broken = tmp_path / "broken"
         shutil.copytree(root, broken)

@@ -215,17 +215,6 @@ def start(recipe_file: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
 
-def test_two_processes_share_the_work_of_a_collection(
-    recipe_file: Path, collection: Path, tmp_path: Path
-) -> None:
-    out = tmp_path / "shared"
-    for process in [start(recipe_file, out) for _ in range(2)]:
-        _, told = process.communicate(timeout=120)
-        assert process.returncode == 0, told.decode()
-    assert digest_of_all(out) == digest_of_all(collection)
-    assert verify(out) == verify(collection)
-
-
 def test_a_killed_worker_is_replaced(recipe_file: Path, collection: Path, tmp_path: Path) -> None:
     out, killed = tmp_path / "killed", set[int]()
     process = start(recipe_file, out, "--workers", "2")
