@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from benchmarks.drawn import KINDS, TUNING, write_recipe
-from pcii.base.crew import Crew
 from pcii.base.errors import InputError
+from pcii.base.executor import Executor
 from pcii.base.progress import Report, Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.rows import recipe_of
@@ -152,12 +152,12 @@ def evaluated(folder: str, methods: Sequence[str]) -> tuple[dict[str, Any], dict
     `folder`, in BENCH_OUT, is for their scores; the datasets are the same for all tables.
     """
     works, _ = chosen_works()
-    crew = Crew(int(os.environ.get("BENCH_WORKERS", "1")))
+    executor = Executor(int(os.environ.get("BENCH_WORKERS", "1")))
     asked = _names(os.environ.get("BENCH_METHODS", "")) or methods
     with Stages() as progress:
         make(works, progress)
         folders = [work.folder for work in works]
-        evaluation = evaluate(folders, output() / folder, methods=asked, crew=crew, report=progress)
+        evaluation = evaluate(folders, output() / folder, methods=asked, executor=executor, report=progress)
     return evaluation, {recipe_of(read_manifest(work.folder)): work.entry for work in works}
 
 

@@ -47,7 +47,7 @@ NO_NUMBERS = {
     "DepthPosterior": "made by `depth_posterior`",
     "Segmented": "made by `segment`",
     "Score": "made by `score`",
-    "Crew": "worker processes",
+    "Executor": "worker processes",
     "RecipeFile": "made by `load_recipe`",
     "SceneFile": "made by `load_scene`",
     "load_scene": "reads a file",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simgen.app.library import (
-        Crew,
+        Executor,
         RecipeFile,
         SceneFile,
         generate,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from simgen.app.photons_in_memory import draw_photons
 
 __all__ = [
-    "Crew",
+    "Executor",
     "RecipeFile",
     "SceneFile",
     "draw_photons",

@@ -131,7 +131,7 @@ def check_collections(names: dict[str, Any]) -> None:
 
 def check_cluster(names: dict[str, Any]) -> None:
     (call,) = names["simgen"].generate_collection.call_args_list
-    assert call.kwargs["crew"].scheduler == "tcp://127.0.0.1:8786"
+    assert call.kwargs["executor"].scheduler == "tcp://127.0.0.1:8786"
 
 
 CHECKS = {

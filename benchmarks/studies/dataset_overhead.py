@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.figures import curve, frame
 from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.timing import median_of
-from pcii.base.crew import ALONE, Crew
+from pcii.base.executor import ALONE, Executor
 from pcii.io.collection import open_collection
 from simgen.collection.whole_collection import generate_collection
 from simgen.spec.sweeps import load_sweep
@@ -43,7 +43,7 @@ def measure(counts: Sequence[int], repeats: int) -> Measured:
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder, LocalCluster(**settings) as running:
         cluster: Any = running
-        dask = Crew(scheduler=str(cluster.scheduler_address))
+        dask = Executor(scheduler=str(cluster.scheduler_address))
         for count in counts:
             sweep = load_sweep("plain_pair", OVERRIDES, seeds=count)
             taken: dict[str, list[float]] = {name: [] for name in (MADE, FOUND, TASKS, OPENED)}

@@ -11,7 +11,7 @@ from pcii.app.results import Results
 from pcii.app.step_commands import depth, reconstruct, segment
 from pcii.base import command_line
 from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
-from pcii.base.crew import ALONE, Crew
+from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD
 
@@ -159,7 +159,7 @@ def evaluate(
     method: tuple[str, ...] = (),
     budget: tuple[str, ...] = (),
     z_mm: Depths = (),
-    crew: Annotated[Crew, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> None:
     """Compare methods over datasets and photon budgets, with intervals over seeds; resumes when run again.
 
@@ -190,7 +190,7 @@ def evaluate(
 
     with Stages() as report:
         evaluation = compare(
-            datasets, out, methods=method, budgets=budget, z_mm=z_mm, crew=crew, report=report
+            datasets, out, methods=method, budgets=budget, z_mm=z_mm, executor=executor, report=report
         )
     if evaluation["made"]["differing"]:
         differing = ", ".join(evaluation["made"]["differing"])

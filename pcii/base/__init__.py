@@ -4,10 +4,10 @@ command_line      Running of command lines: help, error messages of one sentence
                   Ctrl-C.
 command_output    What a command prints: what it did, what was asked for, and the next command to type.
 compiled_loops    Compilation of loops with Numba, which needs no system library.
-crew              Who does a job: this process, several of this machine, or a Dask cluster.
 dask_cluster      A job's pieces as tasks of a Dask cluster, all of whose workers see the same file
                   system.
 errors            The exception that is raised for invalid input.
+executor          Who does a job: this process, several of this machine, or a Dask cluster.
 extensions        Methods by name: built-in ones and entry points of installed packages; calls of functions
                   of theirs.
 jobs              Jobs of many pieces.

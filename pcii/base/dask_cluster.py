@@ -49,7 +49,7 @@ def run_on_cluster(
         except (OSError, ValueError) as fault:
             raise InputError(f"scheduler: none answers at {address} ({fault})") from None
         installed = f"{type(job).__name__}-{uuid4().hex}"
-        with _loss_reported(client, address), client, _on_all_workers(client, job, installed):
+        with client, _loss_reported(client, address), _on_all_workers(client, job, installed):
             wanted = None if resource is None else {resource: 1}
             command = f"dask worker {address} --nthreads 1{f' --resources {resource}=1' if resource else ''}"
             ahead, running, ended = deque(pieces), dict[Any, int](), SimpleQueue[Any]()

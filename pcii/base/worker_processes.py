@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from collections import Counter, deque
 from collections.abc import Generator, Sequence
@@ -110,19 +111,23 @@ def _reply(worker: _Worker) -> Done | Exception | None:
 def _work(pipe: Connection, job: Job, threads: int) -> None:
     """Do the pieces whose numbers come through the pipe, until it is closed at the other end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; who started this process ends it
+    threading.Thread(target=_end_with_starter, daemon=True).start()
     job.use_threads(threads)
-    while True:
-        try:
+    with suppress(EOFError, BrokenPipeError):  # who started this process was killed
+        while True:
             piece = pipe.recv()
-        except EOFError:
-            return
-        try:
-            reply = attempt(job, piece)
-        except Exception as fault:
-            reply = fault
-        if reply is None:
-            time.sleep(AGAIN_S)
-        try:
+            try:
+                reply = attempt(job, piece)
+            except Exception as fault:
+                reply = fault
+            if reply is None:
+                time.sleep(AGAIN_S)
             pipe.send(reply)
-        except BrokenPipeError:  # who started this process was killed
-            return
+
+
+def _end_with_starter() -> None:
+    """End this process, in the midst of a piece too, when the one that started it is gone."""
+    starter = multiprocessing.parent_process()
+    assert starter is not None
+    starter.join()
+    os._exit(1)

@@ -9,8 +9,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
@@ -52,7 +52,7 @@ def evaluate(
     methods: Sequence[Method] = (),
     budgets: Sequence[float | str] = (),
     z_mm: Sequence[float] = (),
-    crew: Crew = ALONE,
+    executor: Executor = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score methods on datasets and compare them; returns the figures of evaluation.json (`summarise`).
@@ -62,7 +62,7 @@ def evaluate(
     of depth; or functions of one's own: of removal, or of depth as pairs ("depth:NAME", function), which are
     measured every time, since nobody knows what they follow from. Without, all that can take the data.
     `budgets` default to all that each dataset has; among them "full-light", its radiance, which some methods
-    of depth take. `z_mm` are depths to look at instead of those that recipes name. `crew` does the work.
+    of depth take. `z_mm` are depths to look at instead of those that recipes name. `executor` does the work.
 
     Rows are added to out/rows.jsonl as they are measured, and rows already in it are not measured again
     unless other software made them (see `pcii.store.software`): `again` in the result says how many
@@ -81,7 +81,7 @@ def evaluate(
     """
     folder = Path(out)
     named = named_functions(methods)
-    if crew != ALONE:
+    if executor != ALONE:
         _check_sendable(named)
     tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
     claim_rows(folder)
@@ -96,7 +96,7 @@ def evaluate(
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
     measuring = Measuring(remaining, folder.resolve())
-    with closing(crew.run(measuring, range(len(remaining)), report)) as work:
+    with closing(executor.run(measuring, range(len(remaining)), report)) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain, results_folder, say, say_next
-from pcii.base.crew import ALONE, Crew
+from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, new_recipe, new_scene
 from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
@@ -67,7 +67,7 @@ def generate(
     set: Overrides = (),
     seeds: int | None = None,
     scenes: int | None = None,
-    crew: Annotated[Crew, Parameter(name="*")] = ALONE,
+    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
 
@@ -117,7 +117,7 @@ def generate(
                 f"radiance is rendered for each of {len(sweep)} datasets, which may take most of the time; "
                 "--set products.radiance=none leaves it out"
             )
-        faults = generate_collection(sweep, out, crew, report)
+        faults = generate_collection(sweep, out, executor, report)
         write_card(out, terms)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
     for fault in faults[:MOST_TOLD]:

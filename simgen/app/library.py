@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pcii.base.crew import ALONE, Crew
 from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.exporting.card_files import write_card
 from pcii.io.collection import Collection, open_collection
@@ -101,23 +101,23 @@ def generate_collection(
     *,
     seeds: int | None = None,
     scenes: int | None = None,
-    crew: Crew = ALONE,
+    executor: Executor = ALONE,
     report: Report = silent,
 ) -> Collection:
     """Make all datasets of a recipe whose fields have several values in the folder `out`, and open them.
 
-    What `simgen generate` does of such a recipe, with its options; `crew` does the work. Raises
+    What `simgen generate` does of such a recipe, with its options; `executor` does the work. Raises
     `pcii.InputError` for a recipe that is wrong or has one value for each field, for a folder that holds
     something else, and, once all others are made, for a dataset that could not be made.
 
     >>> collection = generate_collection("paper", "out/dimmer", ["photons.budget=[100,300]"], seeds=5,
-    ...                                  crew=Crew(workers=2))                      # doctest: +SKIP
+    ...                                  executor=Executor(workers=2))                      # doctest: +SKIP
     >>> [dataset.counts.total for dataset in collection.where(budget=100)]          # doctest: +SKIP
     """
     sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes)
     if not sweep.axes:
         raise InputError(f"{sweep.source}: no field has several values; use simgen.generate for one dataset")
-    faults = collections.generate_collection(sweep, Path(out), crew, report)
+    faults = collections.generate_collection(sweep, Path(out), executor, report)
     write_card(Path(out), sweep.recipe(0).publication.terms())
     if faults:
         raise InputError(

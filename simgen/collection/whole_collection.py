@@ -3,7 +3,7 @@
 from contextlib import closing
 from pathlib import Path
 
-from pcii.base.crew import ALONE, Crew
+from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.store.safe_files import named_in_errors
 from simgen.collection.collection_folder import Row, begin, write_whole_index
@@ -12,7 +12,9 @@ from simgen.renderer import backend
 from simgen.spec.sweeps import Sweep
 
 
-def generate_collection(sweep: Sweep, out: Path, crew: Crew = ALONE, report: Report = silent) -> list[str]:
+def generate_collection(
+    sweep: Sweep, out: Path, executor: Executor = ALONE, report: Report = silent
+) -> list[str]:
     """Make all datasets of a sweep in the folder `out`, or go on with them; faults of those that failed.
 
     A dataset that cannot be made holds up no other. The index is written at the end, also of work that is
@@ -25,7 +27,7 @@ def generate_collection(sweep: Sweep, out: Path, crew: Crew = ALONE, report: Rep
         begin(sweep, out)
     rows, faults, pieces = dict[int, Row](), list[str](), range(len(sweep))
     try:
-        with closing(crew.run(DatasetJob(sweep, out), pieces, report)) as work:
+        with closing(executor.run(DatasetJob(sweep, out), pieces, report)) as work:
             for done in work:
                 if done.result is None:
                     faults.append(done.fault)

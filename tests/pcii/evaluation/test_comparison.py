@@ -16,8 +16,8 @@ from tiny_datasets import NESTED, OWN, by_count, two_rows, write_dataset
 
 from pcii.app import commands as cli
 from pcii.base import command_line
-from pcii.base.crew import Crew
 from pcii.base.errors import InputError
+from pcii.base.executor import Executor
 from pcii.core.estimates import DepthMap
 from pcii.evaluation import evaluation_pages
 from pcii.evaluation.comparison import evaluate, find_datasets
@@ -284,7 +284,7 @@ def test_functions_are_compared_like_methods_with_a_name(series: Path, tmp_path:
     assert result_of(evaluation, OWN, "by_count")["object"]["iou"]["mean"] == pytest.approx(0.85)
     assert result_of(evaluation, OWN, "rows")["object"]["iou"]["mean"] == pytest.approx(10 / 48)
     assert result_of(evaluation, OWN, "depth:near")["depth"]["bad_1px"]["mean"] == 0.5
-    shared = evaluate([series], tmp_path / "out", **asked, crew=Crew(2))
+    shared = evaluate([series], tmp_path / "out", **asked, executor=Executor(2))
     assert without_seconds(shared) == without_seconds(evaluation)
     assert len(rows_of(tmp_path / "out")) == len(rows_of(tmp_path / "alone")) == 12
     # Nobody knows what they follow from, so they are measured whenever they are named.
@@ -312,7 +312,7 @@ def test_functions_that_cannot_be_compared_are_refused(
     series: Path, tmp_path: Path, methods: list[Any], sentence: str
 ) -> None:
     with pytest.raises(InputError, match=f"^methods: {sentence}"):
-        evaluate([series], tmp_path / "out", methods=methods, crew=Crew(2))
+        evaluate([series], tmp_path / "out", methods=methods, executor=Executor(2))
     assert not (tmp_path / "out").exists()
 
 

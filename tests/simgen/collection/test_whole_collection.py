@@ -1,10 +1,8 @@
 """Collections: each dataset is what it would be alone, whoever makes it; resumed, shared, extended."""
 
-import os
+import multiprocessing
 import shutil
-import signal
-import subprocess
-import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,8 +11,8 @@ from digests import digest
 from tiny import GRID_2_X_3
 
 from pcii.base import command_line
-from pcii.base.crew import Crew
 from pcii.base.errors import InputError
+from pcii.base.executor import Executor
 from pcii.io.collection import open_collection
 from pcii.io.collection_layout import COLLECTION, INDEX
 from pcii.io.dataset import open_dataset
@@ -197,44 +195,26 @@ def test_verification_says_what_is_unfinished_and_what_belongs_to_nothing(
         verify(out)
 
 
-def test_workers_make_the_same_bytes_and_the_same_index_but_for_times(
+def test_workers_make_the_same_bytes_though_one_is_killed(
     recipe_file: Path, collection: Path, tmp_path: Path
 ) -> None:
-    assert generate_collection(sweep_of(recipe_file), tmp_path / "two", Crew(workers=2)) == []
-    assert digest_of_all(tmp_path / "two") == digest_of_all(collection)
+    out, killed = tmp_path / "two", list[int | None]()
+
+    def kill() -> None:
+        while not list(out.glob("*/.unfinished.json")):
+            time.sleep(0.005)
+        worker = multiprocessing.active_children()[0]
+        killed.append(worker.pid)
+        worker.kill()
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    assert generate_collection(sweep_of(recipe_file), out, Executor(workers=2)) == []
+    killer.join(timeout=10)
+    assert killed
+    assert digest_of_all(out) == digest_of_all(collection)
 
 
 def digest_of_all(collection: Path) -> dict[str, dict[str, str]]:
     rows = open_collection(collection).rows
     return {row["path"]: digest(collection / row["path"]) for row in rows}
-
-
-def start(recipe_file: Path, out: Path, *more: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-c", "from simgen.app.commands import main; raise SystemExit(main())"]
-    given = ["generate", str(recipe_file), "-o", str(out), "--seeds", "3", *more]
-    return subprocess.Popen([*command, *given], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-
-
-def test_a_killed_worker_is_replaced(recipe_file: Path, collection: Path, tmp_path: Path) -> None:
-    out, killed = tmp_path / "killed", set[int]()
-    process = start(recipe_file, out, "--workers", "2")
-    until = time.monotonic() + 100
-    while len(killed) < 1 and process.poll() is None and time.monotonic() < until:
-        if list(out.glob("*/.unfinished.json")):
-            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-            for child in children:
-                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
-                    os.kill(int(child), signal.SIGKILL)
-                    killed.add(int(child))
-                    break
-        time.sleep(0.01)
-    _, told = process.communicate(timeout=120)
-    assert killed
-    assert process.returncode == 0, told.decode()
-    assert digest_of_all(out) == digest_of_all(collection)
-
-
-def test_crews_that_make_no_sense_are_refused() -> None:
-    for workers, scheduler, resource in ((0, None, None), (2, "tcp://here", None), (1, None, "GPU")):
-        with pytest.raises(InputError):
-            Crew(workers, scheduler, resource)

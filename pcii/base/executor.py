@@ -13,7 +13,7 @@ MOST_WORKERS = 1024
 
 
 @dataclass(frozen=True)
-class Crew:
+class Executor:
     """Who does a job; raises `InputError` for a number of workers that makes no sense, and for both kinds."""
 
     workers: int = 1
@@ -50,7 +50,7 @@ class Crew:
             yield from _run_here(job, pieces)
 
 
-ALONE = Crew()
+ALONE = Executor()
 """This process."""
 
 
