@@ -20,8 +20,8 @@ Function = Callable[..., Any]
 
 
 @dataclass(frozen=True)
-class MethodDoor:
-    """Where methods are asked for by name.
+class MethodRegistry:
+    """Methods by name, built in or of installed packages.
 
     `group` is that of entry points by which other packages register theirs; `built_in` has functions, or
     "module:function" of those that are loaded only when they are asked for. `checked` makes a method of a

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.extensions import MethodDoor, called
+from pcii.base.extensions import MethodRegistry, called
 from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.focal_planes import check_data
 from pcii.core.images import Views
@@ -98,13 +98,13 @@ def depth_methods(data: PhotonCounts | Views | None = None) -> tuple[str, ...]:
     >>> depth_methods()
     ('posterior', 'focus', 'likelihood-sweep', 'variance-sweep', 'structure-tensor')
     """
-    return DOOR.names(_built_in(data))
+    return REGISTRY.names(_built_in(data))
 
 
 def find_depth_method(method: str | Method, data: PhotonCounts | Views) -> Method:
     """The method of this name, or a function, checked; `InputError` listing the names for such data."""
     kind = "photon counts" if isinstance(data, PhotonCounts) else "radiance"
-    return DOOR.find(method, f"estimator of depth from {kind}", _built_in(data))
+    return REGISTRY.find(method, f"estimator of depth from {kind}", _built_in(data))
 
 
 def _checked(estimate: Callable[..., object], label: str, name: str | None) -> Method:
@@ -131,4 +131,4 @@ def _built_in(data: PhotonCounts | Views | None) -> dict[str, Method | str]:
     return FOR_COUNTS if isinstance(data, PhotonCounts) else FOR_VIEWS
 
 
-DOOR = MethodDoor(GROUP, BUILT_IN, _checked)
+REGISTRY = MethodRegistry(GROUP, BUILT_IN, _checked)

@@ -61,7 +61,7 @@ def machine() -> str:
 def _entry_point(method: str) -> "EntryPoint | None":
     """Where another package has the method; None for a built-in one."""
     estimator = estimator_of(method)
-    return removal.DOOR.point_of(method) if estimator is None else depth.DOOR.point_of(estimator)
+    return removal.REGISTRY.point_of(method) if estimator is None else depth.REGISTRY.point_of(estimator)
 
 
 def _processor() -> str:

@@ -1,6 +1,6 @@
 """Removal methods by name: which points of each section are in focus."""
 
-from pcii.base.extensions import MethodDoor
+from pcii.base.extensions import MethodRegistry
 from pcii.core.estimates import Segmented
 from pcii.core.focal_planes import check_depth_counts
 from pcii.core.photon_counts import PhotonCounts
@@ -51,12 +51,12 @@ def removal_methods() -> tuple[str, ...]:
     >>> removal_methods()[:2]
     ('three-step', 'likelihood')
     """
-    return DOOR.names()
+    return REGISTRY.names()
 
 
 def find_method(method: str | plugins.Method) -> plugins.Method:
     """The removal of this name, or a function, checked; `InputError` listing the known names."""
-    return DOOR.find(method, "removal")
+    return REGISTRY.find(method, "removal")
 
 
 METHODS: dict[str, plugins.Method | str] = {
@@ -68,6 +68,6 @@ METHODS: dict[str, plugins.Method | str] = {
     "shape-from-focus": "pcii.baselines.simple_removals:shape_from_focus",
 }
 """The built-in methods; those to compare with are loaded when they are asked for."""
-DOOR = MethodDoor(plugins.GROUP, METHODS, plugins.checked)
+REGISTRY = MethodRegistry(plugins.GROUP, METHODS, plugins.checked)
 DEFAULT_METHODS = ("three-step", "likelihood")
 """The methods of `pcii run` without `--method`."""
