@@ -28,7 +28,7 @@ def duelled(
     plane: np.ndarray,
     touching: np.ndarray,
     regions: Sequence[Region],
-    own_spread_px: np.ndarray,
+    own_disparity_px: np.ndarray,
 ) -> np.ndarray:
     """The planes (h, w) of cells after depths were compared photon by photon in `touching` (h, w) bool.
 
@@ -36,10 +36,12 @@ def duelled(
     """
     strong = _strong(regions)
     named = {region.plane for region in strong}
-    idle = {(float(spread), own) for own, spread in enumerate(own_spread_px) if own not in named}
-    labels = sorted({(region.spread_px, region.plane) for region in strong} | idle)
+    idle = {
+        (float(disparity_px), own) for own, disparity_px in enumerate(own_disparity_px) if own not in named
+    }
+    labels = sorted({(region.total_disparity_px, region.plane) for region in strong} | idle)
     focus, seen = predictions_of(
-        counts, FocalPlanes.at_total_disparity(counts.grid, [spread for spread, _ in labels])
+        counts, FocalPlanes.at_total_disparity(counts.grid, [disparity_px for disparity_px, _ in labels])
     )
     gain = _duel(counts, focus.planes, seen)
     # Any change costs the same: these labels are in no order.

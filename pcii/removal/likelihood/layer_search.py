@@ -34,11 +34,11 @@ LEAST_NATS, PRIOR_SHARE = 5.0, 0.35
 fit that follows noise pays in full, but of pieces that are guessed there are few."""
 
 
-def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
+def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
     """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
 
-    `spread_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed, and the
-    nearest that they lead to; from the one of least E pieces are guessed anew. Deterministic.
+    `total_disparity_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed,
+    and the nearest that they lead to; from the one of least E pieces are guessed anew. Deterministic.
     """
     lit = np.max(starts, axis=0) >= 0
     if not lit.any():
@@ -46,10 +46,10 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
     grid = counts.grid
     most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
     few = counts.subsample(most, np.random.default_rng(0))
-    dark = background_bounds(few, float(spread_px[len(spread_px) // 2]))
-    box = _box_of_light(lit, grid, spread_px)
+    dark = background_bounds(few, float(total_disparity_px[len(total_disparity_px) // 2]))
+    box = _box_of_light(lit, grid, total_disparity_px)
     cut = _cut_out(few, box)
-    layers = Layers(cut, spread_px, dark)
+    layers = Layers(cut, total_disparity_px, dark)
     different: list[np.ndarray] = []
     for start in starts:
         if not any(np.array_equal(start, other) for other in different):
@@ -60,17 +60,17 @@ def layered(counts: PhotonCounts, spread_px: np.ndarray, starts: Sequence[np.nda
         found.append(_settled(layers, np.max([seen for _, seen in found], axis=0)))
     best = min(found, key=lambda one: one[0])[1]
     result = np.full(starts[0].shape, -1)
-    if len(spread_px) > 1:
-        best = _guessed_anew(layers, Layers(cut, np.repeat(spread_px, 2), dark), best)
+    if len(total_disparity_px) > 1:
+        best = _guessed_anew(layers, Layers(cut, np.repeat(total_disparity_px, 2), dark), best)
     result[box] = best
     return result
 
 
-def _box_of_light(lit: np.ndarray, grid: CameraGrid, spread_px: np.ndarray) -> tuple[slice, slice]:
+def _box_of_light(lit: np.ndarray, grid: CameraGrid, total_disparity_px: np.ndarray) -> tuple[slice, slice]:
     """Rows and columns of cells around all that is `lit` (h, w), and as far as its light goes by parallax."""
     down, right = (
         int(np.ceil(np.abs(shifts).max() / CELL_PX)) + AROUND_CELLS
-        for shifts in FocalPlanes.at_total_disparity(grid, spread_px).whole_shifts_px
+        for shifts in FocalPlanes.at_total_disparity(grid, total_disparity_px).whole_shifts_px
     )
     return box_around(lit, (down, right))
 

@@ -41,13 +41,13 @@ than a quarter of what a photon typically sees. If there is no dark, a tenth of 
 DARK_CELLS = 3
 
 
-def background_bounds(counts: PhotonCounts, spread_px: float) -> tuple[float, float]:
+def background_bounds(counts: PhotonCounts, total_disparity_px: float) -> tuple[float, float]:
     """The least and the most light behind all things, in photons per cell and view, from one section."""
     from scipy.ndimage import gaussian_filter
 
     grid, events = counts.grid, counts.events
     V, (h, w) = grid.view_count, cell_shape(counts)
-    planes = FocalPlanes.at_total_disparity(grid, spread_px)
+    planes = FocalPlanes.at_total_disparity(grid, total_disparity_px)
     row, col, inside = planes.project(events, 0)
     cell = (row // CELL_PX * w + col // CELL_PX)[inside]
     photons = np.bincount(cell, events.n[inside], h * w).reshape(h, w)
@@ -82,21 +82,23 @@ def _views_of(
 class Layers:
     """The masks (D, h, w), and who hides what while they are fitted.
 
-    `spread_px` (D,) ascends, from far to near; `dark` is the least and the most light behind all
+    `total_disparity_px` (D,) ascends, from far to near; `dark` is the least and the most light behind all
     (`background_bounds`).
     """
 
-    def __init__(self, counts: PhotonCounts, spread_px: np.ndarray, dark: tuple[float, float]) -> None:
+    def __init__(
+        self, counts: PhotonCounts, total_disparity_px: np.ndarray, dark: tuple[float, float]
+    ) -> None:
         from pcii.evidence.projection_kernels import cells_of_events
 
         grid, events = counts.grid, counts.events
         self.film = grid.height, grid.width
         self.least_dark, self.most_dark = dark
-        self.rows, self.cols = FocalPlanes.at_total_disparity(grid, spread_px).whole_shifts_px
+        self.rows, self.cols = FocalPlanes.at_total_disparity(grid, total_disparity_px).whole_shifts_px
         self.n = events.n.astype(np.float32)
         self.place = events.k, events.l, events.i, events.j
         self.colours, self.sites = counts.event_colours, sites_of_colours(counts.cfa)
-        D, V, N, (h, w) = len(spread_px), grid.view_count, self.n.size, cell_shape(counts)
+        D, V, N, (h, w) = len(total_disparity_px), grid.view_count, self.n.size, cell_shape(counts)
         self.masks = np.zeros((D, h, w), dtype=bool)
         # How many px of each view's cell nearer layers cover.
         self.covered = np.zeros((V, h, w), np.uint16)

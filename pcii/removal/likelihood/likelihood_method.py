@@ -60,16 +60,16 @@ from pcii.sections.reconstruction import reconstruct
 
 SEARCH_STEP_PX = 2.0
 SEARCHED_PX = 30.0
-"""Depths are searched this far beyond the planes, in px of total disparity spread: there is evidence of what
-is defocused, too."""
+"""Depths are searched this far beyond the planes, in px of total disparity: there is evidence of what is
+defocused, too."""
 NEAR_PX = 4.5
 FOCUS_PX = 10.0
-"""A surface is a plane's if it is within 4.5 px of total spread; a round object's outline lies behind what is
-seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
+"""A surface is a plane's if it is within 4.5 px of total disparity; a round object's outline lies behind what
+is seen of it, so that a region may be 10 px away, 5 px of blur, before it counts as defocused."""
 MISPLACED_PX = 1.0 + SEARCH_STEP_PX / 2
-"""Largest distance, in px of total spread, between a surface and the searched depth at which its evidence is
-largest: 1 px, since the whole-pixel shifts of the cameras at both ends are half a pixel off, and half a step
-of the search."""
+"""Largest distance, in px of total disparity, between a surface and the searched depth at which its evidence
+is largest: 1 px, since the whole-pixel shifts of the cameras at both ends are half a pixel off, and half a
+step of the search."""
 STEP_NATS = 0.05
 OUTLINE_CELLS = 3
 """Between things that layers told apart a border is theirs; outlines are drawn this near to the dark."""
@@ -86,16 +86,18 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
     what is not dark (H, W repeated); `region`, the numbers of regions that are in focus.
     """
     grid = counts.grid
-    own_spread, which = np.unique(sections.planes.total_disparity_px, return_inverse=True)
-    planes = searched_planes(own_spread)
+    own_disparity_px, which = np.unique(sections.planes.total_disparity_px, return_inverse=True)
+    planes = searched_planes(own_disparity_px)
     # More photons would not tell planes apart better, only later; outlines take all of them.
     most = max(ENOUGH_PHOTONS, ENOUGH_PER_PX * grid.height * grid.width)
     enough = without_hot_pixels(counts).subsample(most, np.random.default_rng(0))
-    searched = FocalPlanes.at_total_disparity(grid, planes.spread_px)
+    searched = FocalPlanes.at_total_disparity(grid, planes.total_disparity_px)
     focus, halves = focus_evidence(enough, searched), halves_of(enough, searched)
     close = np.flatnonzero(planes.away_px <= NEAR_PX)
     evidence = windowed(focus.gain[close], focus.photons[close])
-    label = best_labels(evidence, STEP_NATS * np.diff(planes.spread_px[close]) / SEARCH_STEP_PX, JUMP_NATS)
+    label = best_labels(
+        evidence, STEP_NATS * np.diff(planes.total_disparity_px[close]) / SEARCH_STEP_PX, JUMP_NATS
+    )
     photons = focus.photons[close].sum(axis=1)
     shown = np.take_along_axis(photons, label[None], axis=0)[0]
     bright = bright_cells(shown)
@@ -107,21 +109,21 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
     if faint or touching.any():
         starts = [plane]
         if touching.any():
-            plane = duelled(enough, plane, touching, regions, own_spread)
+            plane = duelled(enough, plane, touching, regions, own_disparity_px)
             # Once more: what was one region may be several now, at depths of their own.
             parted = regions_of(plane, bright, focus, planes, halves)[1]
-            starts.append(duelled(enough, plane, touching, parted, own_spread))
+            starts.append(duelled(enough, plane, touching, parted, own_disparity_px))
         # A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part,
         # and none is to have it. It is left alone, unless there is too little light to see where it ends.
         fitted = ~dilated(bright & ~touching & (not faint), HALO_CELLS)
-        plane = np.where(fitted, layered(enough, own_spread, starts), starts[0])
+        plane = np.where(fitted, layered(enough, own_disparity_px, starts), starts[0])
         plane = np.where(dark_pieces(plane, bright), -1, plane)
         numbers, regions = regions_of(plane, plane >= 0, focus, planes, halves)
     inner = fitted & ~dilated(plane < 0, OUTLINE_CELLS)
-    masks, belongs = _outlines(counts, regions, numbers, inner, own_spread.size)
+    masks, belongs = _outlines(counts, regions, numbers, inner, own_disparity_px.size)
     # Surfaces are opaque: of several planes that a photon may have come from, it came from the nearest.
-    own = np.where(belongs.any(axis=0), own_spread.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
-    best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_spread.size)])
+    own = np.where(belongs.any(axis=0), own_disparity_px.size - 1 - np.argmax(belongs[::-1], axis=0), -1)
+    best = np.stack([evidence[planes.nearest[close] == p].max(axis=0) for p in range(own_disparity_px.size)])
     in_focus = masks[which]
     steps = {
         "evidence": np.stack([_on_pixels(best[p], grid) for p in which]),
@@ -131,19 +133,19 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
     return Segmented(in_focus, "likelihood", sections, steps, own == which[:, None])
 
 
-def searched_planes(own_spread_px: np.ndarray) -> Planes:
-    """The planes' own depths, and others in steps of 2 px of total spread up to 30 px around each."""
+def searched_planes(own_disparity_px: np.ndarray) -> Planes:
+    """The planes' own depths, and others in steps of 2 px of total disparity up to 30 px around each."""
     steps = np.arange(-SEARCHED_PX, SEARCHED_PX + SEARCH_STEP_PX, SEARCH_STEP_PX)
-    between = np.unique(np.round((own_spread_px[:, None] + steps) / SEARCH_STEP_PX)) * SEARCH_STEP_PX
+    between = np.unique(np.round((own_disparity_px[:, None] + steps) / SEARCH_STEP_PX)) * SEARCH_STEP_PX
     between = between[between >= SEARCH_STEP_PX]
-    apart = np.abs(between[:, None] - own_spread_px[None]).min(axis=1)
-    spread = np.sort(np.concatenate([own_spread_px, between[apart >= SEARCH_STEP_PX / 2]]))
-    away = np.abs(spread[:, None] - own_spread_px[None])
+    apart = np.abs(between[:, None] - own_disparity_px[None]).min(axis=1)
+    disparity_px = np.sort(np.concatenate([own_disparity_px, between[apart >= SEARCH_STEP_PX / 2]]))
+    away = np.abs(disparity_px[:, None] - own_disparity_px[None])
     nearest, away_px = np.argmin(away, axis=1), away.min(axis=1)
     # A depth midway between planes may be of a surface at either; that of a plane is its own.
     alone = (away <= away_px[:, None] + 2 * MISPLACED_PX).sum(axis=1) == 1
     sure = (away_px <= NEAR_PX) & (alone | (away_px == 0))
-    return Planes(spread, nearest, away_px, sure, FOCUS_PX)
+    return Planes(disparity_px, nearest, away_px, sure, FOCUS_PX)
 
 
 def _outlines(
@@ -162,13 +164,13 @@ def _outlines(
     number_of = _on_pixels(np.where(np.isin(numbers, firm), numbers, 0), grid)
     masks = np.zeros((planes, *grid.shape_HW), dtype=bool)
     belongs = np.zeros((planes, counts.events.n.size), dtype=bool)
-    spreads = sorted({region.spread_px for region in regions if region.is_there})
+    disparities_px = sorted({region.total_disparity_px for region in regions if region.is_there})
     found: list[tuple[Region, tuple[slice, slice], Future[np.ndarray]]] = []
     with ThreadPoolExecutor(threads()) as pool:
-        for spread in spreads:
-            section = reconstruct(counts, FocalPlanes.at_total_disparity(grid, spread))
+        for disparity_px in disparities_px:
+            section = reconstruct(counts, FocalPlanes.at_total_disparity(grid, disparity_px))
             for region in regions:
-                if not region.is_there or region.spread_px != spread:
+                if not region.is_there or region.total_disparity_px != disparity_px:
                     continue
                 start = number_of == region.number
                 box = box_around(start)
@@ -178,10 +180,10 @@ def _outlines(
                     part[0][box].astype(np.float32) for part in (section.counts, section.coverage)
                 )
                 found.append((region, box, pool.submit(outlined, photons, samples, start[box], taken)))
-    for spread in spreads:
-        row, col, inside = FocalPlanes.at_total_disparity(grid, spread).project(counts.events, 0)
+    for disparity_px in disparities_px:
+        row, col, inside = FocalPlanes.at_total_disparity(grid, disparity_px).project(counts.events, 0)
         for region, box, outline in found:
-            if region.spread_px == spread:
+            if region.total_disparity_px == disparity_px:
                 mask = np.zeros(grid.shape_HW, dtype=bool)
                 mask[box] = np.where(inner[box], number_of[box] == region.number, outline.result())
                 masks[region.plane] |= mask

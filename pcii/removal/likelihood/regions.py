@@ -48,7 +48,7 @@ class Region:
     number: int
     plane: int
     cells: int
-    spread_px: float
+    total_disparity_px: float
     gain_nats: float
     is_there: bool
 
@@ -57,12 +57,12 @@ class Region:
 class Planes:
     """Which of the searched depths count as which plane.
 
-    `nearest` (Z,) is the plane (P,) that each searched spread is closest to, `away_px` (Z,) how far in px of
-    total spread. Within `far_px` a depth is in the plane's focus; the plane's own it is if it is `sure` (Z,)
-    bool: so near it, and so far from all others, that a surface which shows best there is none of theirs.
+    `nearest` (Z,) is the plane (P,) that each searched depth is closest to, `away_px` (Z,) how far in px of
+    total disparity. Within `far_px` a depth is in the plane's focus; the plane's own it is if it is `sure`
+    (Z,) bool: so near it, and so far from all others, that a surface that shows best there is not of theirs.
     """
 
-    spread_px: np.ndarray
+    total_disparity_px: np.ndarray
     nearest: np.ndarray
     away_px: np.ndarray
     sure: np.ndarray
@@ -200,7 +200,7 @@ def regions_of(
                     number,
                     int(own) if is_there else -1,
                     cells,
-                    float(planes.spread_px[best]),
+                    float(planes.total_disparity_px[best]),
                     float(sure_nats[best]),
                     bool(is_there),
                 )

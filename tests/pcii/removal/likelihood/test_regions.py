@@ -17,11 +17,11 @@ from pcii.removal.likelihood.regions import (
 SHAPE = (30, 40)
 SURE_NATS = 10.0  # of chance once in e^10 = 20 000 times
 HALO_CELLS = 4  # a blurred outline shows up to 16 px outside
-# Two planes, at 20 and 40 px of spread, among five searched depths.
-SPREAD_PX = np.array([10.0, 20.0, 30.0, 40.0, 60.0])
-SEARCHED = FocalPlanes.at_total_disparity(unit_grid(3, 3, 120, 160), SPREAD_PX)
+# Two planes, at 20 and 40 px of total disparity, among five searched depths.
+TOTAL_PX = np.array([10.0, 20.0, 30.0, 40.0, 60.0])
+SEARCHED = FocalPlanes.at_total_disparity(unit_grid(3, 3, 120, 160), TOTAL_PX)
 PLANES = Planes(
-    spread_px=SPREAD_PX,
+    total_disparity_px=TOTAL_PX,
     nearest=np.array([0, 0, 0, 1, 1]),
     away_px=np.array([10.5, 0.0, 10.5, 0.0, 20.0]),
     sure=np.array([False, True, False, True, False]),
@@ -29,7 +29,7 @@ PLANES = Planes(
 )
 FIRST, BETWEEN, SECOND = 1, 2, 3
 
-BLOCKS = [(SPREAD_PX.size, -(-SHAPE[0] // side), -(-SHAPE[1] // side)) for side in (1, 2, 4, 8)]
+BLOCKS = [(TOTAL_PX.size, -(-SHAPE[0] // side), -(-SHAPE[1] // side)) for side in (1, 2, 4, 8)]
 
 
 def halves_with(p: list[np.ndarray]) -> Halves:
@@ -52,10 +52,10 @@ def box(top: int, left: int, height: int, width: int) -> np.ndarray:
 
 def focus_with(*gains: tuple[int, np.ndarray, float]) -> FocusEvidence:
     """Evidence that is 0 but for (depth, where, nats in all)."""
-    gain = np.zeros((SPREAD_PX.size, *SHAPE), np.float32)
+    gain = np.zeros((TOTAL_PX.size, *SHAPE), np.float32)
     for depth, where, nats in gains:
         gain[depth][where] += nats / where.sum()
-    return FocusEvidence(SEARCHED, gain, np.zeros((SPREAD_PX.size, 1, *SHAPE), np.float32))
+    return FocusEvidence(SEARCHED, gain, np.zeros((TOTAL_PX.size, 1, *SHAPE), np.float32))
 
 
 def test_without_photons_nothing_is_bright():
@@ -148,16 +148,16 @@ def test_a_piece_is_what_explains_it_better_though_only_a_speck_beside_it_shows_
     assert (result[mistaken | speck] == 1).all()
 
 
-@pytest.mark.parametrize(("spread_px", "stays"), [(26.0, True), (28.6, True), (30.0, False)])
-def test_what_shows_best_midway_between_planes_is_no_reason_to_part_a_thing(spread_px, stays):
-    # Planes at 28.6 and 34 px of total spread: what shows best at 30 px may be at 32, nearer the other.
+@pytest.mark.parametrize(("total_disparity_px", "stays"), [(26.0, True), (28.6, True), (30.0, False)])
+def test_what_shows_best_midway_between_planes_is_no_reason_to_part_a_thing(total_disparity_px, stays):
+    # Planes at 28.6 and 34 px of total disparity: what shows best at 30 px may be at 32, nearer the other.
     thing, rim = box(5, 5, 12, 12), box(5, 17, 9, 3)
     planes = searched_planes(np.array([28.6, 34.0]))
-    gain = np.zeros((planes.spread_px.size, *SHAPE), np.float32)
-    shown = int(np.argmin(np.abs(planes.spread_px - spread_px)))
-    for depth, where in ((shown, rim), (int(np.argmin(np.abs(planes.spread_px - 34.0))), thing)):
+    gain = np.zeros((planes.total_disparity_px.size, *SHAPE), np.float32)
+    shown = int(np.argmin(np.abs(planes.total_disparity_px - total_disparity_px)))
+    for depth, where in ((shown, rim), (int(np.argmin(np.abs(planes.total_disparity_px - 34.0))), thing)):
         gain[depth][where] = 10.0
-    searched = FocalPlanes.at_total_disparity(SEARCHED.grid, planes.spread_px)
+    searched = FocalPlanes.at_total_disparity(SEARCHED.grid, planes.total_disparity_px)
     focus = FocusEvidence(searched, gain, np.zeros((len(gain), 1, *SHAPE), np.float32))
     result = settled(np.where(rim, 0, 1), thing | rim, focus, planes)
     assert (result[rim] == (0 if stays else 1)).all()
@@ -194,7 +194,7 @@ def test_a_region_is_at_the_depth_that_gains_most_with_the_dark_around_it():
     focus = focus_with((FIRST, piece, 15.0), (FIRST, around, 7.0), (FIRST, too_far, 900.0))
     numbers, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     np.testing.assert_array_equal(numbers, piece)
-    assert (region.number, region.plane, region.cells, region.spread_px) == (1, 0, 36, 20.0)
+    assert (region.number, region.plane, region.cells, region.total_disparity_px) == (1, 0, 36, 20.0)
     assert region.gain_nats == pytest.approx(22.0, rel=1e-5)  # sums of single precision
     assert region.is_there
 
@@ -206,7 +206,7 @@ def test_a_region_that_another_depth_explains_better_is_not_there(depth):
     _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert not region.is_there
     assert region.plane == -1
-    assert region.spread_px == SPREAD_PX[depth]
+    assert region.total_disparity_px == TOTAL_PX[depth]
 
 
 @pytest.mark.parametrize(("side_cells", "is_there"), [(6, True), (4, False)])
@@ -268,7 +268,7 @@ NOISE_NATS = 1000.0  # what noise costs at each depth, give or take sqrt(2000) =
 def test_a_large_dim_region_is_there_if_its_depth_stands_out_of_the_noise(sigmas, is_there):
     # 10 nats are e^-(s^2 / 2) = e^-10, s = 4.5 standard deviations.
     piece = box(5, 5, 20, 30)
-    costs = [(depth, piece, -NOISE_NATS) for depth in range(SPREAD_PX.size)]
+    costs = [(depth, piece, -NOISE_NATS) for depth in range(TOTAL_PX.size)]
     focus = focus_with(*costs, (FIRST, piece, sigmas * np.sqrt(2 * NOISE_NATS)))
     _, (region,) = regions_of(np.zeros(SHAPE, np.int64), piece, focus, PLANES, AGREED)
     assert region.is_there == is_there
@@ -287,14 +287,14 @@ def test_of_few_photons_the_evidence_itself_counts(elsewhere):
 def test_noise_alone_is_never_sure(photons_per_px):
     # The whole of a film on which nothing is: about a hundred nats of noise at each of 11 depths that may be
     # a plane's. Five films are at most 55 trials, of which e^-10 is not one.
-    size, spread_px = 256, np.arange(60.0, 140.0, 2.0)
-    away = np.abs(spread_px - 100)
-    planes = Planes(spread_px, np.zeros(away.size, np.int64), away, sure=away <= 4.5, far_px=10.0)
+    size, total_disparity_px = 256, np.arange(60.0, 140.0, 2.0)
+    away = np.abs(total_disparity_px - 100)
+    planes = Planes(total_disparity_px, np.zeros(away.size, np.int64), away, sure=away <= 4.5, far_px=10.0)
     everything = np.ones((size // 4, size // 4), dtype=bool)
     grid = paper_grid(size, size)
     for seed in range(5):
         counts = even_light(grid, photons_per_px / 100, seed, "GRBG")
-        searched = FocalPlanes.at_total_disparity(counts.grid, spread_px)
+        searched = FocalPlanes.at_total_disparity(counts.grid, total_disparity_px)
         focus, halves = focus_evidence(counts, searched), halves_of(counts, searched)
         _, (region,) = regions_of(np.zeros(everything.shape, np.int64), everything, focus, planes, halves)
         assert not region.is_there
