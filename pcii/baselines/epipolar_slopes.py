@@ -28,8 +28,8 @@ def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:
     grid = data.grid
     per_camera = max(grid.rows, grid.cols) - 1
     planes = FocalPlanes.between(grid, *z_range_mm, PLANE_STEP_PX * per_camera)
-    film = grid.height, grid.width
-    found_px, coherence = np.full(film, np.nan), np.zeros(film)
+    shape_HW = grid.shape_HW
+    found_px, coherence = np.full(shape_HW, np.nan), np.zeros(shape_HW)
     lines = _cross(data)
     for plane, total_px in enumerate(planes.total_disparity_px):
         slope, clear = _slope(lines, planes.take([plane]))

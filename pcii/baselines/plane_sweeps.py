@@ -125,16 +125,20 @@ def _swept(
     Sections, which have these `options`, are made of a few planes at a time.
     """
     planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
-    film = data.grid.height, data.grid.width
-    best = np.zeros(film, np.int64)
-    nearby, last, least = np.full((3, *film), -np.inf), np.full(film, -np.inf), np.full(film, np.inf)
+    shape_HW = data.grid.shape_HW
+    best = np.zeros(shape_HW, np.int64)
+    nearby, last, least = (
+        np.full((3, *shape_HW), -np.inf),
+        np.full(shape_HW, -np.inf),
+        np.full(shape_HW, np.inf),
+    )
     for first in range(0, len(planes), BATCH):
         sections = reconstruct(data, planes.take(slice(first, first + BATCH)), **options)
         for within in range(len(sections.planes)):
             plane, current = first + within, measure(sections, within)
             nearby[2] = np.where(best == plane - 1, current, nearby[2])
             better = current > nearby[1]
-            nearby[:, better] = np.stack([last, current, np.full(film, -np.inf)])[:, better]
+            nearby[:, better] = np.stack([last, current, np.full(shape_HW, -np.inf)])[:, better]
             best[better] = plane
             last, least = current, np.minimum(least, current)
     # Where all planes are alike there is nothing to choose from.

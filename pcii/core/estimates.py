@@ -84,9 +84,9 @@ class Segmented(Brief):
         from pcii.figures.panels import draw_outline
 
         panels, planes = self.sections._draw(axes, self.in_focus)
-        film = self.sections.grid.height, self.sections.grid.width
+        shape_HW = self.sections.grid.shape_HW
         for panel, plane in zip(panels, planes, strict=True):
-            draw_outline(panel, self.in_focus[plane], film, COLOURS[4])
+            draw_outline(panel, self.in_focus[plane], shape_HW, COLOURS[4])
             share = self.in_focus[plane].mean()
             panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{plot_label(self.method)}")
         return panels
@@ -201,12 +201,12 @@ class DepthPosterior(Brief):
         from pcii.figures.maps import draw_entropy
         from pcii.figures.panels import several_axes
 
-        film = self.planes.grid.height, self.planes.grid.width
+        shape_HW = self.planes.grid.shape_HW
         if pixel is None:
-            panels = several_axes(axes, 1, film)
-            draw_entropy(panels[0], self.entropy_bits(), self._most_bits(), film, self.block_px)
+            panels = several_axes(axes, 1, shape_HW)
+            draw_entropy(panels[0], self.entropy_bits(), self._most_bits(), shape_HW, self.block_px)
             return panels
-        i, j = _checked_pixel(pixel, film)
+        i, j = _checked_pixel(pixel, shape_HW)
         panels = several_axes(axes, 1)
         a, b = i // self.block_px, j // self.block_px
         title = f"pixel ({i}, {j}), no surface: {self.no_surface[a, b]:.1%}"
@@ -290,11 +290,11 @@ def _described(values: object) -> str:
     return f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
 
 
-def _checked_pixel(pixel: tuple[int, int], film: tuple[int, int]) -> tuple[int, int]:
+def _checked_pixel(pixel: tuple[int, int], shape_HW: tuple[int, int]) -> tuple[int, int]:
     is_pair = isinstance(pixel, tuple | list) and len(pixel) == 2
     if not is_pair or not all(isinstance(n, int | np.integer) for n in pixel):
         raise InputError(f"pixel: expected (row, column), got {pixel!r}")
     i, j = int(pixel[0]), int(pixel[1])
-    if not (0 <= i < film[0] and 0 <= j < film[1]):
-        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {film[0]} x {film[1]}")
+    if not (0 <= i < shape_HW[0] and 0 <= j < shape_HW[1]):
+        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {shape_HW[0]} x {shape_HW[1]}")
     return i, j

@@ -128,11 +128,13 @@ class Sections(Brief):
         from pcii.figures.exposure import PANEL_PX, block_px
         from pcii.figures.panels import MOST_PANELS, several_axes, show_picture
 
-        film, planes = self.grid.shape_HW, evenly_chosen(len(self.planes), MOST_PANELS)
-        panels = several_axes(axes, len(planes), film)
+        shape_HW, planes = self.grid.shape_HW, evenly_chosen(len(self.planes), MOST_PANELS)
+        panels = several_axes(axes, len(planes), shape_HW)
         step_px = block_px(self.counts.shape[1:3], PANEL_PX)
         for panel, plane, image in zip(panels, planes, self._pictures(planes, step_px, kept), strict=True):
-            show_picture(panel, image, film, f"section at {self.z_mm[plane]:.5g} mm", step_px / self.subpixel)
+            show_picture(
+                panel, image, shape_HW, f"section at {self.z_mm[plane]:.5g} mm", step_px / self.subpixel
+            )
         return panels, planes
 
     def _thumbnails_of(self, kept: np.ndarray | None) -> dict[str, str]:

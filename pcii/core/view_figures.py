@@ -65,10 +65,10 @@ def draw_view(axes: "Axes | None", picture: Picture, grid: CameraGrid, title: st
     from pcii.figures.exposure import PANEL_PX, block_px
     from pcii.figures.panels import several_axes, show_picture
 
-    film = grid.height, grid.width
-    step_px = block_px(film, PANEL_PX)
-    panels = several_axes(axes, 1, film)
-    show_picture(panels[0], picture(step_px), film, title, step_px)
+    shape_HW = grid.shape_HW
+    step_px = block_px(shape_HW, PANEL_PX)
+    panels = several_axes(axes, 1, shape_HW)
+    show_picture(panels[0], picture(step_px), shape_HW, title, step_px)
     return panels
 
 

@@ -112,9 +112,9 @@ def _checked(estimate: Callable[..., object], label: str, name: str | None) -> M
 
     def method(data: PhotonCounts | Views, z_range_mm: tuple[float, float]) -> DepthMap:
         found = called(estimate, label, "the data and the range of depths", data, z_range_mm)
-        film = data.grid.height, data.grid.width
-        if not isinstance(found, DepthMap) or found.z_mm.shape != film:
-            raise InputError(f"{label} must return a pcii.DepthMap of {film[0]} x {film[1]} pixels")
+        shape_HW = data.grid.shape_HW
+        if not isinstance(found, DepthMap) or found.z_mm.shape != shape_HW:
+            raise InputError(f"{label} must return a pcii.DepthMap of {shape_HW[0]} x {shape_HW[1]} pixels")
         z_mm, confidence = found.z_mm, found.confidence
         if not np.all(np.isnan(z_mm) | ((z_mm > 0) & (z_mm < np.inf))):
             raise InputError(f"{label} must return depths above 0 mm, or NaN where it has no answer")

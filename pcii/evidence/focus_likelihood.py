@@ -103,13 +103,13 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
     expected = np.zeros((Z * keep, h, w), np.float32)
     n, full_weight = events.n.astype(np.float32), np.ones(N, np.float32)
     place = events.k, events.l, events.i, events.j
-    film, all_views = grid.shape_HW, np.ones((h, w), np.float32)
+    shape_HW, all_views = grid.shape_HW, np.ones((h, w), np.float32)
 
     def evaluate(z: int) -> None:
         cell_of = np.empty(N, np.int32)
-        cells_of_events(*place, rows[z], cols[z], film, CELL_PX, cell_of)
+        cells_of_events(*place, rows[z], cols[z], shape_HW, CELL_PX, cell_of)
         placed = PlacedEvents(*place, counts.event_colours, n, full_weight, cell_of)
-        section = PlaneView(rows[z], cols[z], *film, sites, all_views, 0.0)
+        section = PlaneView(rows[z], cols[z], *shape_HW, sites, all_views, 0.0)
         predicted = Predicted(*np.empty((2, N)), *np.empty((3, h, w)))
         predict(placed, section, predicted)
         plane_gain = predicted.samples * (predicted.blurred - predicted.mean)

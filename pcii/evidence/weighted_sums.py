@@ -66,14 +66,14 @@ def _of_events(
     from pcii.base.compiled_loops import each_in_threads
     from pcii.evidence.projection_kernels import cells_of_events
 
-    events, film = counts.events, counts.grid.shape_HW
+    events, shape_HW = counts.events, counts.grid.shape_HW
     place, n = (events.k, events.l, events.i, events.j), events.n
     weight = weights[:, events.k, events.l] * n
     sums = np.zeros(shape)
 
     def add_events(z: int) -> None:
         block = np.empty(n.size, np.int32)
-        cells_of_events(*place, shifts[0][z], shifts[1][z], film, block_px, block)
+        cells_of_events(*place, shifts[0][z], shifts[1][z], shape_HW, block_px, block)
         inside = block >= 0
         for group, own in enumerate(weight):
             sums[z, group] = np.bincount(block[inside], own[inside], sums[z, group].size).reshape(shape[2:])

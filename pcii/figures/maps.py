@@ -74,11 +74,13 @@ def entropy_thumbnail(bits: np.ndarray, most_bits: float) -> str:
     return data_uri(entropy_image(bits[::step, ::step], most_bits))
 
 
-def draw_entropy(axes: "Axes", bits: np.ndarray, most_bits: float, film: Sequence[int], side_px: int) -> None:
+def draw_entropy(
+    axes: "Axes", bits: np.ndarray, most_bits: float, shape_HW: Sequence[int], side_px: int
+) -> None:
     """Entropy (h, w) in bits of blocks, `side_px` wide, with a colour bar from 0 to `most_bits`."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
-    show_picture(axes, entropy_image(bits, most_bits), film, "uncertainty of depth", side_px)
+    show_picture(axes, entropy_image(bits, most_bits), shape_HW, "uncertainty of depth", side_px)
     scale = ScalarMappable(Normalize(0, most_bits), "cividis")
     figure_of(axes).colorbar(scale, ax=axes, label="entropy (bits)")

@@ -86,13 +86,13 @@ def figure_of(axes: "Axes") -> "Figure | SubFigure":
 
 
 def show_picture(
-    axes: "Axes", image: np.ndarray, film: Sequence[int], title: str, block_px: float = 1.0
+    axes: "Axes", image: np.ndarray, shape_HW: Sequence[int], title: str, block_px: float = 1.0
 ) -> None:
     """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
 
-    The `film` is its (height, width); blocks that reach over it are cut off.
+    `shape_HW` is that of a view; blocks that reach over it are cut off.
     """
-    height, width = film
+    height, width = shape_HW
     bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
     axes.imshow(image, extent=(-0.5, right, bottom, -0.5))
     axes.set_xlim(-0.5, width - 0.5)
@@ -109,11 +109,11 @@ def hide_frame(axes: "Axes") -> None:
     axes.spines[:].set_visible(False)
 
 
-def draw_outline(axes: "Axes", mask: np.ndarray, film: Sequence[int], colour: str) -> None:
+def draw_outline(axes: "Axes", mask: np.ndarray, shape_HW: Sequence[int], colour: str) -> None:
     """Draw the outline of a mask (H, W) along the sides of its voxels, which may be finer than pixels."""
     from matplotlib.collections import LineCollection
 
-    side = film[0] / mask.shape[0]
+    side = shape_HW[0] / mask.shape[0]
     padded = np.pad(mask, 1)
     rows, cols = np.nonzero(padded[1:, 1:-1] != padded[:-1, 1:-1])  # a line above voxel (row, col)
     lines = [np.stack([cols, rows, cols + 1, rows], axis=-1)]

@@ -68,7 +68,7 @@ Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three nu
 
 
 def at_most(most: int) -> BeforeValidator:
-    """Keeps one item more than a list may have, so that no more than these are looked at and told of."""
+    """Keeps one item more than a list may have, so that no more than these are checked and reported."""
     return BeforeValidator(lambda items: items[: most + 1] if isinstance(items, list | tuple) else items)
 
 

@@ -44,8 +44,8 @@ LEAST_SHARE = 1e-4
 class Exploration:
     """A majorant, ambient light (C,), the share of candidates that is kept, and the light paths it took.
 
-    `majorant` is None if there is no light at all; who lifts it lifts a copy. `is_bounded` is False if paths
-    exceed every majorant so often that photons come in clumps, several from one path: no thinning then.
+    `majorant` is None if there is no light at all; copy it before raising bounds. `is_bounded` is False if
+    paths exceed every majorant so often that photons come in clumps, several from one path: no thinning then.
     """
 
     majorant: Majorant | None

@@ -178,7 +178,7 @@ def _swept(values: Mapping[str, Any], model: type[BaseModel], prefix: str) -> It
     """Fields that have several values, dotted, with what is written there."""
     for name, value in values.items():
         if name not in model.model_fields:
-            continue  # an unknown key, which is told of when the recipe is checked
+            continue  # an unknown key, which the check of the recipe reports
         inner, takes_list = _kind(model.model_fields[name].annotation)
         is_marked = isinstance(value, dict) and set(value) in ({"each"}, {"range"})
         if is_marked or (isinstance(value, list) and not takes_list):

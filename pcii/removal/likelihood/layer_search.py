@@ -79,10 +79,10 @@ def _cut_out(counts: PhotonCounts, box: tuple[slice, slice]) -> PhotonCounts:
     """The same cells of every view: a smaller film, whose cells have the same shifts."""
     events, grid = counts.events, counts.grid
     (top, bottom), (left, right) = ((part.start * CELL_PX, part.stop * CELL_PX) for part in box)
-    film = replace(grid, height=min(bottom, grid.height) - top, width=min(right, grid.width) - left)
+    cut_grid = replace(grid, height=min(bottom, grid.height) - top, width=min(right, grid.width) - left)
     inside = (events.i >= top) & (events.i < bottom) & (events.j >= left) & (events.j < right)
     k, l, i, j, n = (getattr(events, name)[inside] for name in "klijn")
-    return PhotonCounts.from_events(k, l, i - top, j - left, n, film, cfa=counts.cfa)
+    return PhotonCounts.from_events(k, l, i - top, j - left, n, cut_grid, cfa=counts.cfa)
 
 
 def _settled(layers: Layers, start: np.ndarray) -> tuple[float, np.ndarray]:

@@ -69,11 +69,11 @@ def background_bounds(counts: PhotonCounts, total_disparity_px: float) -> tuple[
 
 
 def _views_of(
-    i: np.ndarray, j: np.ndarray, rows: np.ndarray, cols: np.ndarray, film: tuple[int, int]
+    i: np.ndarray, j: np.ndarray, rows: np.ndarray, cols: np.ndarray, shape_HW: tuple[int, int]
 ) -> np.ndarray:
     """How many views have places i (h,) x j (w,) on their film (H, W) if they are shifted, (h, w)."""
     cameras = []
-    for place, shifts, size in zip((i, j), (rows, cols), film, strict=True):
+    for place, shifts, size in zip((i, j), (rows, cols), shape_HW, strict=True):
         seen = place[:, None] - shifts
         cameras.append(((seen >= 0) & (seen < size)).sum(axis=1))
     return np.outer(*cameras)
@@ -92,7 +92,7 @@ class Layers:
         from pcii.evidence.projection_kernels import cells_of_events
 
         grid, events = counts.grid, counts.events
-        self.film = grid.height, grid.width
+        self.shape_HW = grid.shape_HW
         self.least_dark, self.most_dark = dark
         self.rows, self.cols = FocalPlanes.at_total_disparity(grid, total_disparity_px).whole_shifts_px
         self.n = events.n.astype(np.float32)
@@ -116,7 +116,7 @@ class Layers:
         self.relaxed = np.zeros((D, 4, h, w), np.float32)
         for layer in range(D):
             cells_of_events(
-                *self.place, self.rows[layer], self.cols[layer], self.film, CELL_PX, self.cells[layer]
+                *self.place, self.rows[layer], self.cols[layer], self.shape_HW, CELL_PX, self.cells[layer]
             )
         self.home = self._home(D // 2)
 
@@ -300,7 +300,7 @@ class Layers:
         section = PlaneView(
             self.rows[layer],
             self.cols[layer],
-            *self.film,
+            *self.shape_HW,
             self.sites,
             seen.astype(np.float32),
             PRIOR_SAMPLES,
