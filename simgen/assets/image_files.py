@@ -37,10 +37,11 @@ def read_environment(path: Path) -> np.ndarray:
     picture = picture_of(path, ("EXR",))
     height, width, channels = picture.shape
     if channels != 3:
-        raise InputError(f"{path}: has the channel Y; R, G and B are needed")
+        raise InputError(f"{path}: this file has the channel Y; R, G and B are needed")
     if width != 2 * height:
         raise InputError(
-            f"{path}: is {height} x {width} pixels; what shines from all around is twice as wide as high"
+            f"{path}: this file is {height} x {width} pixels; what shines from all around is twice as wide "
+            "as high"
         )
     (radiance,) = decode(picture)
     sound = np.isfinite(radiance) & (radiance >= 0)

@@ -154,7 +154,7 @@ def test_photons_in_a_very_small_sun_do_not_take_forever(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
-        ((16, 32, 1), "this file has the channels Y; R, G and B are needed"),
+        ((16, 32, 1), "this file has the channel Y; R, G and B are needed"),
         ((16, 16, 3), "this file is 16 x 16 pixels; what shines from all around is twice as wide as high"),
         ((32, 16, 3), "this file is 32 x 16 pixels; what shines from all around is twice as wide as high"),
     ],

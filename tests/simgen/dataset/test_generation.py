@@ -170,7 +170,7 @@ def test_a_scene_that_cannot_be_loaded_leaves_no_folder_behind(tmp_path: Path) -
     )
     (tmp_path / "empty").mkdir()
     for out in (tmp_path / "new" / "deep" / "out", tmp_path / "empty"):
-        with pytest.raises(InputError, match="this file is not a PNG"):
+        with pytest.raises(InputError, match="not a PNG"):
             generate(recipe(scene=str(tmp_path / "scene")), Path(), out)
     assert not (tmp_path / "new").exists()
     assert list((tmp_path / "empty").iterdir()) == []
