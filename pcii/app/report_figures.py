@@ -100,11 +100,9 @@ class Shown:
     def true(self) -> TrueFocus | None:
         """What is truly in focus at the planes of the analysis."""
         dataset = self.outcome.dataset
-        return (
-            None
-            if dataset.truth is None
-            else TrueFocus(dataset.grid, dataset.truth, self.outcome.sections.z_mm)
-        )
+        if dataset.truth is None:
+            return None
+        return TrueFocus(dataset.grid, dataset.truth, self.outcome.sections.z_mm)
 
     @cached_property
     def sections(self) -> list[np.ndarray]:

@@ -5,6 +5,7 @@ import re
 import zlib
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -54,17 +55,13 @@ class MethodRegistry:
             return self.checked(method, f"method: {name_of(method)!r}", None)
         known = self.built_in if offered is None else offered
         if isinstance(method, str) and method in known:
-            return self._loaded(known[method])
+            function = known[method]
+            return resolve_name(function) if isinstance(function, str) else function
         point = self.point_of(method) if isinstance(method, str) else None
         if point is None:
             raise InputError(f"method: no {noun} named {method!r}; use {', '.join(self.names(known))}")
         label = f"method: {method!r} of {package_of(point)}"
         return self.checked(load_function(point, label), label, method)
-
-    def _loaded(self, function: Function | str) -> Function:
-        from importlib.metadata import EntryPoint
-
-        return EntryPoint("", function, self.group).load() if isinstance(function, str) else function
 
 
 def registered(group: str, taken: Collection[str], own: Mapping[str, str] = NONE) -> dict[str, "EntryPoint"]:

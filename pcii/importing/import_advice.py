@@ -1,4 +1,4 @@
-"""How an import is to be mended if its views do not fit the cameras that were told, in words of options."""
+"""Advice where imported views do not fit the stated cameras: which options would make them fit."""
 
 from dataclasses import fields
 
@@ -73,16 +73,10 @@ def _wrong_unit(found: GridCheck, grid: CameraGrid) -> str | None:
 
 def _mend(order: ViewOrder, asked: Request) -> str:
     """Options to add and to leave out for another order."""
-    told = asked.views.order
-    changed = {name for name in FLAGS if getattr(order, name) != getattr(told, name)}
-    options = [
-        (flag, not getattr(asked.views.order, name)) for name, flag in FLAGS.items() if name in changed
-    ]
-    if (
-        asked.lenses is not None
-        and changed == {"flip_rows", "flip_cols"}
-        and asked.views.order == ViewOrder()
-    ):
+    stated = asked.views.order
+    changed = {name for name in FLAGS if getattr(order, name) != getattr(stated, name)}
+    options = [(flag, not getattr(stated, name)) for name, flag in FLAGS.items() if name in changed]
+    if asked.lenses is not None and changed == {"flip_rows", "flip_cols"} and stated == ViewOrder():
         options = [("--inverted", not asked.lenses.inverted)]
     added = " ".join(flag for flag, is_new in options if is_new)
     dropped = " ".join(flag for flag, is_new in options if not is_new)

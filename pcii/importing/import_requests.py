@@ -1,4 +1,4 @@
-"""What an import is asked for, and what is read of it: which kind of source it is, and what goes with it."""
+"""Requests to import images: the kind of source, the options that go with it, and what is read."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -66,7 +66,7 @@ class ViewOptions:
 
 @dataclass(frozen=True)
 class Request:
-    """Where images are and what was said about them; None and False for what was not said."""
+    """Where images are, and the options given for them; None and False for those that were not given."""
 
     source: Path
     views: ViewOptions = ViewOptions()

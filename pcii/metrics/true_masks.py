@@ -65,8 +65,3 @@ class TrueFocus:
     def _blur_px(self) -> np.ndarray:
         """Blur half-extent (Z, H, W) of every point at every plane."""
         return np.stack([blur_half_extent_px(self.grid, self.truth.z_mm, z) for z in self.z_mm])
-
-
-def pixel_masks(grid: CameraGrid, truth: Truth, z_mm: np.ndarray) -> np.ndarray:
-    """Truth by pixel: (Z, H, W) bool, points whose blur half-extent is at most the tolerance."""
-    return TrueFocus(grid, truth, z_mm).by_pixel

@@ -7,6 +7,7 @@ decoded.
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -102,7 +103,7 @@ def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS)
         names = " or ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
         raise InputError(f"{path}: not a {names} picture")
     try:
-        read = {"TIFF": tiff_header, "EXR": exr_header}.get(kind, _pillow_header)
+        read = {"TIFF": tiff_header, "EXR": exr_header}.get(kind, partial(_pillow_header, kind))
         picture = Picture(path, kind, **read(path))
         height, width, channels = picture.shape
         if min(picture.shape) < 1 or height * width > most_pixels:
@@ -176,7 +177,7 @@ def _pages(picture: Picture) -> Iterator[tuple[np.ndarray, int]]:
         yield _pillow(picture)
 
 
-def _opened(path: Path) -> Any:
+def _opened(kind: str, path: Path) -> Any:
     """The file as Pillow opens it: by the plug-in of its kind, whose limits of size are above ours."""
     from PIL import JpegImagePlugin, PngImagePlugin, PpmImagePlugin
 
@@ -185,18 +186,18 @@ def _opened(path: Path) -> Any:
         "JPEG": JpegImagePlugin.JpegImageFile,
         "PFM": PpmImagePlugin.PpmImageFile,
     }
-    return plugins[str(kind_of(path))](path)
+    return plugins[kind](path)
 
 
-def _pillow_header(path: Path) -> dict[str, Any]:
-    with warnings.catch_warnings(action="ignore"), _opened(path) as image:
+def _pillow_header(kind: str, path: Path) -> dict[str, Any]:
+    with warnings.catch_warnings(action="ignore"), _opened(kind, path) as image:
         if getattr(image, "n_frames", 1) != 1:
             raise InputError(f"holds {image.n_frames} pictures; give a file with one")
         if image.mode not in PILLOW_MODES:
             raise InputError(f"a {image.mode} picture; save it as RGB or grey")
         channels, dtype = PILLOW_MODES[image.mode]
         header = {"alpha": image.has_transparency_data}
-        if image.format == "PNG":  # of 16 bits Pillow keeps 8, and takes grey with alpha for colours
+        if kind == "PNG":  # of 16 bits Pillow keeps 8, and takes grey with alpha for colours
             with path.open("rb") as file:
                 bits, colour_type = file.read(26)[24:]  # IHDR: PNG specification, section 11.2.1
             channels = 1 if colour_type in (0, 4) else 3
@@ -206,7 +207,7 @@ def _pillow_header(path: Path) -> dict[str, Any]:
 
 
 def _pillow(picture: Picture) -> tuple[np.ndarray, int]:
-    with warnings.catch_warnings(action="ignore"), _opened(picture.path) as image:
+    with warnings.catch_warnings(action="ignore"), _opened(picture.kind, picture.path) as image:
         image.load()  # PNG may tell its orientation after its pixels
         orientation = image.getexif().get(0x0112, UPRIGHT)
         if picture.kind == "PNG" and picture.dtype == np.uint16:

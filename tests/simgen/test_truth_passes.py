@@ -10,7 +10,7 @@ from plain_scenes import built, card, grid, sphere
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
-from pcii.metrics.true_masks import pixel_masks
+from pcii.metrics.true_masks import TrueFocus
 from simgen.cameras.rig import as_rig, centre_camera
 from simgen.renderer import mitsuba_camera
 from simgen.truth import visibility
@@ -135,7 +135,9 @@ def test_focus_is_what_the_score_takes_it_for() -> None:
     for rows, cols in ((10, 10), (2, 7), (9, 3), (1, 1)):
         of = grid(rows, cols, 30, 40)
         truth = Truth(z, np.zeros(z.shape, np.int16), {})
-        np.testing.assert_array_equal(in_focus(of, z, planes), pixel_masks(of, truth, np.array(planes)))
+        np.testing.assert_array_equal(
+            in_focus(of, z, planes), TrueFocus(of, truth, np.array(planes)).by_pixel
+        )
     assert in_focus(of, z, ()).shape == (0, 30, 40)
 
 

@@ -11,7 +11,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import PhotonTruth, Truth
 from pcii.metrics.agreement import mask_agreement
 from pcii.metrics.scoring import score
-from pcii.metrics.true_masks import TrueFocus, pixel_masks
+from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
 
 GRID = paper_grid(24, 32)
@@ -77,9 +77,9 @@ def test_objects_belong_to_the_closest_plane() -> None:
 def test_pixel_truth_is_the_blur_of_one_pixel() -> None:
     # 541 mm is 0.11 px from 540 mm, 625 mm is 0.41 px from 620 mm, 650 mm would be 2.4 px.
     assert blur_half_extent_px(GRID, 541.0, 540.0) == pytest.approx(0.1094, abs=1e-4)
-    masks = pixel_masks(GRID, truth(), Z)
+    masks = TrueFocus(GRID, truth(), Z).by_pixel
     assert masks.sum(axis=(1, 2)).tolist() == [36, 64]
-    assert not pixel_masks(GRID, truth(), np.array([650.0])).any()
+    assert not TrueFocus(GRID, truth(), np.array([650.0])).by_pixel.any()
 
 
 def test_a_perfect_answer_scores_one() -> None:

@@ -11,7 +11,7 @@ from tiny import TINY_RECIPE
 from pcii.base.errors import InputError
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import TRUTH
-from pcii.metrics.true_masks import pixel_masks
+from pcii.metrics.true_masks import TrueFocus
 from simgen.base.strict_models import validate
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe
@@ -51,7 +51,7 @@ def test_every_pass_is_there_and_opens(whole: Path) -> None:
     assert (truth.coverage[truth.object_id > 0] < 1).any()
     group = zarr.open_group(whole / TRUTH, mode="r")
     assert group.attrs["in_focus_z_mm"] == [540.0, 620.0]
-    masks = pixel_masks(dataset.grid, truth, np.array([540.0, 620.0]))
+    masks = TrueFocus(dataset.grid, truth, np.array([540.0, 620.0])).by_pixel
     np.testing.assert_array_equal(array(group, "in_focus"), masks)
     assert masks.any()
     work = {entry["what"]: entry["saved"] for entry in dataset.manifest["skipped"]}
