@@ -13,7 +13,7 @@ import numpy as np
 
 import pcii
 import simgen
-from pcii.metrics.true_masks import pixel_masks
+from pcii.metrics.true_masks import TrueFocus
 
 
 def examples(
@@ -26,7 +26,7 @@ def examples(
         assert truth is not None
         z_mm = float(rng.choice(planes))
         section = pcii.reconstruct(dataset.counts, z_mm=[z_mm])
-        in_focus = pixel_masks(dataset.grid, truth, np.array([z_mm]))[0]
+        in_focus = TrueFocus(dataset.grid, truth, np.array([z_mm])).by_pixel[0]
         yield np.moveaxis(section.counts[0], -1, 0).astype(np.float32), in_focus
 
 
