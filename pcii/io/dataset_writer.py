@@ -80,9 +80,7 @@ def save_dataset(
         if counts is None:
             raise InputError("photon_budget: is of photon counts, and these images are radiance alone")
     texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
-    for name, text in texts.items():
-        if text is not None and not isinstance(text, str):
-            raise InputError(f"{name}: expected text, got {type(text).__name__}")
+    _check_texts(texts)
     if truth is not None:
         _check_truth(truth, counts or views)
     out = Path(path).absolute()
@@ -90,12 +88,7 @@ def save_dataset(
         held_dataset(out, None, content=False)
         out.parent.mkdir(parents=True, exist_ok=True)
         with temporary_folder(out) as new:
-            if counts is not None:
-                write_counts(new / COUNTS, counts)
-            if views is not None:
-                _write_radiance(new, views)
-            if truth is not None:
-                _write_truth(new, truth, counts)
+            _write_parts(new, counts, views, truth)
             manifest = _content(new, counts, views, truth)
             software = versions(PACKAGE, "numpy", "zarr")
             told = {"analysis": analysis, "photon_budget": photon_budget, "versions": software}
@@ -106,6 +99,15 @@ def save_dataset(
             elif held != read_manifest(new):
                 write_manifest(out, read_manifest(new))
     return open_dataset(path)
+
+
+def _write_parts(folder: Path, counts: PhotonCounts | None, views: Views | None, truth: Truth | None) -> None:
+    if counts is not None:
+        write_counts(folder / COUNTS, counts)
+    if views is not None:
+        _write_radiance(folder, views)
+    if truth is not None:
+        _write_truth(folder, truth, counts)
 
 
 def write_counts(folder: Path, counts: PhotonCounts) -> None:
@@ -202,6 +204,13 @@ def check_budget(photon_budget: object) -> float:
     if not 0 < number <= LARGEST_BUDGET:
         raise InputError(f"photon_budget: expected photons, above 0 and up to 2^53, got {photon_budget!r}")
     return float(number)
+
+
+def _check_texts(texts: Mapping[str, object]) -> None:
+    """Raise `InputError` for what is there and no text."""
+    for name, text in texts.items():
+        if text is not None and not isinstance(text, str):
+            raise InputError(f"{name}: expected text, got {type(text).__name__}")
 
 
 def _check_truth(truth: object, images: Any) -> None:

@@ -1,5 +1,6 @@
 """The `simgen` command."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -120,13 +121,18 @@ def generate(
         faults = generate_collection(sweep, out, executor, report)
         write_card(out, terms)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
+    if not faults:
+        say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
+        return 0
+    _complain_of(faults)
+    return 1
+
+
+def _complain_of(faults: Sequence[str]) -> None:
     for fault in faults[:MOST_TOLD]:
         complain(f"not made: {fault}")
     if len(faults) > MOST_TOLD:
         complain(f"and {len(faults) - MOST_TOLD} more were not made")
-    if not faults:
-        say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
-    return 1 if faults else 0
 
 
 def _made(folder: Path, manifest: dict[str, Any]) -> str:

@@ -22,8 +22,10 @@ from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.sensor.detector import detect
+from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
 from simgen.truth.first_hits import first_hits_at_centre
 from simgen.truth.pixel_coverage import coverage
@@ -83,12 +85,17 @@ def draw_photons(
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
     )
+    return counts, _truth(render_scene, grid, counted)
+
+
+def _truth(render_scene: RenderScene, grid: CameraGrid, counted: PhotonTable) -> Truth:
+    """What the virtual centre sees of a scene, and the origins of the photons where they are known."""
     centre = first_hits_at_centre(render_scene, grid)
     photons = None
     if counted.object_id is not None and counted.z_mm is not None:
         origins = counted.one_by_one().columns()
         photons = PhotonTruth(**{name: origins[name] for name in (*"klij", "object_id", "z_mm")})
-    truth = Truth(
+    return Truth(
         z_mm=centre.z_mm,
         object_id=centre.object_id,
         names=render_scene.names,
@@ -96,4 +103,3 @@ def draw_photons(
         normal=centre.normal,
         coverage=coverage(render_scene, centre_camera(grid), centre.object_id),
     )
-    return counts, truth
