@@ -13,7 +13,7 @@ MOST = 4
 """Longer lists are abbreviated to their first and last value and their length."""
 
 
-class Brief(ABC):
+class ShortForm(ABC):
     """Gives a class that states its `_facts` a short `repr` and a table for notebooks."""
 
     @abstractmethod

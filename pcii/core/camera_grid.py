@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, times
+from pcii.base.short_form import ShortForm, times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +29,7 @@ def _check_length(name: str, value: object) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraGrid(Brief):
+class CameraGrid(ShortForm):
     """A grid of `rows` x `cols` parallel pinhole cameras in the plane Z = 0, looking along +Z.
 
     Camera (k, l), k from the top, l from the left, stands at X = (l - (cols-1)/2) pitch_x,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed, span, table, times
+from pcii.base.short_form import ShortForm, listed, span, table, times
 from pcii.core.array_labels import DEPTH_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.focal_planes import FocalPlanes
@@ -23,7 +23,7 @@ DEPTH_SHOWN = ("median_mm", "mae_mm", "median_px", "bias_mm", "bad_1px", "bad_3p
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segmented(Brief):
+class Segmented(ShortForm):
     """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
 
     `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
@@ -93,7 +93,7 @@ class Segmented(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthMap(Brief):
+class DepthMap(ShortForm):
     """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
 
     `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
@@ -148,7 +148,7 @@ class DepthMap(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DepthPosterior(Brief):
+class DepthPosterior(ShortForm):
     """What is known of the depth of blocks of `block_px` x `block_px` pixels of the virtual centre camera.
 
     `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
@@ -233,7 +233,7 @@ class DepthPosterior(Brief):
 
 
 @dataclass(frozen=True, repr=False)
-class Score(Brief):
+class Score(ShortForm):
     """Content of `score.json`: rows per plane, entropies per object, errors of the depth map, bounds."""
 
     planes: tuple[Mapping[str, Any], ...]

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed
+from pcii.base.short_form import ShortForm, listed
 from pcii.core.arrays import check_z_mm, read_only
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import (
@@ -26,7 +26,7 @@ from pcii.core.truth import PhotonTruth
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FocalPlanes(Brief):
+class FocalPlanes(ShortForm):
     """Planes in which a camera grid is focused: `z_mm` (Z,) and `total_disparity_px` (Z,), both float64.
 
     Make it with `at_depths`, `at_total_disparity` or `between`. The total disparity is the parallax over the

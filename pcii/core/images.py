@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, times
+from pcii.base.short_form import ShortForm, times
 from pcii.core.array_labels import VIEWS_LABELS
 from pcii.core.arrays import check_unmasked, read_only
 from pcii.core.bayer import check_cfa
@@ -29,7 +29,7 @@ class ArrayLike5D(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Views(Brief):
+class Views(ShortForm):
     """Linear radiance of every elemental image, (K, L, H, W, C), C = 1 or 3.
 
     `cfa` names the Bayer pattern when C = 1 and the images are mosaics; None means that every pixel

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal, overload
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, times
+from pcii.base.short_form import ShortForm, times
 from pcii.core.array_labels import COUNTS_LABELS
 from pcii.core.arrays import check_total, read_only, whole_counts
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class PhotonEvents(Brief):
+class PhotonEvents(ShortForm):
     """Pixels with photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,) of integers."""
 
     k: np.ndarray
@@ -43,7 +43,7 @@ class PhotonEvents(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PhotonCounts(Brief):
+class PhotonCounts(ShortForm):
     """Photon counts of every elemental image, as sparse events or as a dense stack.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed, times
+from pcii.base.short_form import ShortForm, listed, times
 from pcii.core.array_labels import SECTIONS_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.bayer import by_colour, check_cfa
@@ -25,7 +25,7 @@ Shifts = Literal["nearest", "even"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Sections(Brief):
+class Sections(ShortForm):
     """Sections of the scene at `planes`, in the frame of the virtual centre camera.
 
     `counts` (Z, H, W, C) is the sum of the samples that meet at each voxel: integers for photons, real

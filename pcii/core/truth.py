@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed, span, times
+from pcii.base.short_form import ShortForm, listed, span, times
 from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS
 from pcii.core.arrays import read_only
 from pcii.core.xarray_form import labelled_dataset
@@ -21,7 +21,7 @@ OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 
 
 @dataclass(frozen=True, repr=False)
-class PhotonTruth(Brief):
+class PhotonTruth(ShortForm):
     """Origin of each detected photon: six arrays (N,).
 
     Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of the first surface on its path.
@@ -39,7 +39,7 @@ class PhotonTruth(Brief):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Truth(Brief):
+class Truth(ShortForm):
     """Surfaces in the image of the virtual centre camera, from first hits of rays through pixel centres.
 
     `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the

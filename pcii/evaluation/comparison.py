@@ -95,8 +95,8 @@ def evaluate(
     again = _again(remaining, made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
-    measuring = Measuring(remaining, folder.resolve())
-    with closing(executor.run(measuring, range(len(remaining)), report)) as work:
+    job = EvaluationJob(remaining, folder.resolve())
+    with closing(executor.run(job, range(len(remaining)), report)) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)
@@ -170,8 +170,8 @@ def _is_begun(folder: Path) -> bool:
     return (folder / MANIFEST).is_file() or (folder / MARKER).is_file()
 
 
-class Measuring:
-    """The job of measuring `tasks`: each piece adds a row to those in the folder `out`."""
+class EvaluationJob:
+    """The job of evaluating `tasks`: each piece adds a row to those in the folder `out`."""
 
     def __init__(self, tasks: Sequence[Task], out: Path) -> None:
         self.tasks, self.out = tasks, out

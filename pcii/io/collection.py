@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed
+from pcii.base.short_form import ShortForm, listed
 from pcii.io.collection_layout import check_manifest, read_collection, read_index
 from pcii.io.dataset import Dataset, open_dataset
 
@@ -15,7 +15,7 @@ COLUMNS = ("path", "scene", "scene_number", "seed", "split", "photons")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Collection(Brief, Sequence[Dataset]):
+class Collection(ShortForm, Sequence[Dataset]):
     """Datasets of one folder in the order of its index, each opened, and checked, when it is asked for.
 
     `rows` are what the index says of each: `path`, `values` of the swept fields of the recipe, `scene`,

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import Brief, listed, times
+from pcii.base.short_form import ShortForm, listed, times
 from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
@@ -51,7 +51,7 @@ def budget_of(text: str) -> float | Literal["full-light"]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Dataset(Brief):
+class Dataset(ShortForm):
     """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
 
     path: Path

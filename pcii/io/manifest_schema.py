@@ -164,7 +164,7 @@ class FileList(_Model):
     files: dict[FileName, FileEntry]
 
 
-class Making(_Model):
+class Provenance(_Model):
     """What a part of results was made by."""
 
     key: str
@@ -177,7 +177,7 @@ class ResultsManifest(FileList):
     dataset: Text
     identity: str | None
     budget: Photons | Literal["full-light"] | None
-    made: dict[FileName, Making] = {}
+    made: dict[FileName, Provenance] = {}
     due: list[FileName] = []
 
 

@@ -108,7 +108,7 @@ def generate(
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:
         if not sweep.axes:
-            manifest = make(sweep.recipe(0), sweep.near, out, report)
+            manifest = make(sweep.recipe(0), sweep.recipe_folder, out, report)
             write_card(out, terms)
             say(_made(out, manifest))
             say_next("pcii", "run", out, "-o", results_folder(out))

@@ -91,7 +91,7 @@ def _loaded(recipe: RecipeFile | str | Path) -> RecipeFile:
         raise InputError(
             f"{sweep.source}: several values of {fields} make datasets each: use simgen.generate_collection"
         )
-    return RecipeFile(sweep.recipe(0), sweep.near)
+    return RecipeFile(sweep.recipe(0), sweep.recipe_folder)
 
 
 def generate_collection(

@@ -29,7 +29,7 @@ def lint(
     `scene_number` says which draw of a distribution of scenes is looked at; without it, the first few are,
     less closely. Of other fields with several values the first is taken.
     """
-    sweep, near = target_sweep(name_or_path, overrides)
+    sweep, recipe_folder = target_sweep(name_or_path, overrides)
     recipe = sweep.recipe(0)
     views = (
         f"{recipe.grid.rows} x {recipe.grid.cols} views of {recipe.grid.height} x {recipe.grid.width} pixels"
@@ -37,11 +37,11 @@ def lint(
     pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
     seen_by = f"{views}, {pitch}, {recipe.sensor.cfa}{_first_values(sweep)}"
     numbers = _draws(sweep)
-    if scene_number is None and numbers and is_drawn(recipe.scene, near):
-        scenes = {number: _draw(recipe.scene, near, number) for number in numbers}
+    if scene_number is None and numbers and is_drawn(recipe.scene, recipe_folder):
+        scenes = {number: _draw(recipe.scene, recipe_folder, number) for number in numbers}
         line = f"{recipe.title or recipe.scene}, draws {numbers[0]} to {numbers[-1]}: {seen_by}"
         return line, draw_findings(scenes, recipe.grid.camera_grid(), recipe.analysis.z_mm)
-    target = target_of(sweep, near, scene_number)
+    target = target_of(sweep, recipe_folder, scene_number)
     line = f"{target.recipe.title or target.scene.title}: {seen_by}"
     return line, hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
 
@@ -63,10 +63,10 @@ def _first_values(sweep: Sweep) -> str:
     )
 
 
-def _draw(name_or_path: str, near: Path | None, number: int) -> Scene | InputError:
+def _draw(name_or_path: str, recipe_folder: Path | None, number: int) -> Scene | InputError:
     """A draw of a distribution of scenes, or what is wrong with it."""
     try:
-        return load_scene(name_or_path, near, number)[0]
+        return load_scene(name_or_path, recipe_folder, number)[0]
     except InputError as fault:
         return fault
 

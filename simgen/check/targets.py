@@ -31,13 +31,15 @@ def load_target(
     return target_of(*target_sweep(name_or_path, overrides), scene_number)
 
 
-def target_of(sweep: Sweep, near: Path | None, scene_number: int | None = None) -> Prepared:
+def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None = None) -> Prepared:
     """The recipe of a sweep's first values with its scene; see `load_target`."""
     recipe = sweep.recipe(0)
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})
-    target = prepare(recipe, near)
-    if near is None and any(isinstance(thing.material.finish, Glass) for thing in target.scene.objects):
+    target = prepare(recipe, recipe_folder)
+    if recipe_folder is None and any(
+        isinstance(thing.material.finish, Glass) for thing in target.scene.objects
+    ):
         longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
         return replace(target, recipe=longer)
     return target
@@ -51,7 +53,7 @@ def target_sweep(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Swee
     if not is_scene(name_or_path):
         _check_name(name_or_path)
         sweep = load_sweep(name_or_path, overrides)
-        return sweep, sweep.near
+        return sweep, sweep.recipe_folder
     if overrides:
         raise InputError(f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe")
     return Sweep({"scene": name_or_path}, (), name_or_path, Path()), None

@@ -36,7 +36,7 @@ class DatasetJob:
             raise InputError(
                 f"{self.name(piece)}: the collection is made with other software ({differ}); install that"
             )
-        prepared = prepare(self.sweep.recipe(piece), self.sweep.near)
+        prepared = prepare(self.sweep.recipe(piece), self.sweep.recipe_folder)
         folder = self.out / self.sweep.folder(piece)
         # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
         manifest = finished(folder, prepared.identity, content=False)

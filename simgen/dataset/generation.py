@@ -51,14 +51,13 @@ class _Clock:
         self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
 
 
-def generate(recipe: Recipe, near: Path, out: Path, report: Report = silent) -> dict[str, Any]:
+def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> dict[str, Any]:
     """Make the dataset of `recipe` in the folder `out`; return its manifest.
 
-    `near` is the recipe's folder, beside which scenes are looked up. An unfinished dataset of the
-    same recipe is resumed, a finished one is checked and left alone; a folder that holds anything
-    else is refused with `InputError`.
+    Scenes are looked up in `recipe_folder`. An unfinished dataset of the same recipe is resumed, a finished
+    one is checked and left alone; a folder that holds anything else is refused with `InputError`.
     """
-    prepared = prepare(recipe, near)
+    prepared = prepare(recipe, recipe_folder)
     return finished(out, prepared.identity) or make(prepared, out, report, Reuse())
 
 

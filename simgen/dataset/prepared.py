@@ -85,11 +85,11 @@ class Prepared:
         return build(mi, self.scene, self.folder, self.recipe.render.max_depth, self.curves)
 
 
-def prepare(recipe: Recipe, near: Path | None) -> Prepared:
-    """Look up what a recipe of the folder `near` names; `InputError` if it is missing or wrong."""
-    scene, folder = load_scene(recipe.scene, near, recipe.scene_number)
+def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
+    """Look up what a recipe in `recipe_folder` names; `InputError` if it is missing or wrong."""
+    scene, folder = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
     resolved = recipe.model_copy(update={"analysis": _analysis_of(recipe.analysis, scene.planes_mm)})
-    return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, near or Path()))
+    return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, recipe_folder or Path()))
 
 
 def _analysis_of(analysis: Analysis, planes_mm: tuple[float, ...]) -> Analysis:

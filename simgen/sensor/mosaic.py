@@ -13,15 +13,15 @@ from simgen.spec.recipe import Photons, Sensor
 from simgen.spectral.camera_curves import sensitivity
 
 
-def sensitivities(sensor: Sensor, near: Path) -> np.ndarray | None:
+def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:
     """Relative sensitivities (C, N) of the sensor's camera by wavelength, None in RGB mode.
 
-    A file of sensitivities is looked up in the folder `near`. A monochrome sensor takes G, or the one curve
+    A file of sensitivities is looked up in `recipe_folder`. A monochrome sensor takes G, or the one curve
     that there is. Raises `InputError` for a camera that is not known or has too few curves.
     """
     if sensor.camera is None:
         return None
-    curves = sensitivity(sensor.camera, near)
+    curves = sensitivity(sensor.camera, recipe_folder)
     if sensor.bayer is None:
         return curves[len(curves) // 2 :][:1]
     if len(curves) == 1:

@@ -253,8 +253,8 @@ def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recip
     recipe's title and analysis, which are of its own scene, are dropped but for what is given too.
     Raises `InputError` for a recipe that is missing or wrong.
     """
-    values, source, near = read_recipe(name_or_path, overrides)
-    return validate(Recipe, values, source), near
+    values, source, recipe_folder = read_recipe(name_or_path, overrides)
+    return validate(Recipe, values, source), recipe_folder
 
 
 def read_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[dict[str, Any], str, Path]:

@@ -114,15 +114,17 @@ class Scene(Strict):
         return objects
 
 
-def load_scene(name_or_path: str, near: Path | None = None, number: int | None = None) -> tuple[Scene, Path]:
+def load_scene(
+    name_or_path: str, recipe_folder: Path | None = None, number: int | None = None
+) -> tuple[Scene, Path]:
     """A scene by name or path, and its folder.
 
-    A name is looked up beside the recipe (`near`), in the working directory's `scenes/`, among the scenes
-    that ship, then among generators. Of a scene that is drawn `number` says which draw. Raises `InputError`
+    A name is looked up in `recipe_folder`, in the working directory's `scenes/`, among the scenes that ship,
+    then among generators. Of a scene that is drawn `number` says which draw. Raises `InputError`
     for a scene that is missing or wrong, and for a number where there is nothing to draw or none where
     there is.
     """
-    values, folder, source = _plain_values(name_or_path, near, number)
+    values, folder, source = _plain_values(name_or_path, recipe_folder, number)
     scene = validate(Scene, values, source)
     faults: list[str] = []
     for where, name in scene_files(scene):
@@ -135,17 +137,17 @@ def load_scene(name_or_path: str, near: Path | None = None, number: int | None =
     return scene, folder
 
 
-def is_drawn(name_or_path: str, near: Path | None = None) -> bool:
+def is_drawn(name_or_path: str, recipe_folder: Path | None = None) -> bool:
     """Whether a name or path means a distribution of scenes, by file or by Python, and not one scene."""
-    file = find_scene(name_or_path, near)
+    file = find_scene(name_or_path, recipe_folder)
     return file is None or is_distribution(read_toml(file))
 
 
 def _plain_values(
-    name_or_path: str, near: Path | None, number: int | None
+    name_or_path: str, recipe_folder: Path | None, number: int | None
 ) -> tuple[dict[str, Any], Path, str]:
     """The values of one scene as TOML holds them, its folder, and what errors call it."""
-    file = find_scene(name_or_path, near)
+    file = find_scene(name_or_path, recipe_folder)
     source = name_or_path if file is None else str(file)
     values = {} if file is None else read_toml(file)
     if file is not None and not is_distribution(values):
@@ -176,13 +178,13 @@ def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
     yield from named_files(scene.model_copy(update={"objects": ()}))
 
 
-def find_scene(name_or_path: str, near: Path | None = None) -> Path | None:
+def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | None:
     """The scene.toml that a name or path means, None for the name of a generator.
 
     Raises `InputError` with a suggestion if there is neither.
     """
     given = Path(name_or_path)
-    beside = [] if near is None else [near / given, near / given / "scene.toml"]
+    beside = [] if recipe_folder is None else [recipe_folder / given, recipe_folder / given / "scene.toml"]
     try:
         for candidate in (*beside, given, given / "scene.toml"):
             if candidate.is_file():

@@ -64,7 +64,7 @@ class Sweep:
     written: Mapping[str, Any]
     axes: tuple[Axis, ...]
     source: str
-    near: Path
+    recipe_folder: Path
 
     def __len__(self) -> int:
         return math.prod(len(axis.values) for axis in self.axes)
@@ -118,7 +118,7 @@ class Sweep:
                 scenes.append(self._recipe_with(first | {axis.field: value}).scene)
         if self.axes:
             for scene in dict.fromkeys(scenes):
-                find_scene(scene, self.near)
+                find_scene(scene, self.recipe_folder)
 
 
 def load_sweep(
@@ -135,7 +135,7 @@ def load_sweep(
     `InputError` for a recipe that is missing or wrong, for a field without values, with the same value twice,
     or swept twice, and for more than `MOST_DATASETS`.
     """
-    written, source, near = _read(name_or_path, overrides)
+    written, source, recipe_folder = _read(name_or_path, overrides)
     for option, field, count in (("scenes", "scene_number", scenes), ("seeds", "seed", seeds)):
         if count is not None:
             first = written.get(field, 0)
@@ -150,7 +150,7 @@ def load_sweep(
     for axis in axes:
         if len({axis.name_of(value) for value in axis.values}) < len(axis.values):
             raise InputError(f"{source}: {axis.field}: gives a value twice; each makes one dataset")
-    sweep = Sweep(written, axes, source, near)
+    sweep = Sweep(written, axes, source, recipe_folder)
     if len(sweep) > MOST_DATASETS:
         raise InputError(f"{source}: {len(sweep)} datasets; at most {MOST_DATASETS} can be made at once")
     sweep.check()

@@ -18,14 +18,14 @@ def camera_names() -> list[str]:
     return list(colour_science().MSDS_CAMERA_SENSITIVITIES)
 
 
-def sensitivity(camera: str, near: Path) -> np.ndarray:
+def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
     """Relative sensitivities (3, N) of R, G and B to light's power, or (1, N); the highest value is 1.
 
-    `camera` is one that colour-science ships, or a CSV file (in the folder `near`): the head
+    `camera` is one that colour-science ships, or a CSV file (in `recipe_folder`): the head
     wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
     """
     if camera.lower().endswith(".csv"):
-        wavelength_nm, curves = _read_csv(near / camera)
+        wavelength_nm, curves = _read_csv(recipe_folder / camera)
         rows = np.array([resampled(wavelength_nm, row, outside=0.0) for row in curves.T])
     else:
         table = colour_science().MSDS_CAMERA_SENSITIVITIES
