@@ -479,9 +479,12 @@ def _public(name: str) -> Any:
 def table() -> str:
     """The table in Markdown."""
     lines = ["| |" + "|".join(CONDITIONS.values()) + "|", "|---" * (len(CONDITIONS) + 1) + "|"]
-    for label, (name, call) in rows().items():
-        lines.append(f"| {label} |" + "|".join(cell(call, one, name) for one in CONDITIONS) + "|")
-    return "\n".join(lines)
+    return "\n".join([*lines, *(row(label, name, call) for label, (name, call) in rows().items())])
+
+
+def row(label: str, name: str, call: Callable[[Case], Any]) -> str:
+    """A line of the table: what a call gives in each condition."""
+    return f"| {label} |" + "|".join(cell(call, one, name) for one in CONDITIONS) + "|"
 
 
 def page() -> str:

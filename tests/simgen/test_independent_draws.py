@@ -12,7 +12,7 @@ from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import Recipe
 
-SIDE, VIEWS = 32, 64
+SIDE, VIEWS = 16, 64
 MOST_OF_TOTALS = 5 / np.sqrt(VIEWS)
 MOST_OF_PIXELS = 5 / np.sqrt(VIEWS * SIDE**2)
 """Coefficients of independent noise are normal and one in two million exceeds 5 deviations."""
@@ -56,7 +56,7 @@ def alike(found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize(("budget", "method"), [(100, "thinning"), (4000, "dense")])
+@pytest.mark.parametrize(("budget", "method"), [(100, "thinning"), (1000, "dense")])
 def test_datasets_of_one_seed_have_photons_of_their_own(
     budget: float, method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
