@@ -116,7 +116,7 @@ def work_list(
         folder = out / "data" / entry.name
         series.append(
             [
-                Work(entry, sweep.recipe(number), sweep.near, folder / sweep.folder(number))
+                Work(entry, sweep.recipe(number), sweep.recipe_folder, folder / sweep.folder(number))
                 for number in range(len(sweep))
             ]
         )
