@@ -64,7 +64,7 @@ class Work:
 
     entry: Entry
     recipe: Recipe
-    near: Path
+    recipe_folder: Path
     folder: Path
 
 
@@ -141,7 +141,7 @@ def output() -> Path:
 def make(works: Sequence[Work], report: Report) -> None:
     """Make the datasets that are missing."""
     for done, work in enumerate(works, start=1):
-        generate(work.recipe, work.near, work.folder)
+        generate(work.recipe, work.recipe_folder, work.folder)
         report("datasets", done, len(works))
 
 

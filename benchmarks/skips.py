@@ -46,7 +46,7 @@ class World:
     """A small scene and its recipe, a folder for what is made of it, and what is ready before the clock."""
 
     recipe: Recipe
-    near: Path
+    recipe_folder: Path
     folder: Path
 
     def prepare_all(self) -> None:
@@ -57,7 +57,7 @@ class World:
     @cached_property
     def prepared(self) -> Prepared:
         """The recipe with its scene."""
-        return prepare(self.recipe, self.near)
+        return prepare(self.recipe, self.recipe_folder)
 
     @cached_property
     def scene(self) -> RenderScene:
@@ -184,7 +184,7 @@ def _second(world: World, name: str, reuse: Reuse) -> Arrays:
 
 
 def _finished(world: World) -> Arrays:
-    generate(world.recipe, world.near, world.folder / "first")
+    generate(world.recipe, world.recipe_folder, world.folder / "first")
     return content_of(world.folder / "first")
 
 

@@ -135,12 +135,12 @@ def _drawn(each: int, base_ms: float) -> list[Row]:
         for kind in KINDS:
             relative, kept, draws, fresh = [], [], [], []
             for number in range(TUNING, TUNING + each):
-                recipe, near = load_recipe(str(write_recipe(Path(folder), kind, number)))
+                recipe, recipe_folder = load_recipe(str(write_recipe(Path(folder), kind, number)))
                 start = time.perf_counter()
-                generate(recipe, near, Path(folder) / f"{kind}_{number}_data")
+                generate(recipe, recipe_folder, Path(folder) / f"{kind}_{number}_data")
                 fresh.append(time.perf_counter() - start)
                 grid, depth = recipe.grid.camera_grid(), recipe.render.max_depth
-                setup = Setup(prepare(recipe, near).render_scene(), grid, recipe.cfa, depth)
+                setup = Setup(prepare(recipe, recipe_folder).render_scene(), grid, recipe.cfa, depth)
                 logs: list[dict[str, Any]] = []
                 works = {
                     kind: lambda n, s=setup, p=recipe.photons, logs=logs: logs.append(

@@ -90,8 +90,8 @@ def _realistic_rows(skips: Sequence[Skip], side_px: int, repeats: int) -> list[R
 def realistic_world(side_px: int, folder: Path) -> World:
     """The paper's scene, cameras and photons, on a film of another number of pixels."""
     film = f"grid.pixel_mm={36.0448 / side_px}", f"grid.height={side_px}", f"grid.width={side_px}"
-    recipe, near = load_recipe("paper", [*film, "products.radiance=none"])
-    return World(recipe, near, folder)
+    recipe, recipe_folder = load_recipe("paper", [*film, "products.radiance=none"])
+    return World(recipe, recipe_folder, folder)
 
 
 def random_world(number: int, side_px: int, folder: Path) -> World:
