@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from twins import even_light
 
 from pcii.core.camera_grid import CameraGrid
@@ -56,12 +57,10 @@ def hot(views: tuple[int, int], rate: float, pixels: int, *, everywhere: bool, s
 
 @pytest.mark.parametrize(
     ("size", "rate"),
-    [
-        (SIZES[0], LIGHT[2]),
-        (SIZES[2], LIGHT[0]),
-        (SIZES[4], LIGHT[4]),
-        *(pytest.param(size, rate, marks=pytest.mark.slow) for size in SIZES[::2] for rate in LIGHT[::2]),
-    ],
+    mostly_slow(
+        itertools.product(SIZES[::2], LIGHT[::2]),
+        quick=[(SIZES[0], LIGHT[2]), (SIZES[2], LIGHT[0]), (SIZES[4], LIGHT[4])],
+    ),
 )
 def test_even_light_is_not_answered(size, rate):
     draws = [noise(views, size, rate, cfa, 0) for views, cfa in zip(GRIDS, itertools.cycle(["GRBG", None]))]

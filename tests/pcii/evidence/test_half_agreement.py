@@ -1,5 +1,8 @@
+from itertools import product
+
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from twins import bayer_photons, blocky_texture, even_light, patch_views, unit_grid
 
 from pcii.core.bayer import colour_cells
@@ -48,16 +51,10 @@ def test_what_one_camera_alone_shows_is_not_agreed_on():
 
 @pytest.mark.parametrize(
     ("rate", "views"),
-    [
-        (0.003, (3, 4)),
-        (1.0, (2, 1)),
-        (1e4, (3, 4)),
-        *(
-            pytest.param(rate, views, marks=pytest.mark.slow)
-            for rate in (0.003, 0.1, 1.0, 1e4)
-            for views in [(2, 1), (3, 4)]
-        ),
-    ],
+    mostly_slow(
+        product((0.003, 0.1, 1.0, 1e4), ((2, 1), (3, 4))),
+        quick=[(0.003, (3, 4)), (1.0, (2, 1)), (1e4, (3, 4))],
+    ),
 )
 def test_noise_agrees_as_seldom_as_is_said(rate, views):
     grid = unit_grid(*views, 64, 80)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from twins import even_light, paper_grid, unit_grid
 
 from pcii.core.focal_planes import FocalPlanes
@@ -283,10 +284,7 @@ def test_of_few_photons_the_evidence_itself_counts(elsewhere):
     assert not region.is_there
 
 
-@pytest.mark.parametrize(
-    "photons_per_px",
-    [pytest.param(0.02, marks=pytest.mark.slow), 0.1, pytest.param(1.0, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize("photons_per_px", mostly_slow([0.02, 0.1, 1.0], quick=[0.1]))
 def test_noise_alone_is_never_sure(photons_per_px):
     # The whole of a film on which nothing is: about a hundred nats of noise at each of 11 depths that may be
     # a plane's. Five films are at most 55 trials, of which e^-10 is not one.
