@@ -4,7 +4,7 @@ from pathlib import Path
 
 from simgen.figures.preview_picture import write_preview
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import is_drawn, load_scene
+from simgen.spec.scene import is_scene_distribution, load_scene
 
 DOCS = Path(__file__).resolve().parent
 SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"
@@ -30,7 +30,7 @@ def scene_names() -> list[str]:
 
 def shown_draw(name: str) -> int | None:
     """Which draw of a scene is shown: none of a scene that is one."""
-    return 0 if is_drawn(str(SCENES / name)) else None
+    return 0 if is_scene_distribution(str(SCENES / name)) else None
 
 
 def page() -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from threading import Lock
 from typing import Any, TypeVar
 
-from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Provenance, Results, masks_name
+from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Results, StepRecord, masks_name
 from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.section_stack import Sections
 from pcii.evaluation.method_names import depth_name
@@ -90,7 +90,7 @@ class KeptSteps(Steps):
             return found
         focus, seconds = super().removal(method, sections, make)
         with self._folder, self._results.writing() as results:
-            results.save_segmented(focus, Provenance(key, seconds))
+            results.save_segmented(focus, StepRecord(key, seconds))
         return focus, seconds
 
     def depth(
@@ -107,7 +107,7 @@ class KeptSteps(Steps):
             return found
         depth, seconds = super().depth(method, z_range_mm, make)
         with self._folder, self._results.writing() as results:
-            results.save_depth(depth, Provenance(key, seconds))
+            results.save_depth(depth, StepRecord(key, seconds))
         return depth, seconds
 
     def _keep(self, name: str, found: object) -> None:

@@ -56,7 +56,7 @@ def masks_name(method: str) -> str:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class StepRecord:
     """What a file or folder of results follows from, as a hash, and how long it took to make."""
 
     key: str
@@ -102,7 +102,7 @@ class Results:
                 (self.path / LOCK).unlink(missing_ok=True)
 
     @contextmanager
-    def replacing(self, name: str, provenance: Provenance | None = None) -> Iterator[Path]:
+    def replacing(self, name: str, record: StepRecord | None = None) -> Iterator[Path]:
         """Path at which to write the new file or folder `name`; it is renamed at the end of the block."""
         target = self.path / name
         with temporary_folder(target) as temporary:
@@ -122,8 +122,8 @@ class Results:
             else:
                 new.replace(target)
                 sync_folder(self.path)
-            if provenance is not None:
-                made[name] = asdict(provenance)
+            if record is not None:
+                made[name] = asdict(record)
             self._list(remaining | listed, made, due - {name})
 
     def begin(self, parts: Iterable[str]) -> None:
@@ -150,18 +150,18 @@ class Results:
             labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
         return self._save(SECTIONS, arrays, labels, pattern)
 
-    def save_segmented(self, focus: Segmented, provenance: Provenance | None = None) -> Path:
+    def save_segmented(self, focus: Segmented, record: StepRecord | None = None) -> Path:
         """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
         arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
         if focus.photon_in_focus is not None:
             arrays["photon_in_focus"] = focus.photon_in_focus
         attributes = {"method": focus.method}
-        return self._save(masks_name(focus.method), arrays, SEGMENTED_LABELS, attributes, provenance)
+        return self._save(masks_name(focus.method), arrays, SEGMENTED_LABELS, attributes, record)
 
-    def save_depth(self, depth: DepthMap, provenance: Provenance | None = None) -> Path:
+    def save_depth(self, depth: DepthMap, record: StepRecord | None = None) -> Path:
         """Write the depth map and its confidence."""
         arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
-        return self._save(DEPTH, arrays, DEPTH_LABELS, provenance=provenance)
+        return self._save(DEPTH, arrays, DEPTH_LABELS, record=record)
 
     def save_score(self, result: Score) -> Path:
         """Write score.json."""
@@ -175,9 +175,9 @@ class Results:
         arrays: Mapping[str, np.ndarray],
         labels: Mapping[str, Label],
         attributes: Mapping[str, Any] | None = None,
-        provenance: Provenance | None = None,
+        record: StepRecord | None = None,
     ) -> Path:
-        with self.replacing(name, provenance) as path:
+        with self.replacing(name, record) as path:
             write_arrays(path, arrays, labels, attributes)
         return self.path / name
 

@@ -207,7 +207,7 @@ def check_budget(photon_budget: object) -> float:
 
 
 def _check_texts(texts: Mapping[str, object]) -> None:
-    """Raise `InputError` for what is there and no text."""
+    """Raise `InputError` for a value that is neither text nor None."""
     for name, text in texts.items():
         if text is not None and not isinstance(text, str):
             raise InputError(f"{name}: expected text, got {type(text).__name__}")

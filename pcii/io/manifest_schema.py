@@ -164,8 +164,8 @@ class FileList(_Model):
     files: dict[FileName, FileEntry]
 
 
-class Provenance(_Model):
-    """What a part of results was made by."""
+class StepRecord(_Model):
+    """What a part of results follows from, as a hash, and how long it took to make."""
 
     key: str
     seconds: Seconds
@@ -177,7 +177,7 @@ class ResultsManifest(FileList):
     dataset: Text
     identity: str | None
     budget: Photons | Literal["full-light"] | None
-    made: dict[FileName, Provenance] = {}
+    made: dict[FileName, StepRecord] = {}
     due: list[FileName] = []
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import shorten
-from simgen.spec.scene import is_drawn, load_scene, scene_names
+from simgen.spec.scene import is_scene_distribution, load_scene, scene_names
 from simgen.spec.scene_generators import generators
 from simgen.spec.sweeps import load_sweep
 
@@ -66,7 +66,7 @@ def list_scenes() -> list[ListedScene]:
 
 def _listed_scene(name: str) -> ListedScene:
     try:
-        drawn = is_drawn(name)
+        drawn = is_scene_distribution(name)
         scene, _ = load_scene(name, number=0 if drawn else None)
     except InputError as fault:
         return ListedScene(name, None, None, False, str(fault))

@@ -177,14 +177,14 @@ def preview(
 
 def _say_next_after_check(target: str, overrides: tuple[str, ...], scene: int | None) -> None:
     """Of a scene: look at it. Of a recipe: make it."""
-    from simgen.spec.scene import is_drawn, is_scene
+    from simgen.spec.scene import is_scene, is_scene_distribution
 
     name = _name_of(target)
     if not is_scene(target):
         values = [word for text in overrides for word in ("--set", text)]
         say_next("simgen", "generate", target, "-o", f"out/{name}", *values)
         return
-    if scene is None and is_drawn(target):
+    if scene is None and is_scene_distribution(target):
         scene = 0
     number = [] if scene is None else ["--scene", scene]
     say_next("simgen", "preview", target, *number, "-o", f"{name}.png")

@@ -14,7 +14,7 @@ from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
 from simgen.check.scene_probe import probe_scene
 from simgen.check.targets import load_target
 from simgen.spec.recipe import recipe_file
-from simgen.spec.scene import NAME, is_drawn, is_scene, load_scene, scene_names
+from simgen.spec.scene import NAME, is_scene, is_scene_distribution, load_scene, scene_names
 from simgen.spec.scene_generators import generators
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -63,7 +63,7 @@ def write_new_recipe(name: str, scene: str | None = None) -> Path:
         raise InputError(f"{name!r} is the name of a recipe that ships; choose another")
     chosen = scene or (name if is_scene(name) else FALLBACK_SCENE)
     named = chosen if Path(chosen).name == chosen else os.path.relpath(chosen, path.parent)
-    number = 0 if is_drawn(chosen) else None
+    number = 0 if is_scene_distribution(chosen) else None
     z_mm = "# z_mm = [540, 620]            # sections; default: planes_mm of the scene"
     if not load_scene(chosen, number=number)[0].planes_mm:
         z_mm = f"z_mm = {json.dumps(_depths_mm(chosen, number))}"

@@ -14,7 +14,7 @@ from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
 from simgen.check.targets import target_of, target_sweep
 from simgen.dataset.prepared import needs_of
-from simgen.spec.scene import Scene, is_drawn, load_scene
+from simgen.spec.scene import Scene, is_scene_distribution, load_scene
 from simgen.spec.sweeps import Sweep
 
 DRAWS = 20
@@ -37,7 +37,7 @@ def lint(
     pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
     seen_by = f"{views}, {pitch}, {recipe.sensor.cfa}{_first_values(sweep)}"
     numbers = _draws(sweep)
-    if scene_number is None and numbers and is_drawn(recipe.scene, recipe_folder):
+    if scene_number is None and numbers and is_scene_distribution(recipe.scene, recipe_folder):
         scenes = {number: _draw(recipe.scene, recipe_folder, number) for number in numbers}
         line = f"{recipe.title or recipe.scene}, draws {numbers[0]} to {numbers[-1]}: {seen_by}"
         return line, draw_findings(scenes, recipe.grid.camera_grid(), recipe.analysis.z_mm)

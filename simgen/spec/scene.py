@@ -120,9 +120,8 @@ def load_scene(
     """A scene by name or path, and its folder.
 
     A name is looked up in `recipe_folder`, in the working directory's `scenes/`, among the scenes that ship,
-    then among generators. Of a scene that is drawn `number` says which draw. Raises `InputError`
-    for a scene that is missing or wrong, and for a number where there is nothing to draw or none where
-    there is.
+    then among generators. `number` selects a draw from a distribution of scenes. Raises `InputError` for a
+    scene that is missing or wrong, for a number with a single scene, and for a distribution without one.
     """
     values, folder, source = _plain_values(name_or_path, recipe_folder, number)
     scene = validate(Scene, values, source)
@@ -137,8 +136,8 @@ def load_scene(
     return scene, folder
 
 
-def is_drawn(name_or_path: str, recipe_folder: Path | None = None) -> bool:
-    """Whether a name or path means a distribution of scenes, by file or by Python, and not one scene."""
+def is_scene_distribution(name_or_path: str, recipe_folder: Path | None = None) -> bool:
+    """Whether a name or path means a distribution of scenes (a file or a generator), not one scene."""
     file = find_scene(name_or_path, recipe_folder)
     return file is None or is_distribution(read_toml(file))
 

@@ -20,7 +20,7 @@ from simgen.spec.camera_grid import Grid
 from simgen.spec.lights import Light
 from simgen.spec.materials import Finish, Spectrum
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import Scene, is_drawn, load_scene
+from simgen.spec.scene import Scene, is_scene_distribution, load_scene
 from simgen.spec.shapes import Shape
 from simgen.spec.textures import Texture
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
@@ -46,7 +46,7 @@ MOST_PICTURE_BYTES, MOST_ASSET_BYTES = 60_000, 100_000
 
 def shown_draw(name: str) -> int | None:
     """The draw of a distribution of scenes that is looked at here, which is that of the gallery."""
-    return 0 if is_drawn(str(ROOT / "scenes" / name)) else None
+    return 0 if is_scene_distribution(str(ROOT / "scenes" / name)) else None
 
 
 @cache

@@ -12,7 +12,7 @@ from pcii.base.errors import InputError
 from simgen.dataset.prepared import prepare
 from simgen.drawn import GENERATORS
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import is_drawn, load_scene
+from simgen.spec.scene import is_scene_distribution, load_scene
 from simgen.spec.scene_generators import GROUP, generators
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -68,7 +68,7 @@ def test_a_generator_gives_plain_values_whatever_was_drawn_before(name: str) -> 
     random.seed(1)
     random.random()
     assert GENERATORS[name](3) == values
-    assert is_drawn(name)
+    assert is_scene_distribution(name)
 
 
 def test_the_package_offers_the_generators_that_it_finds_by_itself() -> None:
