@@ -8,7 +8,7 @@ import simgen
 from pcii.io.verification import verify
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/example")
-recipe = simgen.load_recipe("small", ["photons.nested=[1000]"])
+recipe = simgen.load_recipe("small", ["photons.nested=[1000]", "products.radiance=none"])
 manifest = simgen.generate(recipe, folder)
 print(f"{manifest['photons']['total']} photons by {manifest['photons']['method']}")
 

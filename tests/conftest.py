@@ -15,12 +15,12 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @pytest.fixture(scope="session")
 def small_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The dataset of data_recipes/small.toml: 6 x 6 views of 256 x 256, GRBG, with radiance."""
+    """That of data_recipes/small.toml with fewer samples: 6 x 6 views of 256 x 256, GRBG, with radiance."""
     from simgen.dataset.generation import generate
     from simgen.spec.recipe import load_recipe
 
     out = tmp_path_factory.mktemp("data") / "small"
-    recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"))
+    recipe, near = load_recipe(str(ROOT / "data_recipes" / "small.toml"), ["render.samples_per_pixel=2"])
     generate(recipe, near, out)
     return out
 

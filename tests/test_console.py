@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from cyclopts import App
+from property_settings import mostly_slow
 
 from pcii.app import commands as pcii_cli
 from pcii.base import command_line
@@ -65,7 +66,9 @@ ON = "stopped; the same command goes on from here"
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize("begun", [MARKER, "radiance/view_00_01.exr"])
+@pytest.mark.parametrize(
+    "begun", mostly_slow([MARKER, "radiance/view_00_01.exr"], quick=["radiance/view_00_01.exr"])
+)
 def test_a_stopped_generate_says_so_and_goes_on(begun: str, tmp_path: Path) -> None:
     out = tmp_path / "small"
     process = subprocess.Popen(generating(out, 4), stderr=subprocess.PIPE, text=True)

@@ -238,7 +238,10 @@ def mount(tmp_path: Path) -> Iterator[Mount]:
         subprocess.run(["umount", str(mount.place)], check=True)
 
 
-@pytest.mark.parametrize("name", ["dataset", "collection", "results", "evaluation"])
+@pytest.mark.parametrize(
+    "name",
+    ["dataset", pytest.param("collection", marks=pytest.mark.slow), "results", "evaluation"],
+)
 def test_a_read_only_disk_is_named(
     folders: Folders, name: str, mount: Mount, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -97,12 +97,15 @@ def run_on_cluster(
 @contextmanager
 def _without_messages_of_dask() -> Iterator[None]:
     """Keep Dask from printing what happens to connections, tracebacks included, within the block."""
-    logger = logging.getLogger("distributed.client")
-    before, logger.disabled = logger.disabled, True
+    loggers = [logging.getLogger(f"distributed.{part}") for part in ("client", "batched")]
+    before = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
     try:
         yield
     finally:
-        logger.disabled = before
+        for logger, disabled in zip(loggers, before, strict=True):
+            logger.disabled = disabled
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 
 from pcii.io.dataset import open_dataset
 from simgen.base import random_streams as seeds
@@ -56,7 +57,9 @@ def alike(found: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize(("budget", "method"), [(100, "thinning"), (1000, "dense")])
+@pytest.mark.parametrize(
+    ("budget", "method"), mostly_slow([(100, "thinning"), (1000, "dense")], quick=[(100, "thinning")])
+)
 def test_datasets_of_one_seed_have_photons_of_their_own(
     budget: float, method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from digests import digest
+from property_settings import mostly_slow
 from tiny import GRID_2_X_2
 
 from pcii.base.progress import silent
@@ -32,9 +33,12 @@ def recipe_file(tmp_path: Path) -> str:
     return str(path)
 
 
-def test_datasets_are_the_same_whatever_was_made_before(recipe_file: str, tmp_path: Path) -> None:
-    reuse = Reuse()
-    for name, overrides in {"first": list[str](), **OTHERS, "the first again": []}.items():
+@pytest.mark.parametrize("others", [["another scene"], pytest.param(list(OTHERS), marks=pytest.mark.slow)])
+def test_datasets_are_the_same_whatever_was_made_before(
+    others: list[str], recipe_file: str, tmp_path: Path
+) -> None:
+    reuse, between = Reuse(), {name: OTHERS[name] for name in others}
+    for name, overrides in {"first": list[str](), **between, "the first again": []}.items():
         recipe, near = load_recipe(recipe_file, overrides)
         make(prepare(recipe, near), tmp_path / "reused" / name, silent, reuse)
         generate(recipe, near, tmp_path / "alone" / name)
@@ -43,14 +47,17 @@ def test_datasets_are_the_same_whatever_was_made_before(recipe_file: str, tmp_pa
 
 @pytest.mark.parametrize(
     ("overrides", "again"),
-    [
-        (["seed=4"], set[str]()),
-        (["photons.budget=300"], {"plan"}),
-        (["analysis.z_mm=[500.0]"], {"write_truth"}),
-        (["grid.pitch_mm=[9.0,18.0]"], {"plan", "write_truth"}),
-        ([ERRORS, "seed=4"], {"plan", "write_truth"}),
-        (["scene=two_objects"], {"render_scene", "plan", "write_truth"}),
-    ],
+    mostly_slow(
+        [
+            (["seed=4"], set[str]()),
+            (["photons.budget=300"], {"plan"}),
+            (["analysis.z_mm=[500.0]"], {"write_truth"}),
+            (["grid.pitch_mm=[9.0,18.0]"], {"plan", "write_truth"}),
+            ([ERRORS, "seed=4"], {"plan", "write_truth"}),
+            (["scene=two_objects"], {"render_scene", "plan", "write_truth"}),
+        ],
+        quick=[(["photons.budget=300"], {"plan"}), ([ERRORS, "seed=4"], {"plan", "write_truth"})],
+    ),
 )
 def test_only_what_depends_on_a_change_is_made_again(
     recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
