@@ -93,8 +93,13 @@ def without_depth(kind: str, grid: CameraGrid) -> np.ndarray:
     return np.broadcast_to(light, grid.shape_KLHW)
 
 
-@pytest.mark.parametrize("budget", BUDGETS)
-@pytest.mark.parametrize("kind", ["vignetting", "shading", "flicker", "hot"])
+@pytest.mark.parametrize(
+    ("kind", "budget"),
+    mostly_slow(
+        itertools.product(["vignetting", "shading", "flicker", "hot"], BUDGETS),
+        quick=[("vignetting", 1e7), ("shading", None), ("flicker", 1e3), ("hot", 1e7)],
+    ),
+)
 def test_what_shows_no_depth_is_not_answered(kind, budget):
     # In full light the film is more than twice as wide as the parallax: at borders of a narrower one each
     # block is seen by other cameras, whose vignetting differs without noise.
@@ -130,9 +135,13 @@ def test_hot_pixels_are_answered_as_seldom_as_is_said():
     assert np.all(shares.mean(axis=0) <= MOST_FALSE)
 
 
-@pytest.mark.parametrize("cfa", ["GRBG", None])
-@pytest.mark.parametrize("count", [1, 2**40])
-@pytest.mark.parametrize("size", [(1, 1), (1, 9), (20, 24)])
+@pytest.mark.parametrize(
+    ("size", "count", "cfa"),
+    mostly_slow(
+        itertools.product([(1, 1), (1, 9), (20, 24)], [1, 2**40], ["GRBG", None]),
+        quick=[((1, 1), 2**40, None), ((1, 9), 1, "GRBG"), ((20, 24), 2**40, "GRBG")],
+    ),
+)
 def test_saturated_counters_tell_nothing_and_can_be_scored(count, size, cfa):
     grid = grid_of((3, 3), size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, count), grid, cfa=cfa)

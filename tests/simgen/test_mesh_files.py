@@ -1,6 +1,7 @@
 """Sound files of strangers: the same mesh in every form, pictures at their full depth."""
 
 import struct
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import tifffile
 from hostile_files import ply, scene_toml
 from PIL import Image, ImageOps
 from png_files import png16
+from property_settings import mostly_slow
 
 from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
 from simgen.assets.obj_files import read_obj
@@ -123,8 +125,13 @@ def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(pixels[..., 1], [[1, 1, 1], [1, 1, 0]])
 
 
-@pytest.mark.parametrize("orientation", range(1, 9))
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.jpg"])
+@pytest.mark.parametrize(
+    ("name", "orientation"),
+    mostly_slow(
+        product(["a.png", "a.tif", "a.jpg"], range(1, 9)),
+        quick=[*product(["a.jpg"], range(2, 9)), ("a.png", 6), ("a.tif", 8)],
+    ),
+)
 def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tmp_path: Path) -> None:
     exif = Image.Exif()
     exif[0x0112] = orientation
@@ -135,8 +142,16 @@ def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tm
     np.testing.assert_allclose(worn(tmp_path, name).image(name), srgb_to_linear(upright), rtol=1e-6)
 
 
-@pytest.mark.parametrize(("bits", "dtype"), [(1, "bool"), (4, "uint8"), (8, "uint8"), (12, "uint16")])
-@pytest.mark.parametrize("zero_is", ["black", "white"])
+BITS = {1: "bool", 4: "uint8", 8: "uint8", 12: "uint16"}
+
+
+@pytest.mark.parametrize(
+    ("bits", "dtype", "zero_is"),
+    mostly_slow(
+        ((*kind, zero) for kind, zero in product(BITS.items(), ["black", "white"])),
+        quick=[(1, "bool", "white"), (4, "uint8", "black"), (12, "uint16", "white")],
+    ),
+)
 def test_tiff_of_any_bits_is_as_bright(bits: int, dtype: str, zero_is: str, tmp_path: Path) -> None:
     numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
     told = None if bits == 1 else bits

@@ -2,6 +2,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from twins import bayer_photons, blocky_texture, even_light, unit_grid
 
 from pcii.base.errors import InputError
@@ -111,7 +112,7 @@ def flat_share(rate: float, films: int) -> float:
 
 
 # From 0.2 to 50 photons in each pixel of a section.
-@pytest.mark.parametrize("rate", [0.004, 0.02, 0.1, 1.0])
+@pytest.mark.parametrize("rate", mostly_slow([0.004, 0.02, 0.1, 1.0], quick=[0.004, 1.0]))
 def test_a_flat_film_has_no_depth(rate):
     assert flat_share(rate, films=4) <= 1 / 1000  # what is promised
 

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import cycle
+from itertools import cycle, product
 
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from rendered_cards import Card, render
 
 from pcii.core.camera_grid import CameraGrid
@@ -79,8 +80,13 @@ def test_rows_and_columns_exchanged_in_a_grid_that_is_not_square(counted) -> Non
     assert check_grid(light(right), grid, (30, 250), counted=counted).order is None
 
 
-@pytest.mark.parametrize("rows_cols", [(1, 5), (5, 1), (2, 2), (4, 3)])
-@pytest.mark.parametrize("noise", [0.0, 0.1])
+@pytest.mark.parametrize(
+    ("rows_cols", "noise"),
+    mostly_slow(
+        product([(1, 5), (5, 1), (2, 2), (4, 3)], [0.0, 0.1]),
+        quick=[((1, 5), 0.1), ((5, 1), 0.1), ((2, 2), 0.0), ((4, 3), 0.1)],
+    ),
+)
 def test_grids_of_any_shape_also_with_noise(rows_cols, noise) -> None:
     grid = replace(GRID, rows=rows_cols[0], cols=rows_cols[1])
     rng = np.random.default_rng(4)

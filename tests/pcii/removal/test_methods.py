@@ -3,6 +3,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from property_settings import mostly_slow
 from twins import even_light, intersection_over_union, opaque_views, photons_of, unit_grid
 
 from pcii.base.errors import InputError
@@ -135,8 +136,9 @@ def test_plain_discs_are_found_at_their_depths_and_better_with_more_light():
     assert np.all(np.diff(found, axis=0) > -10 / (math.pi * RADIUS_PX**2))
 
 
-@pytest.mark.parametrize("per_view", [30, 300])
-@pytest.mark.parametrize("asked", [3, 5])
+@pytest.mark.parametrize(
+    ("asked", "per_view"), mostly_slow([(3, 30), (3, 300), (5, 30), (5, 300)], quick=[(3, 300), (5, 30)])
+)
 def test_a_plain_disc_is_not_claimed_16_px_of_spread_away(per_view, asked):
     place = (82, 84, 8 - asked)
     counts = plain_discs(place, per_view=per_view)
@@ -158,7 +160,7 @@ def test_round_things_are_whole_though_less_than_5_px_of_spread_part_the_planes(
         assert intersection_over_union(mask, here) > 1 - 2 / 19
 
 
-@pytest.mark.parametrize("rate", [0.001, 0.02, 0.3])
+@pytest.mark.parametrize("rate", mostly_slow([0.001, 0.02, 0.3], quick=[0.02]))
 def test_a_flat_film_is_never_claimed(rate):
     grid = unit_grid(7, 7, 160, 144)
     for seed in range(2):
