@@ -126,6 +126,8 @@ def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, monkeypatch: p
     def refuse(*_: object) -> None:
         raise PermissionError(13, "Permission denied")
 
+    simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
+    assert_shows_something(tmp_path / "x.png")
     monkeypatch.setattr("simgen.figures.picture_parts.write_bytes_safely", refuse)
     with pytest.raises(InputError, match=r"x.png: cannot be written here \(Permission denied\)$"):
         simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
