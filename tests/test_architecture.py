@@ -23,6 +23,7 @@ ROOMS = {
         "io",
         "sections",
         "exporting",
+        "scene_model",
         "evidence",
         "depth",
         "importing",
