@@ -34,7 +34,7 @@ class SceneEnergy:
 
         rays, (h, w), M = self.rays, self.rays.shape, labels.size
         hidden = ray_kernels.behind(labels, rays.largest_step)
-        owner, other = self._owners(labels, hidden)
+        owner, other = self.owners(labels, hidden)
         seen = self.exposure(labels, hidden)
         photons = np.zeros((2 * M + 1, len(self._shares)), np.float32)
         kernels.photons_of_cells(owner, rays.n, rays.colour, photons)
@@ -83,7 +83,7 @@ class SceneEnergy:
             exposures(*arguments, rays.cell_px, seen)
         return np.stack(result)
 
-    def _owners(self, labels: np.ndarray, hidden: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def owners(self, labels: np.ndarray, hidden: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Cell (N,) int32 that each photon comes from, and that across an outline near it, or -1."""
         from pcii.scene_model.ray_kernels import outlines, owners
 

@@ -41,7 +41,7 @@ def test_pixels_that_see_cells_are_those_whose_rays_end_there(seed: int):
     hidden = behind(labels, energy.rays.largest_step)
     seen = energy.exposure(labels, hidden)
     # There is one photon in every pixel, so that photons of a cell are the pixels that see it.
-    owner, _ = energy._owners(labels, hidden)
+    owner, _ = energy.owners(labels, hidden)
     photons = np.bincount(owner, minlength=2 * labels.size + 1)
     assert photons.sum() == energy.rays.n.size
     # A camera sees a cell or not; by blocks of 4 x 4 cells that averages out.
@@ -59,7 +59,7 @@ def test_pixels_that_see_cells_are_those_whose_rays_end_there(seed: int):
 def test_a_wall_goes_on_behind_what_is_near_as_far_as_cameras_see_it():
     rays, labels = rays_of(), np.full((32, 32), 2, np.int16)
     labels[8:24, 8:24] = 14
-    owner, _ = SceneEnergy(rays)._owners(labels, behind(labels, rays.largest_step))
+    owner, _ = SceneEnergy(rays).owners(labels, behind(labels, rays.largest_step))
     assert owner.max() < 2 * labels.size
     # The outermost cameras see 12 labels of a quarter of a cell past an outline, and nobody sees more.
     hidden_cells = np.unique(owner[owner >= labels.size]) - labels.size
@@ -86,7 +86,7 @@ def test_colours_are_predicted_from_those_of_the_same_surface():
 def test_a_ray_meets_the_nearest_surface_on_its_way():
     rays, labels = rays_of(), random_surfaces(0)
     hidden = behind(labels, rays.largest_step)
-    owner, _ = SceneEnergy(rays)._owners(labels, hidden)
+    owner, _ = SceneEnergy(rays).owners(labels, hidden)
     row, col, step_row, step_col = (line.astype(np.float64) for line in rays.lines)
     surfaces = np.concatenate([labels.ravel(), hidden.ravel(), [-1]])
     for ray in range(0, owner.size, 97):
@@ -103,12 +103,12 @@ def test_a_ray_meets_a_slope_between_its_cells_and_no_jump():
     rays = rays_of()
     slope = np.tile(np.arange(2, 10, 0.25).astype(np.int16), (32, 1))
     for labels in (slope, slope[:, ::-1].copy()):
-        owner, _ = SceneEnergy(rays)._owners(labels, behind(labels, rays.largest_step))
+        owner, _ = SceneEnergy(rays).owners(labels, behind(labels, rays.largest_step))
         # Those that end at the sides leave the slope where its depths begin or end.
         middle = (rays.lines[1] > 16) & (rays.lines[1] < 48)
         assert (owner[middle] < labels.size).all()
     steep = np.repeat(slope[:, ::4], 4, axis=1) * 3
-    owner, other = SceneEnergy(rays)._owners(np.minimum(steep, 15), behind(steep, rays.largest_step))
+    owner, other = SceneEnergy(rays).owners(np.minimum(steep, 15), behind(steep, rays.largest_step))
     assert (other >= 0).mean() > 0.05
 
 
