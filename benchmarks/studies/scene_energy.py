@@ -39,6 +39,9 @@ TABLE = "Energy of surfaces"
 PLANE, FOUND, FROM_TRUTH, TRUTH = "best plane", "found", "from the truth", "truth"
 SMOOTHINGS = (0.0, 1.0, 2.0)
 """Standard deviations in blocks by which the posterior of depth is smoothed: a start each."""
+QUANTILES = (0.2, 0.35, 0.5, 0.65, 0.8)
+"""Of the depth of what is probably a surface, from far to near: each place once with the far thing, once with
+the near one."""
 WITHIN_CELLS = 2.5
 """Surfaces belong to a plane within so many cells of total disparity."""
 
@@ -99,24 +102,23 @@ def true_labels(dataset: Dataset, rays: Rays) -> np.ndarray:
 
 
 def starts_of(dataset: Dataset, rays: Rays) -> list[np.ndarray]:
-    """The most probable labels (h, w) int16 by the posterior of depth, as it is and smoothed."""
+    """Labels (h, w) int16 by the posterior of depth: the most probable ones when smoothed, and quantiles."""
     from scipy.ndimage import gaussian_filter
 
-    posterior, (h, w) = depth_posterior(dataset.counts, depth_range_of(dataset)), rays.shape
+    posterior = depth_posterior(dataset.counts, depth_range_of(dataset))
     places = [
         np.abs(rays.planes.total_disparity_px - px).argmin() for px in posterior.planes.total_disparity_px
     ]
     label_of = np.array([-1, *places], np.int16)
     probability = np.concatenate([posterior.no_surface[None], posterior.probability])
-    middle = rays.cell_px // 2
-    return [
-        on_pixels(
-            label_of[gaussian_filter(probability, blocks, axes=(1, 2)).argmax(axis=0)],
-            posterior.block_px,
-            dataset.grid.shape_HW,
-        )[middle :: rays.cell_px, middle :: rays.cell_px][:h, :w]
-        for blocks in SMOOTHINGS
-    ]
+    reached = np.cumsum(posterior.probability, axis=0) / np.maximum(1 - posterior.no_surface, 1e-6)
+    maps = [gaussian_filter(probability, blocks, axes=(1, 2)).argmax(axis=0) for blocks in SMOOTHINGS]
+    for quantile in QUANTILES:
+        plane = 1 + np.minimum((reached < quantile).sum(axis=0), len(places) - 1)
+        maps.append(np.where(posterior.no_surface > 0.5, 0, plane))
+    (h, w), middle, side = rays.shape, rays.cell_px // 2, rays.cell_px
+    pixels = [on_pixels(label_of[found], posterior.block_px, dataset.grid.shape_HW) for found in maps]
+    return [labels[middle::side, middle::side][:h, :w] for labels in pixels]
 
 
 def overlaps(dataset: Dataset, rays: Rays, labels: np.ndarray) -> list[float]:
