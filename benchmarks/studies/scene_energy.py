@@ -26,8 +26,9 @@ from pcii.metrics.agreement import mask_agreement
 from pcii.metrics.true_masks import TrueFocus
 from pcii.scene_model.energy import SceneEnergy
 from pcii.scene_model.parameters import SceneParameters
+from pcii.scene_model.ray_kernels import JUMP
 from pcii.scene_model.rays import Rays
-from pcii.scene_model.solver import State, least_energy
+from pcii.scene_model.solver import best_plane, least_energy, state_of
 from pcii.scene_model.surfaces import planes_of_surfaces
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
@@ -69,20 +70,22 @@ def _rows(scene: str, dataset: Dataset) -> list[Row]:
     rays = Rays.through(dataset.counts, depth_range_of(dataset), SceneParameters())
     energy = SceneEnergy(rays)
     truth = true_labels(dataset, rays)
-    zero = float(energy.of(truth).sum())
+    true = state_of(energy, truth)
     start = time.perf_counter()
     starts = starts_of(dataset, rays)
     found = least_energy(energy, starts)
     seconds = time.perf_counter() - start
-    planes = [np.full(truth.shape, label, np.int16) for label in range(len(rays.planes))]
-    plane = min(planes, key=lambda labels: energy.of(labels).sum())
-    states = {PLANE: State(plane, energy.of(plane)), FOUND: found, FROM_TRUTH: least_energy(energy, [truth])}
-    states[TRUTH] = State(truth, energy.of(truth))
+    states = {
+        PLANE: best_plane(energy),
+        FOUND: found,
+        FROM_TRUTH: least_energy(energy, [truth]),
+        TRUTH: true,
+    }
     rows = []
     for name, state in states.items():
-        wrong = np.abs(state.labels.astype(int) - truth)[truth >= 0] > 2
+        wrong = np.abs(state.labels.astype(int) - truth)[truth >= 0] > JUMP
         values = {
-            "energy_nats": Value(state.total - zero),
+            "energy_nats": Value(state.total - true.total),
             "iou": Value(float(np.mean(overlaps(dataset, rays, state.labels)))),
             "wrong_depth_percent": Value(100 * float(wrong.mean())),
         }

@@ -7,6 +7,7 @@ with s(x) the label of cell x of the virtual centre, and V(x) the pixels of all 
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class SceneEnergy:
         goes_on = hidden >= 0
         for begin, surface, here, own_px in (
             (0, labels, np.zeros_like(goes_on), seen[0]),
-            # Behind an outline a surface is predicted by what is seen of it beside that.
+            # The photon rate of a hidden part is predicted from the visible part of the same surface.
             (M, np.where(goes_on, hidden, labels), goes_on, np.where(goes_on, seen[1], 0)),
         ):
             if begin and not goes_on.any():
@@ -62,7 +63,7 @@ class SceneEnergy:
             )
         beside = np.where(other >= 0, self.parameters.beside_share, 0.0)
         rates = np.maximum((1 - beside) * own_rate + beside * other_rate, 1e-12)
-        energy -= np.bincount(rays.home, rays.n * np.log(rates), M)
+        energy -= np.bincount(rays.middle_cell, rays.n * np.log(rates), M)
         return energy.reshape(h, w)
 
     def exposure(self, labels: np.ndarray, hidden: np.ndarray) -> np.ndarray:
@@ -94,12 +95,12 @@ class SceneEnergy:
         owners(*self.rays.lines, labels, hidden, beside, at_edge, owner, other)
         return owner, other
 
-    @property
+    @cached_property
     def _mean(self) -> float:
         """Photons per pixel of all that counts."""
         return float(self.rays.n.sum(dtype=float)) / max(self.rays.exposed_px, 1.0)
 
-    @property
+    @cached_property
     def _shares(self) -> np.ndarray:
         """Shares of the colours in all photons."""
         photons = np.bincount(self.rays.colour, self.rays.n, 1 if self.rays.counts.cfa is None else 3)
@@ -142,7 +143,7 @@ class SceneEnergy:
             arguments = which, rays.colour, begin, photons, exposure, self._mean, self._shares, own
             kernels.window_rates(*arguments, result)
         gain = np.zeros((S - 1, labels.size), np.float32)
-        kernels.better_told(cells[0], rays.n, begin, by_window[0], gain)
+        kernels.add_log_likelihood_gain(cells[0], rays.n, begin, by_window[0], gain)
         gain += expected[-1] - expected[:-1]
         around = np.empty((S - 1, h, w), np.float32)
         decay = window_decay(self.parameters.quality_cells)

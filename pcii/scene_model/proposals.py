@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pcii.imaging.bright_regions import dilated
 from pcii.scene_model.ray_kernels import JUMP
 from pcii.scene_model.surfaces import of_one_surface, surfaces_of
 
@@ -82,7 +83,6 @@ def hulls(labels: np.ndarray) -> Iterator[Proposal]:
 
     What crosses something is seen on both sides of it.
     """
-    from scipy.ndimage import binary_dilation
     from skimage.morphology import convex_hull_image
 
     numbers = surfaces_of(labels)
@@ -103,8 +103,7 @@ def hulls(labels: np.ndarray) -> Iterator[Proposal]:
     while waiting:
         proposed, pieces, later = labels.copy(), np.zeros(labels.shape, np.int64), []
         for added, label in waiting:
-            near = np.asarray(binary_dilation(added, iterations=APART_CELLS), bool)
-            if pieces[near].any():
+            if pieces[dilated(added, APART_CELLS)].any():
                 later.append((added, label))
             else:
                 proposed[added], pieces[added] = label, pieces.max() + 1

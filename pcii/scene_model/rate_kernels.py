@@ -115,8 +115,10 @@ def expected_photons(
 
 
 @compiled
-def better_told(owner: np.ndarray, n: np.ndarray, begin: int, rates: np.ndarray, gain: np.ndarray) -> None:
-    """Adds to `gain` (S - 1, M) the nats by which windows tell of photons better than the widest one."""
+def add_log_likelihood_gain(
+    owner: np.ndarray, n: np.ndarray, begin: int, rates: np.ndarray, gain: np.ndarray
+) -> None:
+    """Adds to `gain` (S - 1, M) the log-likelihood of photons by each window less that by the widest one."""
     narrower, M = gain.shape
     for event in range(owner.size):
         cell = owner[event] - begin

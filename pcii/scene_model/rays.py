@@ -115,8 +115,8 @@ class Rays:
         return self.counts.event_colours[self._inside[2]].astype(np.int32)
 
     @cached_property
-    def home(self) -> np.ndarray:
-        """Cell (N,) in which each lands at the middle of the ladder: where its energy counts."""
+    def middle_cell(self) -> np.ndarray:
+        """Cell (N,) that each ray crosses at the middle depth, to which its photons' energy is assigned."""
         row, col, step_row, step_col = self.lines
         middle, (h, w) = len(self.planes) // 2, self.shape
         i = np.clip((row + middle * step_row) / 2, 0, h - 1).astype(np.int64)

@@ -57,9 +57,7 @@ def least_energy(energy: SceneEnergy, starts: Sequence[np.ndarray] = ()) -> Stat
 
     Any of them may be wrong. Deterministic.
     """
-    labels = range(0, len(energy.rays.planes), PLANE_STEP)
-    planes = [_state(energy, np.full(energy.rays.shape, label, np.int16)) for label in labels]
-    states = [min(planes, key=_total), *(_state(energy, start) for start in starts)]
+    states = [best_plane(energy, PLANE_STEP), *(state_of(energy, start) for start in starts)]
     states.sort(key=_total)
     best = min((_round(energy, state) for state in states[:FOLLOWED]), key=_total)
     for state in states:
@@ -70,6 +68,14 @@ def least_energy(energy: SceneEnergy, starts: Sequence[np.ndarray] = ()) -> Stat
         if best.total > before - LEAST_NATS:
             break
     return best
+
+
+def best_plane(energy: SceneEnergy, step: int = 1) -> State:
+    """The plane of least energy parallel to the film, of every `step`-th label."""
+    labels = range(0, len(energy.rays.planes), step)
+    return min(
+        (state_of(energy, np.full(energy.rays.shape, label, np.int16)) for label in labels), key=_total
+    )
 
 
 def fused(energy: SceneEnergy, state: State, proposal: Proposal) -> State:
@@ -93,7 +99,8 @@ def fused(energy: SceneEnergy, state: State, proposal: Proposal) -> State:
     return state
 
 
-def _state(energy: SceneEnergy, labels: np.ndarray) -> State:
+def state_of(energy: SceneEnergy, labels: np.ndarray) -> State:
+    """A labelling (h, w) int16 with its energy."""
     return State(labels, energy.of(labels))
 
 
@@ -104,7 +111,7 @@ def _total(state: State) -> float:
 def _with_pieces(energy: SceneEnergy, state: State, proposal: Proposal, where: np.ndarray) -> State:
     """The state that has the proposed labels `where` (h, w) bool; itself if that is nowhere."""
     return (
-        replace(_state(energy, np.where(where, proposal.labels, state.labels)), history=state.history)
+        replace(state_of(energy, np.where(where, proposal.labels, state.labels)), history=state.history)
         if where.any()
         else state
     )

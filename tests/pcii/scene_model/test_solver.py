@@ -9,7 +9,7 @@ from pcii.scene_model.energy import SceneEnergy
 from pcii.scene_model.parameters import SceneParameters
 from pcii.scene_model.proposals import hulls, merged, other_labelling, outlines_moved, shifted
 from pcii.scene_model.rays import Rays
-from pcii.scene_model.solver import State, fused, least_energy
+from pcii.scene_model.solver import fused, least_energy, state_of
 
 SIDE_PX, CAMERAS = 96, 7
 NEAR_PX, FAR_PX = 30.0, 18.0
@@ -67,7 +67,7 @@ def test_a_piece_that_costs_more_is_left_and_one_that_costs_less_is_taken(
     energy, truth = two_bars
     wrong = truth.copy()
     wrong[10:19, 21:27] = -1  # without the upper end of the upright bar
-    state = State(wrong, energy.of(wrong))
+    state = state_of(energy, wrong)
     offer = truth.copy()
     offer[19:29, 35:38] = -1  # and without an end of the level one, which costs less than that saves
     assert energy.of(offer).sum() < state.total
