@@ -11,7 +11,7 @@ import torch
 import torch.nn.functional as f
 from torch import Tensor, nn
 
-WIDTHS = (16, 24, 40, 64, 64)
+WIDTHS = (16, 32, 56, 80, 80)
 """Channels of cells of 4, 8, 16, 32 and 64 px."""
 HEAD = 8
 STEPS = (1, -1, 4, -4)
@@ -21,10 +21,8 @@ MOVED = 8
 
 def moved(x: Tensor, planes: int) -> Tensor:
     """The features of the plane so many steps before, 0 where there is none."""
-    empty = torch.zeros_like(x[:1])
-    for _ in range(abs(planes)):
-        x = torch.cat([empty, x[:-1]]) if planes > 0 else torch.cat([x[1:], empty])
-    return x
+    padded = f.pad(x, (0,) * 6 + (max(planes, 0), max(-planes, 0)))
+    return padded[: x.shape[0]] if planes > 0 else padded[-planes:]
 
 
 class Block(nn.Module):

@@ -43,14 +43,17 @@ def main() -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     for collection in arguments.collections:
         for folder in sorted(path.parent for path in collection.glob("*/manifest.json")):
-            for number in range(arguments.each):
-                name = f"{collection.name}_{folder.name}_{number}"
-                file = arguments.out / f"{name}.npz"
-                if not file.exists():
-                    example = example_of(
-                        pcii.open_dataset(folder), np.random.default_rng(zlib.crc32(name.encode()))
-                    )
-                    write_example(file, example)
+            write_examples(
+                pcii.open_dataset(folder), f"{collection.name}_{folder.name}", arguments.each, arguments.out
+            )
+
+
+def write_examples(dataset: Dataset, name: str, count: int, out: Path) -> None:
+    """Write so many examples of a dataset, those that are not there yet."""
+    for number in range(count):
+        file = out / f"{name}_{number}.npz"
+        if not file.exists():
+            write_example(file, example_of(dataset, np.random.default_rng(zlib.crc32(file.stem.encode()))))
 
 
 def example_of(dataset: Dataset, rng: np.random.Generator) -> dict[str, np.ndarray]:

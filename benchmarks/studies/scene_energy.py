@@ -24,12 +24,12 @@ from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.agreement import mask_agreement
 from pcii.metrics.true_masks import TrueFocus
+from pcii.removal.posterior_masks import PosteriorMasks, in_focus_at
 from pcii.scene_model.energy import SceneEnergy
 from pcii.scene_model.parameters import SceneParameters
 from pcii.scene_model.ray_kernels import JUMP
 from pcii.scene_model.rays import Rays
 from pcii.scene_model.solver import best_plane, least_energy, state_of
-from pcii.scene_model.surfaces import planes_of_surfaces
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
 
@@ -43,8 +43,6 @@ SMOOTHINGS = (0.0, 1.0, 2.0)
 QUANTILES = (0.2, 0.35, 0.5, 0.65, 0.8)
 """Of the depth of what is probably a surface, from far to near: each place once with the far thing, once with
 the near one."""
-WITHIN_CELLS = 2.5
-"""Surfaces belong to a plane within so many cells of total disparity."""
 
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {"kinds": ("textured", "checks"), "numbers": (TUNING,), "side_px": 256, "budget": 1000},
@@ -129,10 +127,11 @@ def overlaps(dataset: Dataset, rays: Rays, labels: np.ndarray) -> list[float]:
     assert dataset.truth is not None
     planes = planes_of(dataset, None)
     true = TrueFocus(dataset.grid, dataset.truth, planes.z_mm).by_object
-    ladder_px, within_px = rays.planes.total_disparity_px, WITHIN_CELLS * rays.cell_px
-    cells = planes_of_surfaces(labels, ladder_px, planes.total_disparity_px, within_px)
-    plane = on_pixels(cells, rays.cell_px, dataset.grid.shape_HW)
-    agreements = [mask_agreement(plane == number, mask) for number, mask in enumerate(true) if mask.any()]
+    ladder_px = rays.planes.total_disparity_px
+    near = in_focus_at(ladder_px, planes.total_disparity_px, PosteriorMasks.within_px)
+    cells = near[:, labels] & (labels >= 0)
+    masks = on_pixels(cells, rays.cell_px, dataset.grid.shape_HW)
+    agreements = [mask_agreement(mask, own) for mask, own in zip(masks, true, strict=True) if own.any()]
     return [agreement["iou"] or 0.0 for agreement in agreements]
 
 

@@ -46,12 +46,8 @@ class PosteriorMasks:
 
     def in_focus_probability(self, posterior: DepthPosterior, planes_px: np.ndarray) -> np.ndarray:
         """Probability (P, h, w) float32 of being in focus at planes of the total disparities (P,)."""
-        own_px, which = np.unique(planes_px, return_inverse=True)
-        gaps_px = np.diff(own_px, prepend=-np.inf, append=np.inf)
-        away_px = posterior.planes.total_disparity_px[:, None] - own_px
-        within_px = [np.minimum(gaps / 2, self.within_px) for gaps in (gaps_px[:-1], gaps_px[1:])]
-        near = (-within_px[0] < away_px) & (away_px <= within_px[1])
-        return np.tensordot(near.T.astype(np.float32), posterior.probability, axes=1)[which]
+        near = in_focus_at(posterior.planes.total_disparity_px, planes_px, self.within_px)
+        return np.tensordot(near.astype(np.float32), posterior.probability, axes=1)
 
     def range_mm(self, planes: FocalPlanes) -> tuple[float, float]:
         """Near and far ends of the depths around the planes; no less than half of the least disparity."""
@@ -60,3 +56,15 @@ class PosteriorMasks:
         farthest_px = max(total_px.min() - self.around_px, total_px.min() / 2)
         near_mm, far_mm = depth_of_total_disparity_mm(planes.grid, np.array([nearest_px, farthest_px]))
         return float(near_mm), float(far_mm)
+
+
+def in_focus_at(depths_px: np.ndarray, planes_px: np.ndarray, within_px: float) -> np.ndarray:
+    """Whether surfaces at total disparities (Z,) are in focus at planes (P,): (P, Z) bool.
+
+    They are at the nearest plane, if that is within `within_px`; planes may be alike.
+    """
+    own_px, which = np.unique(planes_px, return_inverse=True)
+    half_px = np.diff(own_px, prepend=-np.inf, append=np.inf) / 2
+    away_px = depths_px - own_px[:, None]
+    farther_px, nearer_px = (np.minimum(half, within_px)[:, None] for half in (half_px[:-1], half_px[1:]))
+    return ((-farther_px < away_px) & (away_px <= nearer_px))[which]

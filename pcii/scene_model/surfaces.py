@@ -84,20 +84,3 @@ def _from_mean(labels: np.ndarray, deviation_cells: float) -> np.ndarray:
     ):
         window_sums(values, right, down, window_decay(deviation_cells), result)
     return labels - sums[0] / sums[1]
-
-
-def planes_of_surfaces(
-    labels: np.ndarray, ladder_px: np.ndarray, planes_px: np.ndarray, within_px: float
-) -> np.ndarray:
-    """Plane (h, w) int64 that each surface as a whole belongs to, the one most of it is nearest to; or -1.
-
-    `ladder_px` (Z,) and `planes_px` (P,) are total disparities of labels and of planes; what is farther than
-    `within_px` from all planes belongs to none, and so does the background.
-    """
-    away_px = np.abs(ladder_px[:, None] - planes_px)
-    nearest = np.where(away_px.min(axis=1) <= within_px, away_px.argmin(axis=1), planes_px.size)
-    numbers = surfaces_of(labels)
-    votes = np.zeros((numbers.max() + 1, planes_px.size + 1), np.int64)
-    np.add.at(votes, (numbers, np.where(labels < 0, planes_px.size, nearest[labels])), 1)
-    chosen = votes.argmax(axis=1)[numbers]
-    return np.where(chosen == planes_px.size, -1, chosen)

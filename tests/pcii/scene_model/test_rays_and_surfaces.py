@@ -10,7 +10,7 @@ from pcii.scene_model.energy import SceneEnergy
 from pcii.scene_model.parameters import SceneParameters
 from pcii.scene_model.ray_kernels import behind
 from pcii.scene_model.rays import Rays
-from pcii.scene_model.surfaces import planes_of_surfaces, prior_nats, surfaces_of
+from pcii.scene_model.surfaces import prior_nats, surfaces_of
 
 SIDE_PX, CAMERAS, CELL_PX = 64, 5, 2
 TOTAL_PX = np.arange(8.0, 24.0)
@@ -148,10 +148,3 @@ def test_outlines_cost_their_length_and_surfaces_their_number():
 def test_surfaces_are_connected_cells_without_jumps():
     labels = np.array([[0, 1, 3, 7], [-1, -1, 3, 7], [0, -1, 3, 4]], np.int16)
     assert surfaces_of(labels).tolist() == [[0, 0, 0, 1], [2, 2, 0, 1], [3, 2, 0, 0]]
-
-
-def test_a_surface_belongs_to_the_plane_that_most_of_it_is_nearest_to():
-    labels = np.array([[0, 2, 2, 2, -1, 9, 9]], np.int16)
-    ladder_px = np.arange(10.0, 20.0)
-    planes = planes_of_surfaces(labels, ladder_px, np.array([10.0, 12.0, 30.0]), within_px=3.0)
-    assert planes.tolist() == [[1, 1, 1, 1, -1, -1, -1]]
