@@ -7,7 +7,8 @@
 # make bench-full     the same at full size: hours
 # make bench-guard    compare the ratios of that run with the committed ones; fails on a loss above 25 %
 # make bench-publish  make bench, then docs/benchmarks.md and the committed ratios from it; on an idle machine
-# make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours
+# make train  the network of depth anew: draws scenes, makes examples, trains for TRAIN_MINUTES; hours. Goes on
+#             from where it was stopped
 # make docs   the site of docs/*.md and the API, in out/docs
 # make gallery  docs/gallery.md and its pictures, of every scene that ships
 
@@ -78,7 +79,8 @@ train: llvm
 	  $(BIN)/simgen generate $$recipe --out $(OUT)/training/$$(basename $$recipe .toml) || exit; \
 	done
 	$(BIN)/python -m training.samples $(OUT)/training/* --out $(OUT)/training-examples
-	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES)
+	$(BIN)/python -m training.fit $(OUT)/training-examples --out $(OUT)/depth.pt --minutes $(TRAIN_MINUTES) \
+	  $(if $(wildcard $(OUT)/depth.state),--resume)
 	$(BIN)/python -m training.export $(OUT)/depth.pt
 
 docs: $(VENV)/.ready

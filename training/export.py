@@ -7,7 +7,9 @@ import argparse
 from pathlib import Path
 
 import torch
+from torch import Tensor, nn
 
+from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.surface_network import WEIGHTS
 from training.layers import WIDTHS, DepthNetwork
 
@@ -23,7 +25,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=WEIGHTS)
     arguments = parser.parse_args()
     network = DepthNetwork().eval()
-    network.load_state_dict(torch.load(arguments.weights, weights_only=True))
+    network.load_state_dict(torch.load(arguments.weights, weights_only=True, map_location="cpu"))
     export(network, arguments.out)
 
 
@@ -31,35 +33,39 @@ def export(network: DepthNetwork, folder: Path) -> None:
     """Write `trunk.onnx` and `head.onnx` into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     Z, h, w = 5, 64, 32
-    blocks, cells = {0: "planes", 1: "rows", 2: "columns"}, {0: "planes", 1: "cell_rows", 2: "cell_columns"}
-    evidence, surface = torch.zeros(Z, h, w), torch.zeros(Z, h // 2, w // 2)
-    inputs = (evidence, torch.ones(Z, h, w), torch.ones(Z, h // 2, w // 2), surface, torch.ones(1))
-    names = ["evidence", "brightness", "coverage", "surface", "light"]
+    blocks, cells = {1: "planes", 2: "rows", 3: "columns"}, {1: "planes", 2: "cell_rows", 3: "cell_columns"}
+    evidence, surface = torch.zeros(1, Z, h, w), torch.zeros(1, Z, h // 2, w // 2)
+    inputs = (evidence, torch.ones_like(evidence), torch.ones_like(surface), surface, torch.ones(1, 1))
     features = {0: "planes", 2: "cell_rows", 3: "cell_columns"}
-    torch.onnx.export(
+    outputs = {"features": features, "cell_logit": features, "nothing": {2: "cell_rows", 3: "cell_columns"}}
+    names = NetworkInputs._fields
+    _write(
         network.trunk,
         inputs,
         folder / "trunk.onnx",
-        input_names=names,
-        output_names=["features", "cell_logit", "nothing"],
-        dynamic_axes={
-            **dict(zip(names, (blocks, blocks, cells, cells), strict=False)),
-            "features": features,
-            "cell_logit": features,
-            "nothing": {2: "cell_rows", 3: "cell_columns"},
-        },
-        opset_version=OPSET,
-        dynamo=False,
+        dict(zip(names, (blocks, blocks, cells, cells, {}), strict=True)),
+        outputs,
     )
-    parts = torch.zeros(Z, WIDTHS[0], h // 2, w // 2), torch.zeros(Z, 1, h // 2, w // 2)
-    names = ["features", "cell_logit", "evidence", "brightness"]
+    parts = torch.zeros(Z, WIDTHS[0], h // 2, w // 2), torch.zeros(Z, 1, h // 2, w // 2), evidence, evidence
+    given = {"features": features, "cell_logit": features, "evidence": blocks, "brightness": blocks}
+    _write(network.head, parts, folder / "head.onnx", given, {"logit": blocks})
+
+
+def _write(
+    module: nn.Module,
+    example: tuple[Tensor, ...],
+    file: Path,
+    inputs: dict[str, dict[int, str]],
+    outputs: dict[str, dict[int, str]],
+) -> None:
+    """Write a part of the network, with the names of axes whose sizes may differ from the example's."""
     torch.onnx.export(
-        network.head,
-        (*parts, evidence, evidence),
-        folder / "head.onnx",
-        input_names=names,
-        output_names=["logit"],
-        dynamic_axes=dict(zip([*names, "logit"], (features, features, blocks, blocks, blocks), strict=True)),
+        module,
+        example,
+        file,
+        input_names=list(inputs),
+        output_names=list(outputs),
+        dynamic_axes=inputs | outputs,
         opset_version=OPSET,
         dynamo=False,
     )

@@ -1,8 +1,9 @@
 """The network of depth in PyTorch, and its export.
 
-All planes are treated alike: they are the batch (Z, C, h, w) of two-dimensional convolutions, between which
-they exchange features with the planes 1 and 4 steps away and with the largest and the mean over all planes. A
-U-net from cells of 4 px up to cells of 64 px sees shapes; a head of blocks of 2 px sees outlines.
+All planes of B films are treated alike: they are the batch (B Z, C, h, w) of two-dimensional
+convolutions, between which those of a film exchange features with the planes 1 and 4 steps away and with the
+largest and the mean over all planes. A U-net from cells of 4 px up to cells of 64 px sees shapes; a head of
+blocks of 2 px sees outlines.
 """
 
 from itertools import pairwise
@@ -20,9 +21,19 @@ MOVED = 8
 
 
 def moved(x: Tensor, planes: int) -> Tensor:
-    """The features of the plane so many steps before, 0 where there is none."""
+    """The features (B, Z, ...) of the plane so many steps before, 0 where there is none."""
     padded = f.pad(x, (0,) * 6 + (max(planes, 0), max(-planes, 0)))
-    return padded[: x.shape[0]] if planes > 0 else padded[-planes:]
+    return padded[:, : x.shape[1]] if planes > 0 else padded[:, -planes:]
+
+
+def by_film(x: Tensor, films: int) -> Tensor:
+    """Features (B Z, ...) of all planes of B films as (B, Z, ...)."""
+    return x.reshape(films, -1, *x.shape[1:])
+
+
+def over_all(x: Tensor) -> Tensor:
+    """The largest and the mean feature (B, 2 C, h, w) over the planes of features (B, Z, C, h, w)."""
+    return torch.cat([x.amax(1), x.mean(1)], dim=1)
 
 
 class Block(nn.Module):
@@ -37,16 +48,28 @@ class Block(nn.Module):
         nn.init.normal_(self.second.weight, std=0.2 / (3 * width**0.5))
         nn.init.zeros_(self.over_planes.weight)
 
-    def forward(self, x: Tensor) -> Tensor:
-        n = self.share
-        parts = [moved(x[:, i * n : (i + 1) * n], step) for i, step in enumerate(STEPS)]
-        exchanged = torch.cat([*parts, x[:, len(STEPS) * n :]], dim=1)
-        over_planes = self.over_planes(torch.cat([x.amax(0, keepdim=True), x.mean(0, keepdim=True)], dim=1))
-        return x + self.second(f.relu(self.first(exchanged) + over_planes))
+    def forward(self, x: Tensor, films: int) -> Tensor:
+        n, planes = self.share, by_film(x, films)
+        parts = [moved(planes[:, :, i * n : (i + 1) * n], step) for i, step in enumerate(STEPS)]
+        exchanged = torch.cat([*parts, planes[:, :, len(STEPS) * n :]], dim=2).flatten(0, 1)
+        first = by_film(self.first(exchanged), films) + self.over_planes(over_all(planes))[:, None]
+        return x + self.second(f.relu(first).flatten(0, 1))
+
+
+class Blocks(nn.ModuleList):
+    """Blocks one after another."""
+
+    def __init__(self, count: int, width: int) -> None:
+        super().__init__(Block(width) for _ in range(count))
+
+    def forward(self, x: Tensor, films: int) -> Tensor:
+        for block in self:
+            x = block(x, films)
+        return x
 
 
 class Trunk(nn.Module):
-    """Features (Z, 16, h, w) of cells of 4 px, their logits (Z, 1, h, w), that of no surface (1, 1, h, w)."""
+    """Features (B Z, 16, h, w) of cells of 4 px, logits (B Z, 1, h, w), that of no surface (B, 1, h, w)."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -54,9 +77,9 @@ class Trunk(nn.Module):
         self.stem = nn.Conv2d(5, first, 3, padding=1)
         self.down = nn.ModuleList(nn.Conv2d(fine, coarse, 2, stride=2) for fine, coarse in pairwise(WIDTHS))
         self.up = nn.ModuleList(nn.Conv2d(coarse, fine, 1) for fine, coarse in pairwise(WIDTHS))
-        self.before = nn.ModuleList(nn.Sequential(Block(width), Block(width)) for width in WIDTHS[1:-1])
-        self.coarsest = nn.Sequential(Block(WIDTHS[-1]), Block(WIDTHS[-1]))
-        self.after = nn.ModuleList(Block(width) for width in WIDTHS[1:-1])
+        self.before = nn.ModuleList(Blocks(2, width) for width in WIDTHS[1:-1])
+        self.coarsest = Blocks(2, WIDTHS[-1])
+        self.after = nn.ModuleList(Blocks(1, width) for width in WIDTHS[1:-1])
         self.last = nn.Conv2d(first, first, 3, padding=1)
         self.logit = nn.Conv2d(first, 1, 1)
         self.trust = nn.Parameter(torch.tensor(0.5))
@@ -66,29 +89,27 @@ class Trunk(nn.Module):
     def forward(
         self, evidence: Tensor, brightness: Tensor, coverage: Tensor, surface: Tensor, light: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
-        Z, h, w = surface.shape
-        mean_evidence = f.avg_pool2d(evidence[:, None], 2)
-        cell_brightness = f.avg_pool2d(brightness[:, None] ** 2, 2).clamp(min=1e-6).sqrt()
-        level = (light / 3).view(1, 1, 1, 1).expand(Z, 1, h, w)
-        parts = [mean_evidence, cell_brightness, coverage[:, None], surface[:, None] / 4, level]
-        fine = x = f.relu(self.stem(torch.cat(parts, dim=1)))
+        films = surface.shape[0]
+        cell_brightness = f.avg_pool2d(brightness**2, 2).clamp(min=1e-6).sqrt()
+        level = (light / 3).view(-1, 1, 1, 1).expand_as(surface)
+        parts = [f.avg_pool2d(evidence, 2), cell_brightness, coverage, surface / 4, level]
+        fine = x = f.relu(self.stem(torch.stack(parts, dim=2).flatten(0, 1)))
         kept = []
         for down, blocks in zip(self.down, self.before, strict=False):
-            x = blocks(down(x))
+            x = blocks(down(x), films)
             kept.append(x)
-        x = self.coarsest(self.down[-1](x))
+        x = self.coarsest(self.down[-1](x), films)
         for place in reversed(range(len(kept))):
             wider = f.interpolate(self.up[place + 1](x), scale_factor=2.0, mode="nearest")
-            x = self.after[place](kept[place] + wider)
+            x = self.after[place](kept[place] + wider, films)
         x = f.relu(fine + f.interpolate(self.up[0](x), scale_factor=2.0, mode="nearest"))
         x = x + f.relu(self.last(x))
-        logit = self.logit(x) + self.trust * surface[:, None]
-        nothing = self.nothing(torch.cat([x.amax(0, keepdim=True), x.mean(0, keepdim=True)], dim=1))
-        return x, logit, nothing
+        logit = self.logit(x) + self.trust * surface.flatten(0, 1)[:, None]
+        return x, logit, self.nothing(over_all(by_film(x, films)))
 
 
 class Head(nn.Module):
-    """Logits (Z, h, w) of blocks of 2 px."""
+    """Logits (B, Z, h, w) of blocks of 2 px."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -98,20 +119,15 @@ class Head(nn.Module):
         nn.init.zeros_(self.logit.weight)
 
     def forward(self, features: Tensor, cell_logit: Tensor, evidence: Tensor, brightness: Tensor) -> Tensor:
-        own = evidence[:, None]
-        parts = [
-            f.pixel_shuffle(self.spread(features), 2),
-            own,
-            moved(own, 1),
-            moved(own, -1),
-            brightness[:, None],
-        ]
-        x = f.relu(self.mix(torch.cat(parts, dim=1)))
-        return (self.logit(x) + f.interpolate(cell_logit, scale_factor=2.0, mode="nearest"))[:, 0]
+        own = evidence[:, :, None]
+        given = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
+        x = torch.cat([f.pixel_shuffle(self.spread(features), 2), given.flatten(0, 1)], dim=1)
+        logit = self.logit(f.relu(self.mix(x))) + f.interpolate(cell_logit, scale_factor=2.0, mode="nearest")
+        return by_film(logit, evidence.shape[0])[:, :, 0]
 
 
 class DepthNetwork(nn.Module):
-    """Log-probabilities (Z + 1, h, w) of the planes and, last, of no surface, for blocks of 2 px."""
+    """Log-probabilities (B, Z + 1, h, w) of the planes and, last, of no surface, for blocks of 2 px."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -122,5 +138,5 @@ class DepthNetwork(nn.Module):
     ) -> Tensor:
         features, cell_logit, nothing = self.trunk(evidence, brightness, coverage, surface, light)
         logit = self.head(features, cell_logit, evidence, brightness)
-        nothing = f.interpolate(nothing, scale_factor=2.0, mode="nearest")[:, 0]
-        return f.log_softmax(torch.cat([logit, nothing]), dim=0)
+        nothing = f.interpolate(nothing, scale_factor=2.0, mode="nearest")
+        return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1)

@@ -30,6 +30,7 @@ from pcii.scene_model.parameters import SceneParameters
 from pcii.scene_model.ray_kernels import JUMP
 from pcii.scene_model.rays import Rays
 from pcii.scene_model.solver import best_plane, least_energy, state_of
+from pcii.scene_model.starts import starts_of
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
 
@@ -38,12 +39,6 @@ if TYPE_CHECKING:
 
 TABLE = "Energy of surfaces"
 PLANE, FOUND, FROM_TRUTH, TRUTH = "best plane", "found", "from the truth", "truth"
-SMOOTHINGS = (0.0, 1.0, 2.0)
-"""Standard deviations in blocks by which the posterior of depth is smoothed: a start each."""
-QUANTILES = (0.2, 0.35, 0.5, 0.65, 0.8)
-"""Of the depth of what is probably a surface, from far to near: each place once with the far thing, once with
-the near one."""
-
 SIZES: Mapping[Size, Mapping[str, Any]] = {
     "quick": {"kinds": ("textured", "checks"), "numbers": (TUNING,), "side_px": 256, "budget": 1000},
     "full": {"kinds": tuple(KINDS), "numbers": range(TUNING, TUNING + 4), "side_px": 512, "budget": 1000},
@@ -70,7 +65,7 @@ def _rows(scene: str, dataset: Dataset) -> list[Row]:
     truth = true_labels(dataset, rays)
     true = state_of(energy, truth)
     start = time.perf_counter()
-    starts = starts_of(dataset, rays)
+    starts = starts_of(depth_posterior(dataset.counts, depth_range_of(dataset)), rays)
     found = least_energy(energy, starts)
     seconds = time.perf_counter() - start
     states = {
@@ -100,26 +95,6 @@ def true_labels(dataset: Dataset, rays: Rays) -> np.ndarray:
     z_mm = dataset.truth.z_mm[side // 2 :: side, side // 2 :: side][:h, :w]
     places = (total_disparity_px(dataset.grid, z_mm) - total_px[0]) / (total_px[1] - total_px[0])
     return np.where(places < -3, -1, np.clip(places.round(), 0, total_px.size - 1)).astype(np.int16)
-
-
-def starts_of(dataset: Dataset, rays: Rays) -> list[np.ndarray]:
-    """Labels (h, w) int16 by the posterior of depth: the most probable ones when smoothed, and quantiles."""
-    from scipy.ndimage import gaussian_filter
-
-    posterior = depth_posterior(dataset.counts, depth_range_of(dataset))
-    places = [
-        np.abs(rays.planes.total_disparity_px - px).argmin() for px in posterior.planes.total_disparity_px
-    ]
-    label_of = np.array([-1, *places], np.int16)
-    probability = np.concatenate([posterior.no_surface[None], posterior.probability])
-    reached = np.cumsum(posterior.probability, axis=0) / np.maximum(1 - posterior.no_surface, 1e-6)
-    maps = [gaussian_filter(probability, blocks, axes=(1, 2)).argmax(axis=0) for blocks in SMOOTHINGS]
-    for quantile in QUANTILES:
-        plane = 1 + np.minimum((reached < quantile).sum(axis=0), len(places) - 1)
-        maps.append(np.where(posterior.no_surface > 0.5, 0, plane))
-    (h, w), middle, side = rays.shape, rays.cell_px // 2, rays.cell_px
-    pixels = [on_pixels(label_of[found], posterior.block_px, dataset.grid.shape_HW) for found in maps]
-    return [labels[middle::side, middle::side][:h, :w] for labels in pixels]
 
 
 def overlaps(dataset: Dataset, rays: Rays, labels: np.ndarray) -> list[float]:

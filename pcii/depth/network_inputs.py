@@ -23,7 +23,7 @@ LEAST_PHOTONS, MOST_PHOTONS = 1e-2, 1e3
 
 
 class NetworkInputs(NamedTuple):
-    """Inputs (Z planes), float32. Numbers of blocks are padded to whole `multiple`s with empty ones.
+    """Inputs (Z planes), float32. Films are mirrored at their ends where the network needs more blocks.
 
     `evidence` (Z, h, w): asinh of the nats of a block; `brightness` (Z, h, w): square root of its mean over
     that of the film; `coverage` (Z, h / 2, w / 2): share of the views' samples that a cell has; `surface`
@@ -39,14 +39,27 @@ class NetworkInputs(NamedTuple):
 
 
 def inputs_of(
-    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int
+    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int, least: int
 ) -> NetworkInputs:
-    """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples."""
+    """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples.
 
-    def padded(values: np.ndarray) -> np.ndarray:
-        return np.pad(values, [(0, 0), *((0, -size % multiple) for size in values.shape[1:])])
+    Films are mirrored up to whole multiples of so many blocks, and at `least` so many: an empty border would
+    look like the dark around things.
+    """
 
-    nats, sums, samples = (padded(part) for part in (evidence.nats, evidence.sums, evidence.samples))
+    def in_whole_cells(values: np.ndarray) -> np.ndarray:
+        return np.pad(values, [(0, 0), *((0, -size % CELL_SIDE_BLOCKS) for size in values.shape[1:])])
+
+    h, w = (max(-(-size // multiple) * multiple, least) for size in evidence.nats.shape[1:])
+
+    def mirrored(values: np.ndarray, side: int = 1) -> np.ndarray:
+        ends = [
+            (0, 0),
+            *((0, full // side - size) for full, size in zip((h, w), values.shape[1:], strict=True)),
+        ]
+        return np.pad(values, ends, mode="symmetric")
+
+    nats, sums, samples = (in_whole_cells(part) for part in (evidence.nats, evidence.sums, evidence.samples))
     in_cells = [block_sums(part, CELL_SIDE_BLOCKS, np.float32) for part in (nats, samples)]
     posterior = surface_posterior(in_cells[0], prior).transpose(2, 0, 1)
     ratio = np.log(np.maximum(posterior * len(nats), np.float32(np.exp(LEAST_LOG_RATIO))))
@@ -54,10 +67,11 @@ def inputs_of(
     mean = total / number if total > 0 and number > 0 else 1.0
     rate = sums / np.maximum(samples, 1e-3) / np.float32(mean)
     photons = float(evidence.photons.mean(dtype=np.float64)) / 4
+    of_cell = samples_per_block * CELL_SIDE_BLOCKS**2
     return NetworkInputs(
-        np.arcsinh(nats),
-        np.sqrt(np.clip(rate, 0, MOST_RATE)),
-        in_cells[1] / np.float32(samples_per_block * CELL_SIDE_BLOCKS**2),
-        np.minimum(ratio, np.float32(MOST_LOG_RATIO)),
+        mirrored(np.arcsinh(nats)),
+        mirrored(np.sqrt(np.clip(rate, 0, MOST_RATE))),
+        mirrored(in_cells[1] / np.float32(of_cell), CELL_SIDE_BLOCKS),
+        mirrored(np.minimum(ratio, np.float32(MOST_LOG_RATIO)), CELL_SIDE_BLOCKS),
         np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32),
     )

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 WEIGHTS = Path(__file__).parent / "weights"
 MULTIPLE = 32
 """Blocks of a cell of the network's coarsest level, of which films are whole numbers."""
+LEAST_BLOCKS = 128
+"""Smaller films are mirrored up to this side, half of that of the films it was trained on."""
 BAND_VALUES = 1 << 20
 """Blocks times planes whose last step is done at once, which takes 0.2 GB."""
 
@@ -34,7 +36,9 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     # Else the memory of the widest step is kept as long as the process runs.
     options.add_run_config_entry("memory.enable_memory_arena_shrinkage", "cpu:0")
     Z, h, w = inputs.evidence.shape
-    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, inputs._asdict(), options))
+    # The network takes several films at once; here it is one.
+    given = {name: part[None] for name, part in inputs._asdict().items()}
+    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, given, options))
     nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
@@ -43,11 +47,11 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
         # A convolution of the head reaches one block beyond, so that one cell more is given on either side.
         first, last = max(top - CELL_SIDE_BLOCKS, 0), min(end + CELL_SIDE_BLOCKS, h)
         cells = np.s_[:, :, first // CELL_SIDE_BLOCKS : last // CELL_SIDE_BLOCKS]
-        blocks = np.s_[:, first:last]
-        parts = features[cells], cell_logit[cells], inputs.evidence[blocks], inputs.brightness[blocks]
+        blocks = np.s_[:, :, first:last]
+        parts = features[cells], cell_logit[cells], given["evidence"][blocks], given["brightness"][blocks]
         names = [argument.name for argument in head.get_inputs()]
         (logit,) = head.run(None, dict(zip(names, parts, strict=True)), options)
-        own = np.asarray(logit)[:, top - first : end - first]
+        own = np.asarray(logit)[0, :, top - first : end - first]
         largest = np.maximum(own.max(axis=0), nothing[top:end])
         own = np.exp(own - largest)
         none[top:end] = np.exp(nothing[top:end] - largest)

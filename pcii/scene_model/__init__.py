@@ -10,5 +10,6 @@ ray_kernels      Compiled: which surface a ray of a camera meets first, and how 
                  see a cell.
 rays             Rays of photons through a ladder of depths, in cells of the virtual centre.
 solver           The search for the labelling of least energy: from several starts, proposal by proposal.
+starts           Labellings to start the search from, by the posterior probability of depth.
 surfaces         Surfaces of a labelling: connected cells, and what outlines, surfaces and roughness cost.
 """

@@ -44,8 +44,9 @@ class Rays:
 
     @cached_property
     def shape(self) -> tuple[int, int]:
-        """Cells (h, w) of the film; what is left over at the end of an axis belongs to none."""
-        return self.counts.grid.height // self.cell_px, self.counts.grid.width // self.cell_px
+        """Cells (h, w) of the film; the last ones of an axis may reach beyond it."""
+        h, w = (-(-size // self.cell_px) for size in self.counts.grid.shape_HW)
+        return h, w
 
     @cached_property
     def shifts(self) -> tuple[np.ndarray, np.ndarray]:
@@ -70,10 +71,10 @@ class Rays:
     def film(self) -> tuple[np.ndarray, np.ndarray]:
         """First and last row (K, 2), and column (L, 2), of each camera's film that count, in cells."""
         parts = []
-        for size, shifts in zip(self.shape, self.planes.exact_shifts_px, strict=True):
-            first = np.maximum(0.0, -shifts.min(axis=0) / self.cell_px)
-            last = np.minimum(size, size - shifts.max(axis=0) / self.cell_px)
-            parts.append(np.stack([first, np.maximum(first, last)], axis=1))
+        for size_px, shifts_px in zip(self.counts.grid.shape_HW, self.planes.exact_shifts_px, strict=True):
+            first_px = np.maximum(0.0, -shifts_px.min(axis=0))
+            last_px = np.maximum(first_px, size_px - np.maximum(0.0, shifts_px.max(axis=0)))
+            parts.append(np.stack([first_px, last_px], axis=1) / self.cell_px)
         return parts[0], parts[1]
 
     @property

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
+from pcii.core.estimates import DepthPosterior
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.scene_model.energy import SceneEnergy
 from pcii.scene_model.parameters import SceneParameters
 from pcii.scene_model.ray_kernels import behind
 from pcii.scene_model.rays import Rays
+from pcii.scene_model.starts import starts_of
 from pcii.scene_model.surfaces import prior_nats, surfaces_of
 
 SIDE_PX, CAMERAS, CELL_PX = 64, 5, 2
@@ -148,3 +150,29 @@ def test_outlines_cost_their_length_and_surfaces_their_number():
 def test_surfaces_are_connected_cells_without_jumps():
     labels = np.array([[0, 1, 3, 7], [-1, -1, 3, 7], [0, -1, 3, 4]], np.int16)
     assert surfaces_of(labels).tolist() == [[0, 0, 0, 1], [2, 2, 0, 1], [3, 2, 0, 0]]
+
+
+def test_a_film_may_end_within_a_cell():
+    grid = unit_grid(CAMERAS, CAMERAS, 61, 63)
+    planes = FocalPlanes.at_total_disparity(grid, TOTAL_PX)
+    rays = Rays(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid), planes, CELL_PX)
+    assert rays.shape == (31, 32)
+    # With one photon in every pixel, those that count are the pixels that count.
+    assert rays.n.sum() == pytest.approx(rays.exposed_px, rel=0.01)
+    energy = SceneEnergy(rays)
+    labels = np.full(rays.shape, 8, np.int16)
+    seen = energy.exposure(labels, behind(labels, rays.largest_step))
+    assert seen.sum() == pytest.approx(rays.exposed_px, rel=0.01)
+
+
+def test_searches_start_from_the_most_probable_depths_and_from_the_near_and_the_far_ones():
+    grid = unit_grid(CAMERAS, CAMERAS, 61, 63)
+    planes = FocalPlanes.at_total_disparity(grid, TOTAL_PX)
+    rays = Rays(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, int), grid), planes, CELL_PX)
+    probability = np.zeros((TOTAL_PX.size, 31, 32), np.float32)
+    probability[3, :, :16], probability[11, :, :16] = 0.3, 0.6
+    nothing = 1 - probability.sum(axis=0)
+    starts = starts_of(DepthPosterior(planes, probability, nothing, block_px=2), rays)
+    assert all(start.shape == rays.shape and (start[:, 20:] == -1).all() for start in starts)
+    assert (starts[0][:, :16] == 11).all()
+    assert {int(start[15, 4]) for start in starts} == {3, 11}
