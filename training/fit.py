@@ -172,7 +172,10 @@ class Examples:
                 self.of_planes.setdefault(self.planes[file], []).append(file)
 
     def batches(self, rng: np.random.Generator, pool: ThreadPoolExecutor) -> Iterator[Batch]:
-        """Batches without end, made ahead of their use: all kinds of scene alike, as many planes in each."""
+        """Batches without end, made ahead of their use, of examples with as many planes.
+
+        How many is that of one of a kind of scene, all kinds alike.
+        """
         kinds, waiting = list(self.kinds.values()), deque[Future[Batch]]()
         while True:
             while len(waiting) < MADE_AHEAD:

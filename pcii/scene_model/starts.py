@@ -3,7 +3,6 @@
 import numpy as np
 
 from pcii.core.estimates import DepthPosterior
-from pcii.imaging.blocks import on_pixels
 from pcii.scene_model.rays import Rays
 
 SMOOTHINGS_BLOCKS = (0.0, 1.0, 2.0)
@@ -26,12 +25,8 @@ def starts_of(posterior: DepthPosterior, rays: Rays) -> list[np.ndarray]:
     for quantile in QUANTILES:
         plane = 1 + np.minimum((reached < quantile).sum(axis=0), len(places) - 1)
         maps.append(np.where(posterior.no_surface > 0.5, 0, plane))
-    middles = (slice(rays.cell_px // 2, None, rays.cell_px),) * 2
-    starts = []
-    for found in maps:
-        pixels = on_pixels(label_of[found], posterior.block_px, rays.counts.grid.shape_HW)
-        cells = pixels[middles]
-        # The middle of a last cell may lie beyond the film.
-        missing = [(0, full - size) for full, size in zip(rays.shape, cells.shape, strict=True)]
-        starts.append(np.pad(cells, missing, mode="edge"))
-    return starts
+    i, j = (
+        np.minimum((np.arange(cells) * rays.cell_px + rays.cell_px // 2) // posterior.block_px, blocks - 1)
+        for cells, blocks in zip(rays.shape, posterior.no_surface.shape, strict=True)
+    )
+    return [label_of[found][np.ix_(i, j)] for found in maps]
