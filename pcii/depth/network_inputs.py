@@ -39,18 +39,18 @@ class NetworkInputs(NamedTuple):
 
 
 def inputs_of(
-    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int, least: int
+    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int
 ) -> NetworkInputs:
     """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples.
 
-    Films are mirrored up to whole multiples of so many blocks, and at `least` so many: an empty border would
-    look like the dark around things.
+    Films are mirrored up to whole multiples of so many blocks: an empty border would look like the dark
+    around things.
     """
 
     def in_whole_cells(values: np.ndarray) -> np.ndarray:
         return np.pad(values, [(0, 0), *((0, -size % CELL_SIDE_BLOCKS) for size in values.shape[1:])])
 
-    h, w = (max(-(-size // multiple) * multiple, least) for size in evidence.nats.shape[1:])
+    h, w = (-(-size // multiple) * multiple for size in evidence.nats.shape[1:])
 
     def mirrored(values: np.ndarray, side: int = 1) -> np.ndarray:
         ends = [

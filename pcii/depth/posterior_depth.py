@@ -18,7 +18,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.depth.network_inputs import NetworkInputs, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
-from pcii.depth.surface_network import LEAST_BLOCKS, MULTIPLE, network_posterior
+from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
@@ -123,7 +123,7 @@ class PosteriorDepth:
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
         samples_per_block = planes.grid.view_count * block_px**2
-        return inputs_of(evidence, samples_per_block, self.prior, MULTIPLE, LEAST_BLOCKS)
+        return inputs_of(evidence, samples_per_block, self.prior, MULTIPLE)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
         """In how many of eight directions a block (h, w) meets one where the halves `agree`, at its depth."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 WEIGHTS = Path(__file__).parent / "weights"
 MULTIPLE = 32
 """Blocks of a cell of the network's coarsest level, of which films are whole numbers."""
-LEAST_BLOCKS = 128
-"""Smaller films are mirrored up to this side, half of that of the films it was trained on."""
 BAND_VALUES = 1 << 20
 """Blocks times planes whose last step is done at once, which takes 0.2 GB."""
 

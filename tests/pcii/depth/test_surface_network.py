@@ -77,7 +77,7 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
     samples = grid.view_count * METHOD.block_px**2
-    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1, least=0)
+    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1)
     turned = inputs_of(
         evidence._replace(
             nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
@@ -85,7 +85,6 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
         samples,
         SurfacePrior(),
         multiple=1,
-        least=0,
     )
     for part, other in zip(own[:4], turned[:4], strict=True):
         np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
