@@ -23,7 +23,6 @@ ROOMS = {
         "io",
         "sections",
         "exporting",
-        "scene_model",
         "evidence",
         "depth",
         "importing",

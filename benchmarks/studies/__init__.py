@@ -7,7 +7,6 @@ sections          Errors of sections of a known texture, ours and other packages
 section_growth    Time of sections at the paper's size, and how that grows.
 demosaicing       Errors of colours.
 depth_and_focus   Depth and removal by every method over photon budgets.
-scene_energy      The model of the scene: is the least energy beside the truth, and is it found?
 skips             Work that is skipped: on against off.
 end_to_end        From a recipe to a report, beside a plain script.
 colour            Colours of a chart in spectral and RGB mode.
@@ -24,7 +23,6 @@ from benchmarks.studies import (
     photon_costs,
     photon_images,
     radiance_images,
-    scene_energy,
     section_growth,
     sections,
     skips,
@@ -38,7 +36,6 @@ STUDIES: tuple[Study, ...] = (
     section_growth.STUDY,
     demosaicing.STUDY,
     depth_and_focus.STUDY,
-    scene_energy.STUDY,
     skips.STUDY,
     end_to_end.STUDY,
     colour.STUDY,
