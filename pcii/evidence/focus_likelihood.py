@@ -58,20 +58,6 @@ class FocusEvidence:
     photons: np.ndarray
 
 
-@dataclass(frozen=True)
-class Predictions:
-    """Rates that the sections at Z planes predict for N events, and for cells of 4 x 4 pixels.
-
-    `rate` (Z, N) float32: photons per sample of each event's pixel, by all other events; `cell` (Z, N) int32:
-    flat index of the cell that the event falls into, -1 outside; `expected` (Z, H / 4, W / 4) float32:
-    photons in each cell.
-    """
-
-    rate: np.ndarray
-    cell: np.ndarray
-    expected: np.ndarray
-
-
 def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
     """Shape of the coarse grid, (H / 4, W / 4) rounded up."""
     return -(-counts.grid.height // CELL_PX), -(-counts.grid.width // CELL_PX)
@@ -79,15 +65,6 @@ def cell_shape(counts: PhotonCounts) -> tuple[int, int]:
 
 def focus_evidence(counts: PhotonCounts, planes: FocalPlanes) -> FocusEvidence:
     """Evidence that surfaces are at these planes."""
-    return _evaluated(counts, planes, keep=False)[0]
-
-
-def predictions_of(counts: PhotonCounts, planes: FocalPlanes) -> tuple[FocusEvidence, Predictions]:
-    """As `focus_evidence`, and the rate predicted for each event: 8 bytes per event and plane."""
-    return _evaluated(counts, planes, keep=True)
-
-
-def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tuple[FocusEvidence, Predictions]:
     from pcii.base.compiled_loops import each_in_threads
     from pcii.evidence import focus_kernels as kernels
     from pcii.evidence.prediction_kernels import predict
@@ -98,9 +75,6 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
     sites = sites_of_colours(counts.cfa)
     Z, N, C, (h, w) = len(rows), events.n.size, counts.channel_count, cell_shape(counts)
     gain, photons = np.zeros((Z, h, w), np.float32), np.zeros((Z, C, h, w), np.float32)
-    # Predictions of all planes take memory: without `keep` they have no planes.
-    rate, cell = (np.zeros((Z * keep, N), kind) for kind in (np.float32, np.int32))
-    expected = np.zeros((Z * keep, h, w), np.float32)
     n, full_weight = events.n.astype(np.float32), np.ones(N, np.float32)
     place = events.k, events.l, events.i, events.j
     shape_HW, all_views = grid.shape_HW, np.ones((h, w), np.float32)
@@ -115,11 +89,9 @@ def _evaluated(counts: PhotonCounts, planes: FocalPlanes, *, keep: bool) -> tupl
         plane_gain = predicted.samples * (predicted.blurred - predicted.mean)
         kernels.gain_over_blur(placed, predicted, plane_gain, photons[z])
         gain[z] = plane_gain
-        if keep:
-            rate[z], cell[z], expected[z] = predicted.rate, cell_of, predicted.samples * predicted.mean
 
     each_in_threads(evaluate, range(Z))
-    return FocusEvidence(planes, gain, photons), Predictions(rate, cell, expected)
+    return FocusEvidence(planes, gain, photons)
 
 
 def photon_weighted_mean(photons: np.ndarray) -> float:

@@ -1,6 +1,5 @@
-"""Removal by likelihood: regions, duels of depths, opaque layers, outlines.
+"""Removal by likelihood: regions, opaque layers, outlines.
 
-duel               Duels of depths, photon by photon: what does each predict that the others do not?
 guesses            Pieces that may belong to another layer than the one that is seen there now.
 hiding_kernels     Compiled loops over events: which layers hide them, and how well layers predict them.
 layer_kernels      Compiled loops over rays: which layer does each camera see, and what is behind it?

@@ -1,4 +1,4 @@
-"""The search for the opaque layers of least energy: from several starts, then guess by guess.
+"""The search for the opaque layers of least energy: sweeps, then guess by guess.
 
 Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
 nothing behind it can show that it is there. So whole pieces are guessed (`guesses`), put in place and
@@ -34,15 +34,15 @@ LEAST_NATS, PRIOR_SHARE = 5.0, 0.35
 fit that follows noise pays in full, but of pieces that are guessed there are few."""
 
 
-def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, starts: Sequence[np.ndarray]) -> np.ndarray:
+def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, start: np.ndarray) -> np.ndarray:
     """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
 
-    `total_disparity_px` (D,) ascends, from far to near; `starts` are guesses of the result. All are followed,
-    and the nearest that they lead to; from the one of least E pieces are guessed anew. Deterministic.
+    `total_disparity_px` (D,) ascends, from far to near; `start` (h, w) is a guess of the result, from
+    which layers are fitted; then pieces are guessed. Deterministic.
     """
-    lit = np.max(starts, axis=0) >= 0
+    lit = start >= 0
     if not lit.any():
-        return starts[0]
+        return start
     grid = counts.grid
     most = max(MOST_PHOTONS, MOST_PHOTONS_PER_PX * grid.height * grid.width)
     few = counts.subsample(most, np.random.default_rng(0))
@@ -50,19 +50,13 @@ def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, starts: Sequen
     box = _box_of_light(lit, grid, total_disparity_px)
     cut = _cut_out(few, box)
     layers = Layers(cut, total_disparity_px, dark)
-    different: list[np.ndarray] = []
-    for start in starts:
-        if not any(np.array_equal(start, other) for other in different):
-            different.append(start)
-    found = [_settled(layers, start[box]) for start in different]
-    if len(found) > 1:
-        # What one of them found in front another may have missed: what explains nothing goes again.
-        found.append(_settled(layers, np.max([seen for _, seen in found], axis=0)))
-    best = min(found, key=lambda one: one[0])[1]
-    result = np.full(starts[0].shape, -1)
+    layers.put(_masks_of(start[box], len(layers.masks)))
+    for _ in range(SWEEPS):
+        layers.sweep()
     if len(total_disparity_px) > 1:
-        best = _guessed_anew(layers, Layers(cut, np.repeat(total_disparity_px, 2), dark), best)
-    result[box] = best
+        _guess_anew(layers, Layers(cut, np.repeat(total_disparity_px, 2), dark))
+    result = np.full(start.shape, -1)
+    result[box] = layers.visible()
     return result
 
 
@@ -85,25 +79,17 @@ def _cut_out(counts: PhotonCounts, box: tuple[slice, slice]) -> PhotonCounts:
     return PhotonCounts.from_events(k, l, i - top, j - left, n, cut_grid, cfa=counts.cfa)
 
 
-def _settled(layers: Layers, start: np.ndarray) -> tuple[float, np.ndarray]:
-    """E and what is seen (h, w) after sweeps from a guess of what is seen."""
-    layers.put(_masks_of(start, len(layers.masks)))
-    for _ in range(SWEEPS):
-        layers.sweep()
-    return layers.energy(), layers.visible()
-
-
 def _masks_of(seen: np.ndarray, count: int) -> np.ndarray:
     return np.arange(count)[:, None, None] == seen
 
 
-def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarray:
-    """What is seen (h, w) after pieces were guessed and those kept that cost less.
+def _guess_anew(layers: Layers, doubled: Layers) -> None:
+    """Guess pieces of the layers, and keep those that cost less.
 
     `doubled` has each of the `layers` twice, for surfaces that are told by themselves at the same depth.
     """
-    layers.put(_masks_of(seen, len(layers.masks)))
-    changed = np.ones(seen.shape, dtype=bool)
+    layers.put(_masks_of(layers.visible(), len(layers.masks)))
+    changed = np.ones(layers.masks.shape[1:], dtype=bool)
     for _ in range(ROUNDS):
         for _ in range(SWEEPS_OF_A_GUESS):
             layers.sweep(LIT_NATS)
@@ -117,7 +103,6 @@ def _guessed_anew(layers: Layers, doubled: Layers, seen: np.ndarray) -> np.ndarr
                 changed |= guess.around
         if not changed.any():
             break
-    return layers.visible()
 
 
 def _apart(guesses: Sequence[Guess]) -> list[list[Guess]]:

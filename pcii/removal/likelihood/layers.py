@@ -148,10 +148,6 @@ class Layers:
         """
         self._compose(fit=True, lit_nats=lit_nats)
 
-    def energy(self) -> float:
-        """E of the masks as they are, in nats."""
-        return float((self._outlines() + AREA_NATS * self.masks.sum(axis=0) - self.light_explained()).sum())
-
     def cost_seen(self) -> np.ndarray:
         """What outlines cost, and cells for the rays alone that end on any of them, in nats (h, w)."""
         from pcii.removal.likelihood.layer_kernels import gathered

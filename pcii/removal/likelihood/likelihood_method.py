@@ -8,11 +8,9 @@
    neighbour (evidence that is largest midway between two planes counts for neither), and one that a depth far
    from every plane explains surely better is defocused.
    (`pcii.removal.likelihood.regions`)
-4. Where pieces of several planes touch they are compared photon by photon: what does each of their depths
-   predict of it that the others do not? (`duel`)
-5. There, and everywhere if light is scarce, opaque layers are fitted to all photons together: what a nearer
-   one hides says nothing of those behind it (`layers`, `layer_search`).
-6. Each region is outlined to the pixel at its own depth (`outline`).
+4. Where pieces of several planes touch, and everywhere if light is scarce, opaque layers are fitted to all
+   photons together: what a nearer one hides says nothing of those behind it (`layers`, `layer_search`).
+5. Each region is outlined to the pixel at its own depth (`outline`).
 
 Nothing is told about the number of objects, their colours or their depths, and nothing is claimed without
 evidence, nor without two halves of the cameras agreeing on it (`pcii.evidence.half_agreement`): of films
@@ -43,7 +41,6 @@ from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around, dilated
-from pcii.removal.likelihood.duel import duelled, where_planes_touch
 from pcii.removal.likelihood.layer_search import layered
 from pcii.removal.likelihood.outline import outlined
 from pcii.removal.likelihood.regions import (
@@ -55,6 +52,7 @@ from pcii.removal.likelihood.regions import (
     dark_pieces,
     regions_of,
     settled,
+    where_planes_touch,
 )
 from pcii.sections.reconstruction import reconstruct
 
@@ -107,16 +105,10 @@ def remove_by_likelihood(counts: PhotonCounts, sections: Sections) -> Segmented:
     touching = where_planes_touch(bright, numbers, regions)
     plane, fitted = np.where(bright, plane, -1), np.zeros_like(bright)
     if faint or touching.any():
-        starts = [plane]
-        if touching.any():
-            plane = duelled(enough, plane, touching, regions, own_disparity_px)
-            # Once more: what was one region may be several now, at depths of their own.
-            parted = regions_of(plane, bright, focus, planes, halves)[1]
-            starts.append(duelled(enough, plane, touching, parted, own_disparity_px))
         # A thing by itself in the dark has been judged as a whole: of a round one each depth explains a part,
         # and none is to have it. It is left alone, unless there is too little light to see where it ends.
         fitted = ~dilated(bright & ~touching & (not faint), HALO_CELLS)
-        plane = np.where(fitted, layered(enough, own_disparity_px, starts), starts[0])
+        plane = np.where(fitted, layered(enough, own_disparity_px, plane), plane)
         plane = np.where(dark_pieces(plane, bright), -1, plane)
         numbers, regions = regions_of(plane, plane >= 0, focus, planes, halves)
     inner = fitted & ~dilated(plane < 0, OUTLINE_CELLS)

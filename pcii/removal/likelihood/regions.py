@@ -5,6 +5,7 @@ dark around it, where a blurred outline would show. A piece that its neighbour's
 its neighbour's; a region that some depth far from every plane explains surely better is defocused.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,6 +36,8 @@ OWN_OPINION_CELLS = 25
 """A piece of less than 20 x 20 px within something larger is narrower than the windows that put it there; one
 by itself has the evidence of the dark around it, and no benefit of doubt about whether it is in focus."""
 SMALLEST_CELLS = 6
+STRONG_NATS, STRONG_CELLS = 20.0, 25
+"""Layers are fitted where regions touch that have this much evidence and so many cells."""
 ROUNDS = 3
 
 
@@ -206,6 +209,17 @@ def regions_of(
                 )
             )
     return numbers, found
+
+
+def where_planes_touch(bright: np.ndarray, numbers: np.ndarray, regions: Sequence[Region]) -> np.ndarray:
+    """Connected pieces of what is bright that hold strong regions of several planes, (h, w) bool."""
+    pieces = connected_pieces(bright)
+    planes_of: dict[int, set[int]] = {}
+    for region in regions:
+        if region.gain_nats > STRONG_NATS and region.cells >= STRONG_CELLS:
+            piece = int(pieces[numbers == region.number][0])
+            planes_of.setdefault(piece, set()).add(region.plane)
+    return np.isin(pieces, [piece for piece, own in planes_of.items() if len(own) > 1])
 
 
 def dark_pieces(plane: np.ndarray, bright: np.ndarray) -> np.ndarray:

@@ -17,7 +17,6 @@ from pcii.evidence.focus_likelihood import (
     cell_shape,
     focus_evidence,
     photon_weighted_mean,
-    predictions_of,
     windowed,
 )
 from pcii.sections.reconstruction import reconstruct
@@ -33,9 +32,6 @@ def plane_at(grid: CameraGrid, disparity: float) -> FocalPlanes:
 
 
 class Twin(NamedTuple):
-    rate: np.ndarray
-    cell: np.ndarray
-    expected: np.ndarray
     gain: np.ndarray
     size: np.ndarray  # sum of the absolute terms of each gain, for its rounding
 
@@ -105,8 +101,7 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
         down = sum(v * reach(y, b, width, rows) for b, v in enumerate(covering_views[scale][0]))
         return down * sum(v * reach(x, b, width, cols) for b, v in enumerate(covering_views[scale][1]))
 
-    rate, cell = np.zeros(len(photons)), np.full(len(photons), -1)
-    expected, gain, size = np.zeros((h, w)), np.zeros((h, w)), np.zeros((h, w))
+    gain, size = np.zeros((h, w)), np.zeros((h, w))
     for e, (row, col, c, n, inside) in enumerate(photons):
         if not inside:
             continue
@@ -118,10 +113,9 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
             share = (light(wide, y, x, c, e) + 0.3 * sites[c] / sum(sites)) / (around + 0.3)
             rates.append(light(scale, y, x, None, e) * share / (samples(scale, y, x) * sites[c]))
         base = max(rates[4], 1e-12)
-        rate[e] = 0.95 * sum(rates) / 5 + 0.05 * base
-        cell[e] = (row // 4) * w + col // 4
-        gain[row // 4, col // 4] += n * math.log(rate[e] / base)
-        size[row // 4, col // 4] += n * abs(math.log(rate[e] / base))
+        rate = 0.95 * sum(rates) / 5 + 0.05 * base
+        gain[row // 4, col // 4] += n * math.log(rate / base)
+        size[row // 4, col // 4] += n * abs(math.log(rate / base))
     for a, b in itertools.product(range(h), range(w)):
         blocks = [(y, x) for y in (2 * a, 2 * a + 1) for x in (2 * b, 2 * b + 1)]
         here = {(y, x): covering_views[0][0][y] * covering_views[0][1][x] for y, x in blocks}
@@ -136,10 +130,9 @@ def focus_twin(counts: PhotonCounts, disparity: float) -> Twin:
                 for s in range(5)
             ]
             mean, base = sum(rates) / 5, rates[4]
-            expected[a, b] += here[y, x] * (0.95 * mean + 0.05 * base)
             gain[a, b] -= here[y, x] * 0.95 * (mean - base)
             size[a, b] += here[y, x] * (mean + base)
-    return Twin(rate, cell, expected, gain, size)
+    return Twin(gain, size)
 
 
 def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin: int = 0) -> PhotonCounts:
@@ -152,15 +145,12 @@ def scattered(grid: CameraGrid, cfa: str | None, photons: int, seed: int, margin
 
 
 @pytest.mark.parametrize(("cfa", "disparity"), [("GRBG", 2), ("BGGR", 3.4), (None, 3.4)])
-def test_predictions_and_gains_are_those_of_all_other_photons(cfa, disparity):
+def test_gains_are_those_of_all_other_photons(cfa, disparity):
     # Landing 16 px or more from the frame, between the centres of the widest blocks (see the next test).
     counts = scattered(unit_grid(2, 3, 71, 69), cfa, photons=40, seed=3, margin=20)
-    focus, predictions = predictions_of(counts, plane_at(counts.grid, disparity))
+    focus = focus_evidence(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
-    np.testing.assert_array_equal(predictions.cell[0], twin.cell)
-    # Rates are kept in single precision, and sums of gains: a few roundings of 6e-8 each.
-    np.testing.assert_allclose(predictions.rate[0], twin.rate, rtol=1e-6)
-    np.testing.assert_allclose(predictions.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
+    # Sums of gains are kept in single precision: a few roundings of 6e-8 each.
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
 
 
@@ -169,13 +159,10 @@ TINY = [((9, 11), 1), ((9, 11), 3), ((9, 11), 7.5), ((1, 1), 1), ((5, 2), 2), ((
 
 @pytest.mark.parametrize("cfa", ["GRBG", None])
 @pytest.mark.parametrize(("size", "disparity"), TINY)
-def test_predictions_at_the_frame_are_those_of_all_other_photons(cfa, size, disparity):
+def test_gains_at_the_frame_are_those_of_all_other_photons(cfa, size, disparity):
     counts = scattered(unit_grid(2, 3, *size), cfa, photons=20, seed=1)
-    focus, predictions = predictions_of(counts, plane_at(counts.grid, disparity))
+    focus = focus_evidence(counts, plane_at(counts.grid, disparity))
     twin = focus_twin(counts, disparity)
-    np.testing.assert_array_equal(predictions.cell[0], twin.cell)
-    np.testing.assert_allclose(predictions.expected[0], twin.expected, rtol=1e-6, atol=1e-9)
-    np.testing.assert_allclose(predictions.rate[0], twin.rate, rtol=1e-6)
     assert np.all(np.abs(focus.gain[0] - twin.gain) <= 1e-6 * twin.size + 1e-9)
 
 
@@ -183,9 +170,8 @@ def test_predictions_at_the_frame_are_those_of_all_other_photons(cfa, size, disp
 @pytest.mark.parametrize(("i", "j"), [(48, 48), (40, 61), (0, 0), (0, 50), (95, 3)])
 def test_a_single_photon_is_not_predicted(cfa, i, j):
     one = PhotonCounts.from_events(*np.array([[0, 0, i, j, 1]]).T, unit_grid(2, 2, 96, 96), cfa=cfa)
-    rate = predictions_of(one, FocalPlanes.at_total_disparity(one.grid, [1e-6]))[1].rate
-    # With no other photon there is no rate at all but the floor of 1e-12, which keeps logarithms finite.
-    assert rate.max() <= 1e-12
+    # With no other photon both rates are the same floor; what is left are photons that were expected.
+    assert focus_evidence(one, FocalPlanes.at_total_disparity(one.grid, [1e-6])).gain.max() < 0.01
 
 
 def test_two_photons_of_different_colour_are_no_evidence():
@@ -334,11 +320,10 @@ def test_depths_whose_shifts_are_all_even_do_not_attract_texture():
 def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
     grid = unit_grid(2, 2, *size)
     counts = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, dtype=int), grid, cfa=cfa)
-    focus, predictions = predictions_of(counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0]))
+    focus = focus_evidence(counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0]))
     assert cell_shape(counts) == (math.ceil(size[0] / 4), math.ceil(size[1] / 4))
-    assert focus.gain.shape == predictions.expected.shape == (2, *cell_shape(counts))
+    assert focus.gain.shape == (2, *cell_shape(counts))
     assert focus.photons.shape == (2, counts.channel_count, *cell_shape(counts))
-    assert predictions.rate.shape == predictions.cell.shape == (2, 0)
     assert not focus.gain.any()
     assert not focus.photons.any()
     assert not windowed(focus.gain, focus.photons).any()
@@ -348,10 +333,10 @@ def test_no_photons_gain_nothing_on_cells_rounded_up(cfa, size):
 def test_the_largest_counts_have_finite_gains(size):
     grid = unit_grid(3, 3, *size)
     counts = PhotonCounts.from_dense(np.full(grid.shape_KLHW, 1 << 40), grid, cfa="GRBG")
-    focus, predictions = predictions_of(
+    focus = focus_evidence(
         counts, FocalPlanes.at_total_disparity(counts.grid, [1.0, 2.0, 200.0])
     )  # some views do not reach the last
-    for values in (focus.gain, predictions.rate, predictions.expected, windowed(focus.gain, focus.photons)):
+    for values in (focus.gain, windowed(focus.gain, focus.photons)):
         assert np.all(np.isfinite(values))
 
 
@@ -366,15 +351,6 @@ def test_photons_are_counted_by_colour_and_cell():
     expected[1, 0, 1] = 2  # green at (4, 4), projected to row 3
     expected[1, 1, 1] = 1  # green at (3, 5), projected to row 5; the last photon leaves the frame for row 8
     np.testing.assert_array_equal(focus.photons[0], expected)
-
-
-def test_predictions_come_with_the_same_evidence():
-    counts = scattered(unit_grid(3, 3, 30, 30), "GRBG", photons=200, seed=5)
-    planes = FocalPlanes.at_total_disparity(counts.grid, [2.0, 4.0, 7.0])
-    focus, alone = predictions_of(counts, planes)[0], focus_evidence(counts, planes)
-    np.testing.assert_array_equal(focus.gain, alone.gain)
-    np.testing.assert_array_equal(focus.photons, alone.photons)
-    assert alone.planes is planes
 
 
 def near_twin(gain: np.ndarray) -> np.ndarray:
