@@ -1,14 +1,14 @@
 """Pieces that may belong to another layer than the one that is seen there now.
 
 Guessed are pieces that a layer in front of all would explain, discs where it would gain most, pieces of one
-light in the section at its depth, the hulls of what is seen of it already, for what crosses something is seen
-on both sides of it, and that a border between two layers lies farther on. Whether a guess is right is told
-by what it saves (`pcii.removal.likelihood.layer_search`); here it only must not be missed.
+light in the section at its depth, and the hulls of what is seen of it already, for what crosses something is
+seen on both sides of it. Whether a guess is right is told by what it saves
+(`pcii.removal.likelihood.layer_search`); here it only must not be missed.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations, permutations
+from itertools import combinations
 
 import numpy as np
 
@@ -20,8 +20,6 @@ from pcii.removal.likelihood.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers
 
 FAVOURS_NATS = (0.0, 0.3, 0.8)
 """What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
-BEYOND_CELLS = 8
-"""How far a border may lie farther on: the fit that follows takes back what is too much."""
 ALIKE_CELLS, MOST_ALIKE, SAME_SHARE = 40, 8, 0.8
 """Of pieces of one light those of 25 x 25 px and more that a layer would explain best; of two that share four
 fifths of what they cover one."""
@@ -69,19 +67,17 @@ def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, 
     from pcii.removal.likelihood.outline_kernels import least_outline
 
     seen = layers.visible()
-    for layer, other in permutations(range(len(layers.masks)), 2):
-        yield layer, dilated(seen == layer, BEYOND_CELLS) & (seen == other)
     near_light = dilated(seen >= 0, 2)
     for layer, gain in enumerate(layers.in_the_open()):
         other = (seen != layer) & near_light
-        whole = [piece & other for piece in (*_hulls(seen == layer, gain), *_discs(gain, other))]
-        whole += _alike(photons[layer], seen, layer, gain)
-        yield from ((layer, piece) for piece in whole if gain[piece].sum() > LEAST_OPEN_NATS * piece.sum())
+        pieces = [piece & other for piece in (*_hulls(seen == layer, gain), *_discs(gain, other))]
+        pieces += _alike(photons[layer], seen, layer, gain)
+        yield from ((layer, piece) for piece in pieces if gain[piece].sum() > LEAST_OPEN_NATS * piece.sum())
         for favour in FAVOURS_NATS:
             inside = np.empty_like(gain)
             granted = gain + np.float32(favour - AREA_NATS)
             least_outline(granted, LENGTH_NATS * CELL_PX, STEPS, inside)
-            yield layer, (inside > 0.5) & (seen != layer) & near_light
+            yield layer, (inside > 0.5) & other
 
 
 def _hulls(mask: np.ndarray, gain: np.ndarray) -> Iterator[np.ndarray]:
