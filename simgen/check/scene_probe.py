@@ -24,7 +24,7 @@ from simgen.photons.counting_plan import Plan, plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
-from simgen.spec.lights import AreaLight
+from simgen.spec.lights import AreaLight, SpotLight
 from simgen.spec.materials import Glass
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
@@ -232,7 +232,7 @@ def _lamps_away(scene: Scene, boxes: Iterable[np.ndarray]) -> tuple[int, ...]:
     points = np.array(corners, dtype=np.float64).reshape(-1, 3)
     away = []
     for number, lamp in enumerate(scene.lights, start=1):
-        if isinstance(lamp, AreaLight) and points.size:
+        if isinstance(lamp, AreaLight | SpotLight) and points.size:
             facing = np.subtract(lamp.target_mm, lamp.position_mm)
             if np.all((points - lamp.position_mm) @ facing <= 0):
                 away.append(number)

@@ -12,7 +12,16 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.renderer.mitsuba_colours import radiance_plugin
-from simgen.spec.lights import AreaLight, EnvironmentLight, Level, Light, PointLight, UniformLight
+from simgen.spec.lights import (
+    AreaLight,
+    DirectionalLight,
+    EnvironmentLight,
+    Level,
+    Light,
+    PointLight,
+    SpotLight,
+    UniformLight,
+)
 from simgen.spectral.spectra import illuminant
 
 NODES = 32
@@ -32,6 +41,17 @@ def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | 
             # In cd = cd/m^2 m^2, with lengths in mm.
             intensity = radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant)
             return {"type": "point", "position": list(light.position_mm), "intensity": intensity}
+        case SpotLight():
+            return {
+                "type": "spot",
+                "to_world": mi.ScalarTransform4f(_facing(light)),
+                "intensity": radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant),
+                "beam_width": light.beam_deg,
+                "cutoff_angle": light.cutoff_deg,
+            }
+        case DirectionalLight():
+            irradiance = radiance_plugin(mi, gain * light.illuminance_lux, light.illuminant)
+            return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
         case EnvironmentLight():
             assert surroundings is not None
             return _environment(mi, light, gain, surroundings)
@@ -47,14 +67,18 @@ def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | 
 
 def _pose(light: AreaLight) -> np.ndarray:
     """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
+    return _facing(light) * [light.width_mm / 2, light.height_mm / 2, 1, 1]
+
+
+def _facing(light: AreaLight | SpotLight) -> np.ndarray:
+    """From a lamp at the origin that shines towards +z to where it stands and what it faces; (4, 4)."""
     towards = np.subtract(light.target_mm, light.position_mm)
     towards = towards / np.linalg.norm(towards)
     up = np.array([0.0, -1.0, 0.0]) if abs(towards[1]) < 0.99 else np.array([0.0, 0.0, 1.0])
     left = np.cross(up, towards)
     left /= np.linalg.norm(left)
     pose = np.eye(4)
-    pose[:3, 0] = left * (light.width_mm / 2)
-    pose[:3, 1] = np.cross(towards, left) * (light.height_mm / 2)
+    pose[:3, 0], pose[:3, 1] = left, np.cross(towards, left)
     pose[:3, 2], pose[:3, 3] = towards, light.position_mm
     return pose
 
@@ -102,10 +126,14 @@ def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) 
     match light:
         case UniformLight():
             return float(np.pi * light.luminance_cd_m2)
-        case PointLight():
+        case PointLight() | SpotLight():
             towards = np.subtract(light.position_mm, point)
             distance = np.linalg.norm(towards)
-            return float(light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
+            share = _share_of_axis(light, -towards / distance) if isinstance(light, SpotLight) else 1.0
+            return float(share * light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
+        case DirectionalLight():
+            along = light.direction[2] / np.linalg.norm(light.direction)
+            return float(light.illuminance_lux * max(along, 0))
         case EnvironmentLight():
             assert surroundings is not None
             return light.luminance_cd_m2 * _from_around(light, surroundings)
@@ -118,6 +146,12 @@ def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) 
             at_surface, at_lamp = np.maximum(-towards[2], 0), np.maximum(-pose[:3, 2] @ towards, 0)
             shares = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
             return float(light.luminance_cd_m2 * (shares * at_surface * at_lamp / squared**2).sum())
+
+
+def _share_of_axis(light: SpotLight, direction: np.ndarray) -> float:
+    """How bright a spot is in a direction (3,) of length 1, as a share of its intensity along the axis."""
+    angle = np.degrees(np.arccos(np.clip(direction @ _facing(light)[:3, 2], -1, 1)))
+    return float(np.clip((light.cutoff_deg - angle) / (light.cutoff_deg - light.beam_deg), 0, 1))
 
 
 def _from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:

@@ -2,10 +2,10 @@
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from simgen.base.asset_names import EnvironmentName
-from simgen.base.strict_models import Length, Position, Positive, Real, Strict, completed_by
+from simgen.base.strict_models import Length, Position, Positive, Real, Strict, Vector, completed_by
 from simgen.spectral.spectra import illuminant_names, known_illuminant
 
 Illuminant = Annotated[
@@ -53,6 +53,49 @@ class PointLight(Strict):
     illuminant: Illuminant = "D65"
 
 
+class SpotLight(Strict):
+    """A lamp without size that shines in a cone about its axis; it is seen by no camera."""
+
+    type: Literal["spot"] = "spot"
+    position_mm: Position
+    """Where it stands."""
+    target_mm: Position
+    """What its axis goes through."""
+    intensity_cd: Positive
+    """Luminous intensity along its axis: lux times square metres."""
+    beam_deg: Annotated[Real, Field(ge=0, lt=90)] = 15.0
+    """Up to this angle from its axis it is as bright as along it."""
+    cutoff_deg: Annotated[Real, Field(gt=0, lt=90)] = 20.0
+    """Beyond this angle it is dark; between the two it falls evenly with the angle."""
+    illuminant: Illuminant = "D65"
+
+    @model_validator(mode="after")
+    def _is_a_cone(self) -> Self:
+        if self.position_mm == self.target_mm:
+            raise ValueError("target_mm: a spot must face something else than its own position_mm")
+        if self.beam_deg >= self.cutoff_deg:
+            raise ValueError("beam_deg: the angle up to which a spot is bright must be below its cutoff_deg")
+        return self
+
+
+class DirectionalLight(Strict):
+    """Parallel light from far away, such as the sun's, which fills the scene; it is seen by no camera."""
+
+    type: Literal["directional"] = "directional"
+    direction: Vector
+    """Where the light goes: (0, 0, 1) away from the cameras, (0, 1, 0) down; its length is of no matter."""
+    illuminance_lux: Positive
+    """What a surface that faces the light gets; 100 000 of the sun, 0.2 of the moon."""
+    illuminant: Illuminant = "D65"
+
+    @field_validator("direction")
+    @classmethod
+    def _goes_somewhere(cls, direction: Vector) -> Vector:
+        if not any(direction):
+            raise ValueError("a direction is not (0, 0, 0); (0, 0, 1) points away from the cameras")
+        return direction
+
+
 class UniformLight(Strict):
     """The same luminance from everywhere, seen by the cameras where nothing is hit."""
 
@@ -78,7 +121,10 @@ class EnvironmentLight(Strict):
     """By how much the surroundings are turned to the right about the vertical axis."""
 
 
-Light = Annotated[AreaLight | PointLight | UniformLight | EnvironmentLight, Field(discriminator="type")]
+Light = Annotated[
+    AreaLight | PointLight | SpotLight | DirectionalLight | UniformLight | EnvironmentLight,
+    Field(discriminator="type"),
+]
 
 
 class Level(Strict):

@@ -1,6 +1,6 @@
-"""Lamps: inverse square and cosine of a point, and that a plane gets the lux that a scene asks for."""
+"""Lamps: inverse square, cosine and cone, and that a plane gets the lux that a scene asks for."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,15 +27,27 @@ def variant_is_put_back() -> Iterator[None]:
     backend.load()
 
 
-def lit_by_a_point(lamp_mm: np.ndarray, intensity_cd: float, fine: int = 1) -> np.ndarray:
-    """Radiance (H fine, W fine) of the card: rho / pi times I cos / d^2, in metres; nothing else is used."""
+def lit_by_a_point(
+    lamp_mm: np.ndarray,
+    intensity_cd: float,
+    fine: int = 1,
+    cone: Callable[[np.ndarray], np.ndarray] = lambda towards: np.ones(towards.shape[:-1]),
+) -> np.ndarray:
+    """Radiance (H fine, W fine) of the card: rho / pi times I cos / d^2, in metres; nothing else is used.
+
+    `cone` is the share of I in each direction, given towards the lamp.
+    """
     side = np.arange(32 * fine)
     at_mm = ((side + 0.5) / fine - 16) * (Z_MM / 50.0)
     y, x = np.meshgrid(at_mm, at_mm, indexing="ij")
     towards_m = (lamp_mm - np.stack([x, y, np.full_like(x, Z_MM)], axis=-1)) / 1000
     distance_m = np.linalg.norm(towards_m, axis=-1)
     cosine = np.maximum(-towards_m[..., 2] / distance_m, 0)
-    return RHO / np.pi * intensity_cd * cosine / distance_m**2
+    return RHO / np.pi * intensity_cd * cone(towards_m / distance_m[..., None]) * cosine / distance_m**2
+
+
+def in_pixels(fine: np.ndarray) -> np.ndarray:
+    return fine.reshape(32, 8, 32, 8).mean(axis=(1, 3))
 
 
 def point(x: float, y: float, z: float, intensity_cd: float) -> dict[str, Any]:
@@ -48,7 +60,7 @@ PLACES = [(0.0, 0.0, 300.0), (200.0, -150.0, 100.0), (-100.0, 60.0, -400.0)]
 @pytest.mark.parametrize("place", PLACES)
 def test_a_points_light_falls_off_with_the_square_and_the_cosine(place: tuple[float, float, float]) -> None:
     view = seen(made([FLAT], [point(*place, 2.5)]), GRID, 256)
-    expected = lit_by_a_point(np.array(place), 2.5, fine=8).reshape(32, 8, 32, 8).mean(axis=(1, 3))
+    expected = in_pixels(lit_by_a_point(np.array(place), 2.5, fine=8))
     # Only the place within a pixel varies: by a few per cent, of which 256 paths leave a sixteenth.
     np.testing.assert_allclose(view, expected[..., None].repeat(3, axis=2), rtol=0.01)
     np.testing.assert_allclose(view.mean(axis=(0, 1)), expected.mean(), rtol=5e-4)
@@ -70,7 +82,7 @@ def test_a_points_light_in_spectra_is_that_in_colours() -> None:
 
 def test_photons_of_a_points_light_fall_off_likewise() -> None:
     place, wanted = PLACES[1], 20_000 if SCALAR else 400_000
-    expected = lit_by_a_point(np.array(place), 2.5, fine=8).reshape(32, 8, 32, 8).mean(axis=(1, 3))
+    expected = in_pixels(lit_by_a_point(np.array(place), 2.5, fine=8))
     gain = wanted / expected.sum()
     photons, _ = thinned(made([FLAT], [point(*place, 2.5)]), GRID, 2, gain)
     assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
@@ -79,6 +91,62 @@ def test_photons_of_a_points_light_fall_off_likewise() -> None:
     distance_mm = np.linalg.norm(np.stack([10 * x - place[0], 10 * y - place[1], 0 * x + 400]), axis=0)
     bare = expected * distance_mm / distance_mm.mean()
     assert surprise(photons, bare[..., None].repeat(3, axis=2), GRID, gain) > (4 if SCALAR else 10)
+
+
+SPOT = point(150.0, -80.0, 100.0, 2.5) | {
+    "type": "spot",
+    "target_mm": (20.0, 10.0, Z_MM),
+    "beam_deg": 8.0,
+    "cutoff_deg": 20.0,
+}
+
+
+def cone_of_the_spot(towards: np.ndarray) -> np.ndarray:
+    axis = np.subtract(SPOT["target_mm"], SPOT["position_mm"])
+    angle_deg = np.degrees(np.arccos(-towards @ (axis / np.linalg.norm(axis))))
+    return np.interp(angle_deg, [8.0, 20.0], [1.0, 0.0])
+
+
+def test_a_spot_is_bright_in_its_beam_and_dark_beyond_its_cutoff() -> None:
+    expected = in_pixels(lit_by_a_point(np.array(SPOT["position_mm"]), 2.5, 8, cone_of_the_spot))
+    # The cone's edges are in the film: of a thousand pixels some are dark, some in the beam.
+    assert (expected == 0).sum() > 100
+    assert (expected > 0.9 * expected.max()).sum() > 20
+    built = made([FLAT], [SPOT])
+    view = seen(built, GRID, 256)
+    np.testing.assert_allclose(view, expected[..., None].repeat(3, axis=2), rtol=0.02, atol=0.01 * view.max())
+    np.testing.assert_allclose(view.mean(axis=(0, 1)), expected.mean(), rtol=2e-3)
+    gain = (20_000 if SCALAR else 400_000) / expected.sum()
+    photons, _ = thinned(built, GRID, 2, gain)
+    assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
+
+
+DIRECTIONAL = {"type": "directional", "direction": (0.3, 0.8, 1.5), "illuminance_lux": 40.0}
+
+
+@pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
+def test_parallel_light_is_even_and_throws_a_shadow_along_its_direction(spectral: bool) -> None:
+    grey = {"reflectance": {"wavelength_nm": (400, 700), "value": (RHO, RHO)}}
+    blind = {
+        "name": "blind",
+        "position_mm": (0.0, 0.0, Z_MM - 40),
+        "shape": {"type": "card", "width_mm": 60.0, "height_mm": 60.0},
+        "material": {"reflectance": [0, 0, 0]},
+    }
+    # Both stand where a camera without parallax sees them: the blind at (0, 0), its shadow 40 mm behind it.
+    view = seen(made([card(Z_MM, 600.0, grey), blind], [DIRECTIONAL], spectral=spectral), GRID, 256).mean(
+        axis=2
+    )
+    lit = 40.0 * 1.5 / np.linalg.norm(DIRECTIONAL["direction"]) * RHO / np.pi
+    at_mm = (np.arange(32) - 15.5) * (Z_MM / 50.0)
+    y, x = np.meshgrid(at_mm, at_mm, indexing="ij")
+    # 40 mm farther on light has gone 8 mm to the right and 21 mm down; pixels are 10 mm wide.
+    away = np.maximum(np.abs(x - 8.0), np.abs(y - 21.3))
+    hidden = np.maximum(np.abs(x), np.abs(y)) < 30 * Z_MM / (Z_MM - 40) + 6
+    np.testing.assert_allclose(view[(away > 36) & ~hidden], lit, rtol=5e-2 if spectral else 1e-4)
+    np.testing.assert_allclose(view[(away > 36) & ~hidden].mean(), lit, rtol=5e-3)
+    assert not view[(away < 24) & ~hidden].any()
+    assert ((away < 24) & ~hidden).sum() > 3
 
 
 NEAR_LAMP = {
@@ -100,10 +168,17 @@ def lights_of(kind: str, folder: Path, coloured: bool) -> list[dict[str, Any]]:
         pixels[4, 2] *= 100  # behind the cameras, above
         return [sky(folder, pixels, turn_deg=-25.0)]
     uniform = {"type": "uniform", "luminance_cd_m2": 3.0}
-    return {"uniform": [uniform], "area": [NEAR_LAMP], "point": [lamp], "two": [NEAR_LAMP, lamp]}[kind]
+    return {
+        "uniform": [uniform],
+        "area": [NEAR_LAMP],
+        "point": [lamp],
+        "spot": [SPOT | {"target_mm": (90.0, 10.0, Z_MM)}],
+        "directional": [DIRECTIONAL],
+        "two": [NEAR_LAMP, lamp],
+    }[kind]
 
 
-@pytest.mark.parametrize("kind", ["uniform", "area", "point", "two", SUN])
+@pytest.mark.parametrize("kind", ["uniform", "area", "point", "spot", "directional", "two", SUN])
 @pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
 def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_path: Path) -> None:
     grey = {"wavelength_nm": (400, 700), "value": (RHO, RHO)}
@@ -125,8 +200,10 @@ def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_
         point(100.0, 0.0, Z_MM, 2.0),
         NEAR_LAMP | {"position_mm": (0.0, 0.0, 900.0)},
         NEAR_LAMP | {"target_mm": (-800.0, 40.0, 400.0)},
+        SPOT | {"target_mm": (400.0, 10.0, Z_MM)},
+        DIRECTIONAL | {"direction": (0.0, 1.0, -0.1)},
     ],
-    ids=["behind", "in the plane", "a lamp behind", "a lamp that looks away"],
+    ids=["behind", "in the plane", "a lamp behind", "a lamp that looks away", "a spot beside", "from behind"],
 )
 def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"level: none of the lights shines on a surface at z_mm = 500"):
