@@ -45,6 +45,13 @@ class Assets:
         largest = np.iinfo(pixels.dtype).max
         return srgb_to_linear(np.arange(largest + 1) / largest).astype(np.float32)[pixels]
 
+    def numbers(self, name: str) -> np.ndarray:
+        """What a grey image holds, (H, W, 1) float32 from 0 to 1; `InputError` if it is coloured."""
+        pixels = self._images[name]
+        if (pixels != pixels[..., :1]).any():
+            raise InputError(f"{name!r} is coloured; save the one channel that is meant as a grey image")
+        return pixels[..., :1] / np.float32(np.iinfo(pixels.dtype).max)
+
     def environment(self, name: str) -> np.ndarray:
         """Light from all around as linear RGB, (H, W, 3) float32, finite and not negative."""
         return self._environments[name]

@@ -25,7 +25,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import AreaLight, SpotLight
-from simgen.spec.materials import Glass
+from simgen.spec.materials import is_clear
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
 
@@ -93,7 +93,7 @@ def probe_scene(target: Prepared) -> Facts:
         lamps_away=_lamps_away(scene, list(boxes.values())),
         level=scene.level,
         gain=render_scene.gain,
-        glass=tuple(thing.name for thing in scene.objects if isinstance(thing.material.finish, Glass)),
+        glass=tuple(thing.name for thing in scene.objects if is_clear(thing.material.finish)),
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),
     )

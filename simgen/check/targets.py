@@ -8,7 +8,7 @@ from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import suggestion
 from simgen.dataset.prepared import Prepared, prepare
-from simgen.spec.materials import Glass
+from simgen.spec.materials import is_clear
 from simgen.spec.recipe import Render
 from simgen.spec.scene import is_scene, scene_names
 from simgen.spec.scene_generators import generators
@@ -37,9 +37,7 @@ def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})
     target = prepare(recipe, recipe_folder)
-    if recipe_folder is None and any(
-        isinstance(thing.material.finish, Glass) for thing in target.scene.objects
-    ):
+    if recipe_folder is None and any(is_clear(thing.material.finish) for thing in target.scene.objects):
         longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
         return replace(target, recipe=longer)
     return target

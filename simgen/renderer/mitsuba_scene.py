@@ -111,7 +111,7 @@ def _object_id(shape_id: str) -> int:
 
 def _object(mi: Any, thing: SceneObject, assets: Assets, pattern: np.ndarray | None) -> Any:
     try:
-        surface = two_sided(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
+        surface = surface_plugin(mi, thing.material, thing.shape, assets, pattern)
         return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None

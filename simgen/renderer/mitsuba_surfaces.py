@@ -12,15 +12,22 @@ from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
 from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin
-from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic
+from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, is_clear
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
 
+TEXTURE = "material.texture"
+PRINCIPLED = {
+    "metallic": "metallic",
+    "roughness": "roughness",
+    "spec_trans": "transmission",
+    "clearcoat": "clearcoat",
+}
+"""Parameters of Mitsuba's plugin by the fields of the finish; each a number or a texture."""
+
 
 def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
-    """The same from behind, so that a card or an open mesh is no black hole there; glass has two sides."""
-    if surface["type"] in ("dielectric", "thindielectric"):
-        return surface
+    """The same from behind, so that a card or an open mesh is no black hole there."""
     return {"type": "twosided", "bsdf": surface}
 
 
@@ -43,22 +50,44 @@ def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | Non
 def surface_plugin(
     mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
 ) -> dict[str, Any]:
-    """The surface of an object of this shape, from the front; `pattern` are its pixels if it carries one."""
-    match material.finish:
+    """The surface of an object of this shape, on both sides; `pattern` are its pixels if it carries one."""
+    finish = material.finish
+    match finish:
         case Matt():
-            return matt(_reflectance(mi, material, shape, assets, pattern))
+            surface = matt(_reflectance(mi, material, shape, assets, pattern))
         case Plastic(roughness=alpha):
-            return {
+            surface = {
                 "type": "roughplastic",
                 "distribution": "ggx",
                 "alpha": alpha,
                 "diffuse_reflectance": _reflectance(mi, material, shape, assets, pattern),
             }
         case Metal(name=name, roughness=alpha):
-            return {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
+            surface = {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
         case Glass(refractive_index=index):
             pane = isinstance(shape, Card)
-            return {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
+            surface = {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
+        case Principled(refractive_index=index, clearcoat_gloss=gloss):
+            surface = {
+                "type": "principled",
+                "base_color": _reflectance(mi, material, shape, assets, pattern),
+                "eta": index,
+                "clearcoat_gloss": gloss,
+            }
+            for name, field in PRINCIPLED.items():
+                given = getattr(finish, field)
+                if isinstance(given, str):
+                    _check_texcoords(f"material.finish.{field}", shape, assets)
+                    given = _texture(mi, _numbers(assets, given, field), shape, raw=True)
+                surface[name] = given
+    return surface if is_clear(finish) else two_sided(surface)
+
+
+def _numbers(assets: Assets, name: str, field: str) -> np.ndarray:
+    try:
+        return assets.numbers(name)
+    except InputError as fault:
+        raise InputError(f"material.finish.{field}: {fault}") from None
 
 
 def _reflectance(
@@ -67,18 +96,26 @@ def _reflectance(
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
-    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
-        raise InputError(
-            f"material.texture: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
-            "add them to the file, or give the material a reflectance instead"
-        )
+    _check_texcoords(TEXTURE, shape, assets)
     pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
     assert pixels is not None
+    # Linear already, so colours are left as they are, but for being made spectra where these are asked.
+    return _texture(mi, pixels, shape, raw=not is_spectral(mi))
+
+
+def _check_texcoords(where: str, shape: Shape, assets: Assets) -> None:
+    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
+        raise InputError(
+            f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
+            f"add them to the file, or give {'a reflectance' if where == TEXTURE else 'a number'} instead"
+        )
+
+
+def _texture(mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool) -> dict[str, Any]:
     return {
         "type": "bitmap",
         "bitmap": _bitmap(mi, _in_renderers_order(pixels, shape)),
-        # Linear already, so colours are left as they are, but for being made spectra where these are asked.
-        "raw": not is_spectral(mi),
+        "raw": raw,
         "filter_type": "bilinear",
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
         "wrap_mode": "repeat" if isinstance(shape, Sphere) else "clamp",
@@ -92,7 +129,7 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
 
 
 def _in_renderers_order(pixels: np.ndarray, shape: Shape) -> np.ndarray:
-    """A texture's pixels (H, W, 3) in the order that the renderer takes them for this shape."""
+    """A texture's pixels (H, W, C) in the order that the renderer takes them for this shape."""
     if isinstance(shape, Card):
         return np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
     return pixels

@@ -11,6 +11,16 @@ from simgen.spec.textures import Texture
 from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
 
 
+def _number_or_image(given: Any) -> str:
+    return "image" if isinstance(given, str) else "number"
+
+
+ShareOrImage = Annotated[
+    Annotated[Share, Tag("number")] | Annotated[ImageName, Tag("image")], Discriminator(_number_or_image)
+]
+"""A number from 0 to 1, or a grey image of such."""
+
+
 class Matt(Strict):
     """Scatters light evenly (Lambert)."""
 
@@ -48,7 +58,34 @@ class Glass(Strict):
     """Of the glass against air: 1.5 of windows, 1.33 of water, 1.9 of heavy flint."""
 
 
-Finish = Matt | Plastic | Metal | Glass
+class Principled(Strict):
+    """What modelling programs write: matt, metal, clear and coated, mixed by numbers (Burley 2015).
+
+    `metallic`, `roughness`, `transmission` and `clearcoat` are numbers, or grey images inside the scene's
+    folder whose values, black 0 and white 1, are taken as they are stored.
+    """
+
+    type: Literal["principled"] = "principled"
+    metallic: ShareOrImage = 0.0
+    """0 is plastic or the like, whose highlights are white; 1 is metal, whose highlights are coloured."""
+    roughness: ShareOrImage = 0.5
+    """Width of the highlights: its square is the GGX alpha that other finishes take as their roughness."""
+    refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+    """Of what is no metal: how strong its highlights are, and how much it bends light that passes."""
+    transmission: ShareOrImage = 0.0
+    """How much of the light that does not go back at once passes through, as in glass; for closed shapes."""
+    clearcoat: ShareOrImage = 0.0
+    """How much of a clear coat is over it, with highlights of its own."""
+    clearcoat_gloss: Share = 1.0
+    """Of that coat: 1 gives sharp highlights (GGX alpha 0.001), 0 wide ones (0.1)."""
+
+
+Finish = Matt | Plastic | Metal | Glass | Principled
+
+
+def is_clear(finish: Finish) -> bool:
+    """Whether light passes through a surface of this finish."""
+    return isinstance(finish, Glass) or (isinstance(finish, Principled) and finish.transmission != 0)
 
 
 class Spectrum(Strict):
