@@ -45,12 +45,17 @@ class Assets:
         largest = np.iinfo(pixels.dtype).max
         return srgb_to_linear(np.arange(largest + 1) / largest).astype(np.float32)[pixels]
 
+    def stored(self, name: str) -> np.ndarray:
+        """What an image holds, without the sRGB curve: (H, W, 3) float32 from 0 to 1."""
+        pixels = self._images[name]
+        return pixels / np.float32(np.iinfo(pixels.dtype).max)
+
     def numbers(self, name: str) -> np.ndarray:
         """What a grey image holds, (H, W, 1) float32 from 0 to 1; `InputError` if it is coloured."""
-        pixels = self._images[name]
+        pixels = self.stored(name)
         if (pixels != pixels[..., :1]).any():
             raise InputError(f"{name!r} is coloured; save the one channel that is meant as a grey image")
-        return pixels[..., :1] / np.float32(np.iinfo(pixels.dtype).max)
+        return pixels[..., :1]
 
     def environment(self, name: str) -> np.ndarray:
         """Light from all around as linear RGB, (H, W, 3) float32, finite and not negative."""

@@ -16,7 +16,6 @@ from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Princip
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
 
-TEXTURE = "material.texture"
 PRINCIPLED = {
     "metallic": "metallic",
     "roughness": "roughness",
@@ -77,9 +76,13 @@ def surface_plugin(
             for name, field in PRINCIPLED.items():
                 given = getattr(finish, field)
                 if isinstance(given, str):
-                    _check_texcoords(f"material.finish.{field}", shape, assets)
+                    _check_texcoords(f"material.finish.{field}", "give a number instead", shape, assets)
                     given = _texture(mi, _numbers(assets, given, field), shape, raw=True)
                 surface[name] = given
+    if material.normal_map is not None:
+        _check_texcoords("material.normal_map", "leave it out", shape, assets)
+        tilts = _texture(mi, assets.stored(material.normal_map), shape, raw=True)
+        surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
     return surface if is_clear(finish) else two_sided(surface)
 
 
@@ -96,18 +99,18 @@ def _reflectance(
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
-    _check_texcoords(TEXTURE, shape, assets)
+    _check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
     pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
     assert pixels is not None
     # Linear already, so colours are left as they are, but for being made spectra where these are asked.
     return _texture(mi, pixels, shape, raw=not is_spectral(mi))
 
 
-def _check_texcoords(where: str, shape: Shape, assets: Assets) -> None:
+def _check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
     if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
         raise InputError(
             f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
-            f"add them to the file, or give {'a reflectance' if where == TEXTURE else 'a number'} instead"
+            f"add them to the file, or {instead}"
         )
 
 

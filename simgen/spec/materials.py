@@ -158,6 +158,9 @@ class Material(Strict):
     laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")
     """Matt by default; { type = "plastic", roughness = 0.1 } adds highlights."""
+    normal_map: ImageName | None = None
+    """An image inside the scene's folder that tilts the surface: red to the right of the picture, green up,
+    blue out of it, each stored as half of the component plus a half (as in OpenGL and glTF)."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
@@ -167,4 +170,6 @@ class Material(Strict):
         if not coloured and (self.reflectance is not None or self.texture is not None):
             kind = self.finish.type
             raise ValueError(f"the colour of {kind} is its own; give no 'reflectance' and no 'texture'")
+        if self.normal_map is not None and is_clear(self.finish):
+            raise ValueError("normal_map: a surface that light passes through cannot be tilted by an image")
         return self

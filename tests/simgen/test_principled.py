@@ -137,9 +137,7 @@ def test_an_image_holds_its_numbers_as_they_are(tmp_path: Path, bits: int) -> No
 
 def test_images_that_do_not_fit_are_named(tmp_path: Path) -> None:
     Image.fromarray(np.eye(3, dtype=np.uint8)[None] * 200).save(tmp_path / "coloured.png")
-    with pytest.raises(
-        InputError, match=r"object 'ball', material\.finish\.roughness: 'coloured\.png' is"
-    ):
+    with pytest.raises(InputError, match=r"object 'ball', material\.finish\.roughness: 'coloured\.png' is"):
         made([ball(painted({"roughness": "coloured.png"}))], [EVERYWHERE], folder=tmp_path)
     (tmp_path / "bare.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
@@ -147,9 +145,7 @@ def test_images_that_do_not_fit_are_named(tmp_path: Path) -> None:
     )
     Image.fromarray(np.full((2, 2), 90, np.uint8)).save(tmp_path / "grey.png")
     mesh = {"shape": {"type": "mesh", "file": "bare.ply"}}
-    with pytest.raises(
-        InputError, match=r"finish\.metallic: it cannot be laid on 'bare\.ply'.*number"
-    ):
+    with pytest.raises(InputError, match=r"finish\.metallic: it cannot be laid on 'bare\.ply'.*number"):
         made([ball(painted({"metallic": "grey.png"})) | mesh], [EVERYWHERE], folder=tmp_path)
 
 
