@@ -18,7 +18,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.spec.camera_grid import Grid
 from simgen.spec.lights import Light
-from simgen.spec.materials import Finish, Spectrum
+from simgen.spec.materials import Finish, Spectrum, is_clear
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import Scene, is_scene_distribution, load_scene
 from simgen.spec.shapes import Shape
@@ -181,8 +181,9 @@ def test_recipes_of_every_kind_ship() -> None:
 @pytest.mark.parametrize("name", SCENES)
 def test_light_passes_glass_where_there_is_some(name: str) -> None:
     target = load_target(str(ROOT / "scenes" / name), scene_number=shown_draw(name))
-    glass = any(thing.material.finish.type == "glass" for thing in target.scene.objects)
-    assert target.recipe.render.max_depth == (8 if glass else 3)
+    clear = any(is_clear(thing.material.finish) for thing in target.scene.objects)
+    assert clear == (name in ("glass", "finishes"))
+    assert target.recipe.render.max_depth == (8 if clear else 3)
 
 
 @pytest.mark.parametrize("file", SCRIPTS, ids=lambda file: file.parent.name)

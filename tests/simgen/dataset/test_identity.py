@@ -38,6 +38,8 @@ MATERIALS = [
     {"reflectance": {"wavelength_nm": [400.0, 700.0], "value": [0.2, 0.8]}},
     {"finish": METAL},
     {"finish": {"type": "glass"}},
+    {"reflectance": "dark skin", "finish": {"type": "principled", "metallic": 0.5}},
+    {"reflectance": "dark skin", "normal_map": "a.png"},
 ]
 SHAPES = [
     {"type": "sphere", "radius_mm": 20.0},
@@ -62,6 +64,8 @@ SCENE = {
         AREA | {"width_mm": 100.0, "height_mm": 90.0, "luminance_cd_m2": 1000.0},
         {"type": "point", "position_mm": [0.0, -500.0, 0.0], "intensity_cd": 10.0},
         {"type": "environment", "file": "a.exr", "luminance_cd_m2": 100.0},
+        {"type": "spot", "position_mm": [0.0, -9.0, 0.0], "target_mm": [0.0, 0.0, 9.0], "intensity_cd": 1.0},
+        {"type": "directional", "direction": [0.0, 1.0, 1.0], "illuminance_lux": 10.0},
     ],
     "level": {"illuminance_lux": 500.0, "z_mm": 540.0},
     "backdrop": {"z_mm": 2000.0},
