@@ -122,8 +122,7 @@ class PosteriorDepth:
 
     def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
-        samples_per_block = planes.grid.view_count * block_px**2
-        return inputs_of(evidence, samples_per_block, self.prior, MULTIPLE)
+        return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
         """In how many of eight directions a block (h, w) meets one where the halves `agree`, at its depth."""

@@ -29,6 +29,7 @@ BAND_VALUES = 1 << 20
 def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities (Z, h, w) of the planes and (h, w) of no surface, float32, for blocks of the inputs."""
     import onnxruntime
+    from scipy.special import expit, logsumexp, softmax
 
     from pcii.base.compiled_loops import threads
 
@@ -53,11 +54,8 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
         names = [argument.name for argument in head.get_inputs()]
         (logit,) = head.run(None, dict(zip(names, parts, strict=True)), options)
         own = np.asarray(logit)[0, :, top - first : end - first]
-        largest = own.max(axis=0)
-        surface = largest + np.log(np.exp(own - largest).sum(axis=0))
-        none[top:end] = 1 / (1 + np.exp(surface - nothing[top:end]))
-        own = np.exp((own - largest) / np.float32(TEMPERATURE))
-        probability[:, top:end] = own * ((1 - none[top:end]) / own.sum(axis=0))
+        none[top:end] = expit(nothing[top:end] - logsumexp(own, axis=0))
+        probability[:, top:end] = softmax(own / np.float32(TEMPERATURE), axis=0) * (1 - none[top:end])
     return probability, none
 
 

@@ -50,11 +50,16 @@ class Assets:
         pixels = self._images[name]
         return pixels / np.float32(np.iinfo(pixels.dtype).max)
 
-    def numbers(self, name: str) -> np.ndarray:
-        """What a grey image holds, (H, W, 1) float32 from 0 to 1; `InputError` if it is coloured."""
+    def numbers(self, name: str, where: str) -> np.ndarray:
+        """What a grey image holds, (H, W, 1) float32 from 0 to 1.
+
+        `InputError`, beginning with `where`, if it is coloured.
+        """
         pixels = self.stored(name)
         if (pixels != pixels[..., :1]).any():
-            raise InputError(f"{name!r} is coloured; save the one channel that is meant as a grey image")
+            raise InputError(
+                f"{where}: {name!r} is coloured; save the one channel that is meant as a grey image"
+            )
         return pixels[..., :1]
 
     def environment(self, name: str) -> np.ndarray:

@@ -76,21 +76,15 @@ def surface_plugin(
             for name, field in PRINCIPLED.items():
                 given = getattr(finish, field)
                 if isinstance(given, str):
-                    _check_texcoords(f"material.finish.{field}", "give a number instead", shape, assets)
-                    given = _texture(mi, _numbers(assets, given, field), shape, raw=True)
+                    where = f"material.finish.{field}"
+                    _check_texcoords(where, "give a number instead", shape, assets)
+                    given = _texture(mi, assets.numbers(given, where), shape, raw=True)
                 surface[name] = given
     if material.normal_map is not None:
         _check_texcoords("material.normal_map", "leave it out", shape, assets)
         tilts = _texture(mi, assets.stored(material.normal_map), shape, raw=True)
         surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
     return surface if is_clear(finish) else two_sided(surface)
-
-
-def _numbers(assets: Assets, name: str, field: str) -> np.ndarray:
-    try:
-        return assets.numbers(name)
-    except InputError as fault:
-        raise InputError(f"material.finish.{field}: {fault}") from None
 
 
 def _reflectance(

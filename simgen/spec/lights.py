@@ -37,8 +37,7 @@ class AreaLight(Strict):
 
     @model_validator(mode="after")
     def _faces_something(self) -> Self:
-        if self.position_mm == self.target_mm:
-            raise ValueError("target_mm: an area light must face something else than its own position_mm")
+        _check_target(self)
         return self
 
 
@@ -71,8 +70,7 @@ class SpotLight(Strict):
 
     @model_validator(mode="after")
     def _is_a_cone(self) -> Self:
-        if self.position_mm == self.target_mm:
-            raise ValueError("target_mm: a spot must face something else than its own position_mm")
+        _check_target(self)
         if self.beam_deg >= self.cutoff_deg:
             raise ValueError("beam_deg: the angle up to which a spot is bright must be below its cutoff_deg")
         return self
@@ -94,6 +92,12 @@ class DirectionalLight(Strict):
         if not any(direction):
             raise ValueError("a direction is not (0, 0, 0); (0, 0, 1) points away from the cameras")
         return direction
+
+
+def _check_target(lamp: AreaLight | SpotLight) -> None:
+    if lamp.position_mm == lamp.target_mm:
+        what = "an area light" if isinstance(lamp, AreaLight) else "a spot"
+        raise ValueError(f"target_mm: {what} must face something else than its own position_mm")
 
 
 class UniformLight(Strict):

@@ -90,8 +90,8 @@ def test_the_middle_of_a_shape_is_lit_as_if_it_were_tilted(shape: str, folder: P
         view = seen(made([tilted(shape)], [parallel(direction)], folder=folder), grid, 64)
         # Components are stored to 1/255: of a cosine of 0.3 or more that is 2 %.
         np.testing.assert_allclose(view.mean(), expected(direction), rtol=0.02)
-    with_others = [expected(direction) for direction in LIGHTS_GO]
-    assert min(abs(a / b - 1) for a, b in itertools.pairwise(with_others)) > 0.05
+    radiances = [expected(direction) for direction in LIGHTS_GO]
+    assert min(abs(a / b - 1) for a, b in itertools.pairwise(radiances)) > 0.05
 
 
 def test_tilts_are_the_same_in_spectra_and_photon_by_photon(folder: Path) -> None:

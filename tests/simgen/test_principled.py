@@ -41,6 +41,11 @@ def ball(material: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def in_blocks(view: np.ndarray) -> np.ndarray:
+    """Means of 4 x 4 pixels."""
+    return view.reshape(8, 4, 8, 4, 3).mean(axis=(1, 3))
+
+
 def by_hand(parameters: dict[str, Any], *, clear: bool) -> RenderScene:
     """The ball before the card, described to the renderer directly."""
     mi = backend.load()
@@ -88,13 +93,12 @@ def test_each_number_does_what_it_does_to_the_renderers_own(case: str) -> None:
     theirs = {"eta": 1.5, "roughness": 0.5, **theirs}
     same = seen(by_hand(theirs, clear=clear), GRID, 1024, seed=2)
     # Blocks of 4 x 4 pixels of 1024 paths that vary by 1 or less of the mean, twice.
-    first, second = (image.reshape(8, 4, 8, 4, 3).mean(axis=(1, 3)) for image in (view, same))
+    first, second = in_blocks(view), in_blocks(same)
     np.testing.assert_allclose(first, second, rtol=5 * 2**0.5 / np.sqrt(16 * 1024))
     np.testing.assert_allclose(view.mean(axis=(0, 1)), same.mean(axis=(0, 1)), rtol=2e-3)
     # The fault: the number does nothing.
     plain = seen(by_hand({"eta": 1.5, "roughness": 0.5}, clear=False), GRID, 1024)
-    other = plain.reshape(8, 4, 8, 4, 3).mean(axis=(1, 3))
-    assert np.abs(first / other - 1).max() > 5 * 2**0.5 / np.sqrt(16 * 1024)
+    assert np.abs(first / in_blocks(plain) - 1).max() > 5 * 2**0.5 / np.sqrt(16 * 1024)
 
 
 @pytest.mark.parametrize("metallic", [0.0, 0.5, 1.0])
@@ -106,7 +110,7 @@ def test_no_more_light_is_sent_back_than_comes(metallic: float, roughness: float
         material = painted({"metallic": metallic, "roughness": roughness, **more}, colour)
         view = seen(made([ball(material)], [EVERYWHERE], max_depth=DEPTH), GRID, 256)
         # 4 x 4 pixels of 256 paths that vary by 0.5 or less.
-        assert view.reshape(8, 4, 8, 4, 3).mean(axis=(1, 3)).max() < 1 + 5 * 0.5 / np.sqrt(4096)
+        assert in_blocks(view).max() < 1 + 5 * 0.5 / np.sqrt(4096)
 
 
 def test_clear_light_is_lost_by_roughness_alone() -> None:

@@ -1,10 +1,11 @@
-"""The search for the opaque layers of least energy: sweeps, then guess by guess.
+"""The search for the opaque layers of least energy: sweeps over the layers, then proposals of whole pieces.
 
-Fitting one layer after another ends in the nearest valley: what a wrong piece hides is not believed, so that
-nothing behind it can show that it is there. So whole pieces are guessed (`guesses`), put in place and
-fitted with everything else; where that costs less around the piece, it stays. Surfaces are compared with the
-light of each told by itself; a piece that differs from what is around it would then save something at any
-depth, so the piece must also be better told by itself where it is than told by itself where it was.
+Fitting one layer after another ends in the nearest local minimum: photons of a hidden surface do not count
+for it, so that what a wrong piece hides stays hidden. So whole pieces are proposed (`proposals`), put in
+place and fitted with everything else; a proposal is kept where it lowers the energy around it. Surfaces are
+then compared with the rate of each estimated from its own photons. A piece that differs from its
+surroundings would lower the energy at any depth, so it must also explain the photons better, by its own
+rate, at the proposed depth than, by its own rate, at the depth where it was.
 """
 
 from collections.abc import Sequence
@@ -17,28 +18,28 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.imaging.bright_regions import box_around, dilated
-from pcii.removal.likelihood.guesses import AROUND_CELLS, Guess, guesses_of
 from pcii.removal.likelihood.layers import BESIDE_SHARE, Layers, background_bounds
+from pcii.removal.likelihood.proposals import AROUND_CELLS, Proposal, proposals_of
 
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
 """Of brighter films as many photons are drawn, or as many per px of a large one. A layer is flat and things
 are round: with more photons E would rather cut a thing in two than let its front be a little out of focus."""
 SWEEPS = 5
-ROUNDS, SWEEPS_OF_A_GUESS = 2, 2
+ROUNDS, SWEEPS_OF_A_PROPOSAL = 2, 2
 LIT_NATS = 0.1
-"""Two thirds of what cells cost, while pieces are guessed: else the middle of a thing before something bright
-is not worth its cells, since what it hides costs as much as before. Not from the start: where that is wrong
-in front of all, what is wrong is to go."""
+"""Two thirds of what cells cost, while pieces are proposed: else the middle of a thing before something
+bright is not worth its cells, since what it hides costs as much as before. Not from the start: where that is
+wrong in front of all, what is wrong is to go."""
 LEAST_NATS, PRIOR_SHARE = 5.0, 0.35
-"""What a guess must save; of what outlines cost, and cells that else were dark, such a share counts for it. A
-fit that follows noise pays in full, but of pieces that are guessed there are few."""
+"""By how much a proposal must lower the energy. Of the cost of outlines, and of cells that else were dark,
+such a share counts: a fit that follows noise pays in full, but proposals are few."""
 
 
 def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, start: np.ndarray) -> np.ndarray:
     """The layer (h, w) int64 that the virtual centre sees in each cell, -1 where it is dark.
 
-    `total_disparity_px` (D,) ascends, from far to near; `start` (h, w) is a guess of the result, from
-    which layers are fitted; then pieces are guessed. Deterministic.
+    `total_disparity_px` (D,) ascends, from far to near; layers are fitted from `start` (h, w), then
+    pieces are proposed. Deterministic.
     """
     lit = start >= 0
     if not lit.any():
@@ -54,7 +55,7 @@ def layered(counts: PhotonCounts, total_disparity_px: np.ndarray, start: np.ndar
     for _ in range(SWEEPS):
         layers.sweep()
     if len(total_disparity_px) > 1:
-        _guess_anew(layers, Layers(cut, np.repeat(total_disparity_px, 2), dark))
+        _keep_better_pieces(layers, Layers(cut, np.repeat(total_disparity_px, 2), dark))
     result = np.full(start.shape, -1)
     result[box] = layers.visible()
     return result
@@ -83,71 +84,71 @@ def _masks_of(seen: np.ndarray, count: int) -> np.ndarray:
     return np.arange(count)[:, None, None] == seen
 
 
-def _guess_anew(layers: Layers, doubled: Layers) -> None:
-    """Guess pieces of the layers, and keep those that cost less.
+def _keep_better_pieces(layers: Layers, doubled: Layers) -> None:
+    """Propose pieces of other layers, and keep those that lower the energy.
 
     `doubled` has each of the `layers` twice, for surfaces that are told by themselves at the same depth.
     """
     layers.put(_masks_of(layers.visible(), len(layers.masks)))
     changed = np.ones(layers.masks.shape[1:], dtype=bool)
     for _ in range(ROUNDS):
-        for _ in range(SWEEPS_OF_A_GUESS):
+        for _ in range(SWEEPS_OF_A_PROPOSAL):
             layers.sweep(LIT_NATS)
         explained = _explained(doubled, layers.masks)
-        # Where nothing has changed since, the same guess would fail again.
-        guesses = [guess for guess in guesses_of(layers) if (guess.around & changed).any()]
+        # Where nothing has changed since, the same proposal would fail again.
+        proposals = [piece for piece in proposals_of(layers) if (piece.around & changed).any()]
         changed = np.zeros_like(changed)
-        for together in _apart(guesses):
+        for together in _apart(proposals):
             explained, kept = _tried(layers, doubled, together, explained)
-            for guess in kept:
-                changed |= guess.around
+            for piece in kept:
+                changed |= piece.around
         if not changed.any():
             break
 
 
-def _apart(guesses: Sequence[Guess]) -> list[list[Guess]]:
-    """The guesses in groups in which no two have to do with each other."""
-    groups: list[tuple[np.ndarray, list[Guess]]] = []
-    for guess in guesses:
+def _apart(proposals: Sequence[Proposal]) -> list[list[Proposal]]:
+    """The proposals in groups in which no two have to do with each other."""
+    groups: list[tuple[np.ndarray, list[Proposal]]] = []
+    for piece in proposals:
         for taken, group in groups:
-            if not (taken & guess.around).any():
-                taken |= guess.around
-                group.append(guess)
+            if not (taken & piece.around).any():
+                taken |= piece.around
+                group.append(piece)
                 break
         else:
-            groups.append((guess.around.copy(), [guess]))
+            groups.append((piece.around.copy(), [piece]))
     return [group for _, group in groups]
 
 
 def _tried(
-    layers: Layers, doubled: Layers, guesses: Sequence[Guess], explained: np.ndarray
-) -> tuple[np.ndarray, list[Guess]]:
-    """What is explained (h, w) after those of the guesses were kept that lessen E, and which they are."""
+    layers: Layers, doubled: Layers, proposals: Sequence[Proposal], explained: np.ndarray
+) -> tuple[np.ndarray, list[Proposal]]:
+    """What is explained (h, w) after those proposals were kept that lower the energy, and which they are."""
     before, seen, cost = layers.masks.copy(), layers.visible(), layers.cost_seen()
-    guessed = before.copy()
-    for guess in guesses:
-        guessed[:, guess.cells] = False
-        guessed[guess.layer, guess.cells] = True
-    layers.put(guessed)
-    for _ in range(SWEEPS_OF_A_GUESS):
+    proposed = before.copy()
+    for piece in proposals:
+        proposed[:, piece.cells] = False
+        proposed[piece.layer, piece.cells] = True
+    layers.put(proposed)
+    for _ in range(SWEEPS_OF_A_PROPOSAL):
         layers.sweep(LIT_NATS)
     after, shown = layers.masks.copy(), layers.visible()
     cheaper = PRIOR_SHARE * (cost - layers.cost_seen())
     saved = _explained(doubled, after) - explained + cheaper
-    better = [guess for guess in guesses if saved[guess.around].sum() > LEAST_NATS]
-    kept: list[Guess] = []
+    better = [piece for piece in proposals if saved[piece.around].sum() > LEAST_NATS]
+    kept: list[Proposal] = []
     if better:
         # Is it the depth that is better, or that the piece is told by itself? So it may be where it was, too.
-        moved = np.any([guess.around for guess in better], axis=0) & (shown != seen)
+        moved = np.any([piece.around for piece in better], axis=0) & (shown != seen)
         was, now = (moved & _masks_of(where, len(before)) for where in (seen, shown))
         old, new = _told_by_itself(doubled, before, was), _told_by_itself(doubled, after, now)
-        for guess in better:
-            here = guess.around
+        for piece in better:
+            here = piece.around
             light = max(one[here].sum() for one in new) - max(one[here].sum() for one in old)
             if light + cheaper[here].sum() > LEAST_NATS:
-                kept.append(guess)
-    for guess in kept:
-        before[:, guess.around] = after[:, guess.around]
+                kept.append(piece)
+    for piece in kept:
+        before[:, piece.around] = after[:, piece.around]
     layers.put(before)
     return (_explained(doubled, before) if kept else explained), kept
 

@@ -1,9 +1,9 @@
 """Pieces that may belong to another layer than the one that is seen there now.
 
-Guessed are pieces that a layer in front of all would explain, discs where it would gain most, pieces of one
-light in the section at its depth, and the hulls of what is seen of it already, for what crosses something is
-seen on both sides of it. Whether a guess is right is told by what it saves
-(`pcii.removal.likelihood.layer_search`); here it only must not be missed.
+Proposed are, for each layer: regions whose photons it would explain if it were in front of all others; discs
+where it would explain most; regions of one brightness in the section at its depth; and convex hulls of its
+visible parts, since of a surface that crosses another one parts are visible on both sides. The energy decides
+which proposals are right (`pcii.removal.likelihood.layer_search`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from pcii.imaging.watershed_pieces import pieces_alike, pieces_along_ridges
 from pcii.removal.likelihood.layers import AREA_NATS, LENGTH_NATS, STEPS, Layers
 
 FAVOURS_NATS = (0.0, 0.3, 0.8)
-"""What a layer is granted per cell while pieces are guessed: of what may be there some is, in full or not."""
+"""What a layer is granted per cell while pieces are proposed: one may be there in part."""
 ALIKE_CELLS, MOST_ALIKE, SAME_SHARE = 40, 8, 0.8
 """Of pieces of one light those of 25 x 25 px and more that a layer would explain best; of two that share four
 fifths of what they cover one."""
@@ -30,13 +30,13 @@ MOST_HULLS, MOST_PAIRED, MOST_HULLS_OF_TWO = 3, 14, 8
 DISC_CELLS, MOST_DISCS = (6.0, 9.0, 13.5), 6
 """Discs of 24, 36 and 54 px, so many of each where most is gained: the fit that follows outlines them."""
 SMALLEST_CELLS, FEWEST_PHOTONS = 16, 50.0
-"""Less light than that cannot save what a guess must."""
+"""Less light than that cannot lower the energy by as much as a proposal must."""
 AROUND_CELLS = 8
-"""A guess is judged by what changes within 32 px of it: parallax brings it there."""
+"""A proposal is judged by what changes within 32 px of it: parallax brings it there."""
 
 
 @dataclass(frozen=True)
-class Guess:
+class Proposal:
     """That `layer` is what is seen in `cells`; judged in `around` (both (h, w) bool)."""
 
     layer: int
@@ -44,7 +44,7 @@ class Guess:
     around: np.ndarray
 
 
-def guesses_of(layers: Layers) -> Iterator[Guess]:
+def proposals_of(layers: Layers) -> Iterator[Proposal]:
     """Connected pieces of what may be another layer's, each of them once."""
     told: set[bytes] = set()
     photons = [layers.photons(layer) for layer in range(len(layers.masks))]
@@ -59,7 +59,7 @@ def guesses_of(layers: Layers) -> Iterator[Guess]:
             name = bytes([layer]) + np.packbits(cells).tobytes()
             if name not in told:
                 told.add(name)
-                yield Guess(layer, cells, dilated(cells, AROUND_CELLS))
+                yield Proposal(layer, cells, dilated(cells, AROUND_CELLS))
 
 
 def _supposed(layers: Layers, photons: list[np.ndarray]) -> Iterator[tuple[int, np.ndarray]]:
