@@ -88,8 +88,10 @@ def _seen(
     grid: CameraGrid,
     lamps: tuple[AreaLight, ...],
 ) -> np.ndarray:
-    # Only its shape and lamps in view matter, so that no more files than its mesh are needed.
-    plain = scene.objects[number - 1].model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5))})
+    # Only its shape with its holes and lamps in view matter: no other files are needed.
+    thing = scene.objects[number - 1]
+    shown = {"opacity": thing.material.opacity, "tiled": thing.material.tiled}
+    plain = thing.model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5), **shown)})
     single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
     return first_hits_at_centre(build(render_scene.mi, single, folder, 2), grid).object_id == 1
 

@@ -2,6 +2,8 @@
 
 backend           The renderer behind everything: the one place that loads Mitsuba and Dr.Jit.
 device_arrays     NumPy's arrays as the renderer's, and parts of those; for compiled backends.
+emission          Objects that shine by themselves: as Mitsuba's emitters, and the light that they give a
+                  plane.
 installation      Whether the renderer is installed, which analysis does without.
 intersection      Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one
                   in scalar mode.

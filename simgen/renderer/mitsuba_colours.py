@@ -4,9 +4,21 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import srgb_to_linear
+from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.spec.materials import Reflectance, Spectrum
-from simgen.spectral.spectra import WAVELENGTH_NM, illuminant, linear_srgb, patch, resampled, tint
+from simgen.spectral.spectra import (
+    DAYLIGHT,
+    WAVELENGTH_NM,
+    illuminant,
+    integral,
+    linear_srgb,
+    observer,
+    patch,
+    resampled,
+    tint,
+)
+
+Triple = tuple[float, float, float]
 
 
 def is_spectral(mi: Any) -> bool:
@@ -31,11 +43,31 @@ def spectrum_of(reflectance: str | Spectrum) -> np.ndarray:
     return resampled(reflectance.wavelength_nm, reflectance.value)
 
 
-def radiance_plugin(mi: Any, luminance_cd_m2: float, name: str) -> dict[str, Any]:
-    """Light of a CIE illuminant's spectrum, or of its colour, of this luminance in cd/m^2."""
+def radiance_plugin(mi: Any, luminance_cd_m2: float, colour: str | Triple) -> dict[str, Any]:
+    """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
     if is_spectral(mi):
-        return spectrum_plugin(luminance_cd_m2 * illuminant(name))
-    return {"type": "rgb", "value": (luminance_cd_m2 * tint(name)).tolist()}
+        return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
+    if isinstance(colour, str):
+        rgb = tint(colour)
+    else:
+        rgb = srgb_to_linear(np.array(colour))
+        rgb /= LUMINANCE @ rgb
+    return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
+
+
+def light_spectrum(mi: Any, colour: str | Triple) -> np.ndarray:
+    """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
+
+    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019), as the
+    renderer makes it of reflectances.
+    """
+    if isinstance(colour, str):
+        return illuminant(colour)
+    rgb = srgb_to_linear(np.array(colour))
+    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), WAVELENGTH_NM)
+    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * illuminant(DAYLIGHT)
+    luminosity = observer()[1]
+    return filtered * (integral(luminosity * illuminant(DAYLIGHT)) / integral(luminosity * filtered))
 
 
 def spectrum_plugin(values: np.ndarray) -> dict[str, Any]:

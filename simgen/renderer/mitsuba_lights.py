@@ -4,14 +4,14 @@ In RGB mode radiance is linear sRGB scaled such that its luminance, 0.2126 R + 0
 is in cd/m^2; in spectral mode see `spectra`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
-from simgen.renderer.mitsuba_colours import radiance_plugin
+from simgen.renderer.mitsuba_colours import light_spectrum, radiance_plugin
 from simgen.spec.lights import (
     AreaLight,
     DirectionalLight,
@@ -22,7 +22,8 @@ from simgen.spec.lights import (
     SpotLight,
     UniformLight,
 )
-from simgen.spectral.spectra import illuminant
+from simgen.spec.scene import Scene
+from simgen.spectral.spectra import DAYLIGHT
 
 NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
@@ -98,20 +99,31 @@ def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarr
     }
 
 
-def main_spectrum(lights: Sequence[Light]) -> np.ndarray:
-    """The mean spectrum (N,) of the lights, each at luminance 1."""
-    names = [getattr(light, "illuminant", "D65") for light in lights]
-    return np.mean([illuminant(name) for name in names], axis=0)
+def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
+    """The mean spectrum (N,) of all that shines, each at luminance 1."""
+    emissions = [thing.material.emission for thing in scene.objects if thing.material.emission is not None]
+    colours = [getattr(lamp, "illuminant", DAYLIGHT) for lamp in (*scene.lights, *emissions)]
+    return np.mean([light_spectrum(mi, colour) for colour in colours], axis=0)
 
 
-def gain_for(level: Level | None, lights: Sequence[Light], surroundings: np.ndarray | None) -> float:
-    """By how much to make lights brighter for a plane to get its level; `InputError` if it gets no light."""
+def gain_for(
+    level: Level | None,
+    lights: Sequence[Light],
+    surroundings: np.ndarray | None,
+    lux_of_objects: Callable[[float], float],
+) -> float:
+    """By how much to make all that shines brighter for a plane to get its level.
+
+    `lux_of_objects` is what objects that shine give a plane at a depth in mm. `InputError` if there is no
+    light on it.
+    """
     if level is None:
         return 1.0
     lux = sum(illuminance_lux(light, level.z_mm, surroundings) for light in lights)
+    lux += lux_of_objects(level.z_mm)
     if not lux > 0:
         raise InputError(
-            f"level: none of the lights shines on a surface at z_mm = {level.z_mm:g} that faces the cameras"
+            f"level: nothing shines on a surface at z_mm = {level.z_mm:g} that faces the cameras"
         )
     return level.illuminance_lux / lux
 

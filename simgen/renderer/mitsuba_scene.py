@@ -10,9 +10,10 @@ import numpy as np
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
+from simgen.renderer.emission import emission_plugin, object_lux
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
-from simgen.renderer.mitsuba_shapes import card_pose, placed_shape, pose_of
+from simgen.renderer.mitsuba_shapes import card_pose, placed_shape
 from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_plugin, two_sided
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import Scene, SceneObject
@@ -53,9 +54,17 @@ def build(
         "type": "scene",
         "integrator": {"type": "path", "max_depth": max_depth},
     }
+    around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
+    surroundings = None if around is None else assets.environment(around.file)
+    gain = gain_for(
+        scene.level,
+        scene.lights,
+        surroundings,
+        lambda z_mm: sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects),
+    )
     patterns = painted_patterns(scene.objects)
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        plugins[f"object{number}"] = _object(mi, thing, assets, pattern)
+        plugins[f"object{number}"] = _object(mi, thing, assets, pattern, gain)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
@@ -64,9 +73,6 @@ def build(
             "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
             "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
         }
-    around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
-    surroundings = None if around is None else assets.environment(around.file)
-    gain = gain_for(scene.level, scene.lights, surroundings)
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
     try:
@@ -76,7 +82,7 @@ def build(
     except RuntimeError as fault:
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
     _numbers_as_data(mi, loaded)
-    filters = None if curves is None else filters_for(curves, main_spectrum(scene.lights))
+    filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
     return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain)
 
 
@@ -109,10 +115,10 @@ def _object_id(shape_id: str) -> int:
     return int(shape_id.removeprefix("object")) if shape_id.startswith("object") else 0
 
 
-def _object(mi: Any, thing: SceneObject, assets: Assets, pattern: np.ndarray | None) -> Any:
+def _object(mi: Any, thing: SceneObject, assets: Assets, pattern: np.ndarray | None, gain: float) -> Any:
     try:
         surface = surface_plugin(mi, thing.material, thing.shape, assets, pattern)
-        return placed_shape(mi, thing.shape, pose_of(mi, thing), assets, surface)
+        return placed_shape(mi, thing, assets, surface, emission_plugin(mi, thing, assets, gain))
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None
 

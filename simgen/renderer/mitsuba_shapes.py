@@ -6,13 +6,12 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
-from simgen.assets.solids import box, cylinder
+from simgen.assets.cutouts import cut_out
+from simgen.assets.solids import triangles_of
 from simgen.assets.triangles import Triangles
-from simgen.base.strict_models import LARGEST_MM
+from simgen.spec.materials import Material
 from simgen.spec.scene import SceneObject
-from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
-
-SMALLEST_MM = 1e-3
+from simgen.spec.shapes import Card, Mesh, Shape, Sphere
 
 
 def pose_of(mi: Any, thing: SceneObject) -> Any:
@@ -24,25 +23,47 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose
 
 
-def placed_shape(mi: Any, shape: Shape, pose: Any, assets: Assets, surface: dict[str, Any]) -> Any:
-    """The Mitsuba shape (or the plugin that makes it) of an object in this pose with this surface."""
-    T = mi.ScalarTransform4f
-    match shape:
-        case Sphere():
-            to_world = pose @ globe_pose(mi) @ T().scale(shape.radius_mm)
-            return {"type": "sphere", "to_world": to_world, "bsdf": surface}
-        case Card():
+def placed_shape(
+    mi: Any, thing: SceneObject, assets: Assets, surface: dict[str, Any], emitter: dict[str, Any] | None
+) -> Any:
+    """The Mitsuba shape (or the plugin that makes it) of an object with this surface and emitter."""
+    T, pose, shape = mi.ScalarTransform4f, pose_of(mi, thing), thing.shape
+    plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": emitter})
+    if thing.material.opacity is None:
+        if isinstance(shape, Sphere):
+            return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | plain
+        if isinstance(shape, Card):
             to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
-            return {"type": "rectangle", "to_world": to_world, "bsdf": surface}
-        case Box():
-            triangles = box(shape.width_mm, shape.height_mm, shape.depth_mm)
-            return _mesh(mi, triangles, 1.0, pose, surface)
-        case Cylinder():
-            return _mesh(mi, cylinder(shape.radius_mm, shape.length_mm), 1.0, pose, surface)
-        case Mesh():
-            triangles = assets.mesh(shape.file)
-            _check_size(shape, triangles)
-            return _mesh(mi, triangles, shape.scale, pose, surface)
+            return {"type": "rectangle", "to_world": to_world} | plain
+    matrix = np.array(pose.matrix, dtype=np.float64)
+    return mesh_of(mi, solid_parts(shape, thing.material, assets), matrix, plain)
+
+
+def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
+    """Where a shape of this material is, as triangles in mm; all of it without an opacity.
+
+    Raises `InputError` for an opacity that cannot be laid on the shape or leaves nothing of it.
+    """
+    triangles = triangles_of(shape, assets)
+    if material.opacity is None:
+        return triangles
+    where = "material.opacity"
+    if isinstance(shape, Sphere):
+        raise InputError(f"{where}: it cannot be laid on a sphere; give a mesh")
+    check_texcoords(where, "leave it out", shape, assets)
+    try:
+        return cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
+    except ValueError as fault:
+        raise InputError(f"{where}: {fault}") from None
+
+
+def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
+    """`InputError` for a picture on a mesh that does not say where it lies."""
+    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
+        raise InputError(
+            f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
+            f"add them to the file, or {instead}"
+        )
 
 
 def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
@@ -63,34 +84,27 @@ def globe_pose(mi: Any) -> Any:
     return mi.ScalarTransform4f([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
-def _check_size(shape: Mesh, triangles: Triangles) -> None:
-    reach = float(np.abs(triangles.positions).max()) * shape.scale
-    extent = float(np.ptp(triangles.positions, axis=0).max()) * shape.scale
-    if not (extent >= SMALLEST_MM and reach <= LARGEST_MM):
-        raise InputError(
-            f"shape.scale: with {shape.scale:g} the mesh {shape.file!r} is {extent:g} mm large and reaches "
-            f"{reach:g} mm from its origin; {SMALLEST_MM:g} to {LARGEST_MM:g} mm are allowed"
-        )
-
-
-def _mesh(mi: Any, triangles: Triangles, scale: float, pose: Any, surface: dict[str, Any]) -> Any:
-    matrix = np.array(pose.matrix, dtype=np.float64)
+def mesh_of(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, dict[str, Any]]) -> Any:
+    """Triangles, moved by a matrix (4, 4), as a Mitsuba mesh; `parts` are its "bsdf" and "emitter"."""
     properties = mi.Properties()
-    properties["bsdf"] = mi.load_dict(surface)
+    for name, plugin in parts.items():
+        properties[name] = mi.load_dict(plugin)
+    # The renderer aims at lamps as if their faces were flat; with smoothed normals it would be off.
+    normals = None if "emitter" in parts else triangles.normals
     mesh = mi.Mesh(
         "mesh",
         len(triangles.positions),
         len(triangles.faces),
         props=properties,
-        has_vertex_normals=triangles.normals is not None,
+        has_vertex_normals=normals is not None,
         has_vertex_texcoords=triangles.texcoords is not None,
     )
     values = mi.traverse(mesh)
-    positions = scale * triangles.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    positions = triangles.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     values["vertex_positions"] = positions.astype(np.float32).ravel()
     values["faces"] = triangles.faces.astype(np.uint32).ravel()
-    if triangles.normals is not None:
-        values["vertex_normals"] = (triangles.normals @ matrix[:3, :3].T).astype(np.float32).ravel()
+    if normals is not None:
+        values["vertex_normals"] = (normals @ matrix[:3, :3].T).astype(np.float32).ravel()
     if triangles.texcoords is not None:  # Mitsuba's v runs down a picture
         values["vertex_texcoords"] = (triangles.texcoords * [1, -1] + [0, 1]).astype(np.float32).ravel()
     values.update()

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
 from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin
+from simgen.renderer.mitsuba_shapes import check_texcoords
 from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, is_clear
 from simgen.spec.scene import SceneObject
-from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
+from simgen.spec.shapes import Box, Card, Cylinder, Shape, Sphere
 
 PRINCIPLED = {
     "metallic": "metallic",
@@ -77,12 +77,14 @@ def surface_plugin(
                 given = getattr(finish, field)
                 if isinstance(given, str):
                     where = f"material.finish.{field}"
-                    _check_texcoords(where, "give a number instead", shape, assets)
-                    given = _texture(mi, assets.numbers(given, where), shape, raw=True)
+                    check_texcoords(where, "give a number instead", shape, assets)
+                    given = texture_plugin(
+                        mi, assets.numbers(given, where), shape, raw=True, tiled=material.tiled
+                    )
                 surface[name] = given
     if material.normal_map is not None:
-        _check_texcoords("material.normal_map", "leave it out", shape, assets)
-        tilts = _texture(mi, assets.stored(material.normal_map), shape, raw=True)
+        check_texcoords("material.normal_map", "leave it out", shape, assets)
+        tilts = texture_plugin(mi, assets.stored(material.normal_map), shape, raw=True, tiled=material.tiled)
         surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
     return surface if is_clear(finish) else two_sided(surface)
 
@@ -93,29 +95,24 @@ def _reflectance(
     if material.texture is None:
         assert material.reflectance is not None
         return reflectance_plugin(mi, material.reflectance)
-    _check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
+    check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
     pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
     assert pixels is not None
     # Linear already, so colours are left as they are, but for being made spectra where these are asked.
-    return _texture(mi, pixels, shape, raw=not is_spectral(mi))
+    return texture_plugin(mi, pixels, shape, raw=not is_spectral(mi), tiled=material.tiled)
 
 
-def _check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
-    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
-        raise InputError(
-            f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
-            f"add them to the file, or {instead}"
-        )
-
-
-def _texture(mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool) -> dict[str, Any]:
+def texture_plugin(
+    mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool, tiled: bool = False
+) -> dict[str, Any]:
+    """Pixels (H, W, C) as the texture of this shape; `raw` ones are no colours that become spectra."""
     return {
         "type": "bitmap",
         "bitmap": _bitmap(mi, _in_renderers_order(pixels, shape)),
         "raw": raw,
         "filter_type": "bilinear",
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
-        "wrap_mode": "repeat" if isinstance(shape, Sphere) else "clamp",
+        "wrap_mode": "repeat" if tiled or isinstance(shape, Sphere) else "clamp",
     }
 
 

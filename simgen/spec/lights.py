@@ -1,22 +1,48 @@
 """Lamps and what shines from all around: where they stand, how bright and of what colour they are."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from simgen.base.asset_names import EnvironmentName
-from simgen.base.strict_models import Length, Position, Positive, Real, Strict, Vector, completed_by
+from simgen.base.strict_models import (
+    Colour,
+    Length,
+    Position,
+    Positive,
+    Real,
+    Strict,
+    Vector,
+    completed_by,
+)
 from simgen.spectral.spectra import illuminant_names, known_illuminant
 
-Illuminant = Annotated[
+NamedIlluminant = Annotated[
     str,
     Field(
         max_length=40,
-        description="Colour of the light: a CIE illuminant by name, such as D65, A or FL2.",
+        description="a CIE illuminant by name, such as D65, A or FL2",
         json_schema_extra=completed_by("enum", illuminant_names),
     ),
     AfterValidator(known_illuminant),
 ]
+
+
+def _is_lit(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(colour):
+        raise ValueError("light is not black; (1, 1, 1) is that of daylight")
+    return colour
+
+
+def _named_or_colour(given: Any) -> str:
+    return "name" if isinstance(given, str) else "colour"
+
+
+Illuminant = Annotated[
+    Annotated[NamedIlluminant, Tag("name")] | Annotated[Colour, AfterValidator(_is_lit), Tag("colour")],
+    Discriminator(_named_or_colour),
+]
+"""Colour of the light: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""
 
 
 class AreaLight(Strict):

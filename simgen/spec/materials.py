@@ -7,6 +7,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simgen.base.asset_names import ImageName
 from simgen.base.strict_models import Colour, Positive, Real, Share, Strict, completed_by
+from simgen.spec.lights import Illuminant
 from simgen.spec.textures import Texture
 from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
 
@@ -107,6 +108,24 @@ class Spectrum(Strict):
         return self
 
 
+class Emission(Strict):
+    """Light that a surface sends out by itself, evenly in all directions on the side that its normals point
+    to: outwards from closed shapes, towards the cameras from a card."""
+
+    luminance_cd_m2: Positive
+    """How bright it is; a screen has some 300, a lit lampshade 3000."""
+    illuminant: Illuminant = "D65"
+    """Its colour: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""
+    texture: ImageName | None = None
+    """An sRGB image inside the scene's folder whose white has this luminance and the colour D65."""
+
+    @model_validator(mode="after")
+    def _has_one_colour(self) -> Self:
+        if self.texture is not None and self.illuminant != "D65":
+            raise ValueError("illuminant: the colours of an image are its own; leave it out")
+        return self
+
+
 def _kind_of_reflectance(value: Any) -> str:
     if isinstance(value, str):
         return "patch"
@@ -161,6 +180,13 @@ class Material(Strict):
     normal_map: ImageName | None = None
     """An image inside the scene's folder that tilts the surface: red to the right of the picture, green up,
     blue out of it, each stored as half of the component plus a half (as in OpenGL and glTF)."""
+    tiled: bool = False
+    """Beyond its borders a picture is repeated; otherwise its outermost pixels go on there."""
+    opacity: ImageName | None = None
+    """A grey image inside the scene's folder, taken as it is stored: where it, linear between the middles of
+    its pixels, is below a half, there is no surface. On cards, boxes, cylinders and meshes."""
+    emission: Emission | None = None
+    """Light that the surface sends out by itself, such as { luminance_cd_m2 = 300.0 }."""
 
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
@@ -172,4 +198,6 @@ class Material(Strict):
             raise ValueError(f"the colour of {kind} is its own; give no 'reflectance' and no 'texture'")
         if self.normal_map is not None and is_clear(self.finish):
             raise ValueError("normal_map: a surface that light passes through cannot be tilted by an image")
+        if self.opacity is not None and is_clear(self.finish):
+            raise ValueError("opacity: what light passes through is bounded by whole surfaces, without holes")
         return self

@@ -7,9 +7,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from pcii.base.errors import InputError
 from simgen.base.asset_names import AssetName, asset, named_files
@@ -88,8 +88,8 @@ class Scene(Strict):
     """What it is for."""
     objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS), at_most(MOST_OBJECTS)] = ()
     """What truth and scores know by name; none makes an empty scene."""
-    lights: Annotated[tuple[Light, ...], Field(min_length=1, max_length=MOST_LIGHTS), at_most(MOST_LIGHTS)]
-    """At least one lamp, or light from all around."""
+    lights: Annotated[tuple[Light, ...], Field(max_length=MOST_LIGHTS), at_most(MOST_LIGHTS)] = ()
+    """Lamps, and light from all around; at least one, unless an object has a `material.emission`."""
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
@@ -112,6 +112,15 @@ class Scene(Strict):
         if twice:
             raise ValueError(f"two objects are named '{twice[0]}'; give each its own name")
         return objects
+
+    @model_validator(mode="after")
+    def _is_lit(self) -> Self:
+        if not self.lights and not any(thing.material.emission for thing in self.objects):
+            raise ValueError(
+                "'lights': nothing shines; give a light, such as { type = \"uniform\", luminance_cd_m2 = "
+                "100.0 }, or an object a material.emission"
+            )
+        return self
 
 
 def load_scene(

@@ -1,11 +1,11 @@
 """Shapes that objects of a scene can have, in millimetres about the object's position."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from simgen.base.asset_names import MeshName
-from simgen.base.strict_models import Length, Positive, Strict
+from simgen.base.strict_models import Length, Positive, Strict, Vector
 
 
 class Sphere(Strict):
@@ -59,6 +59,23 @@ class Cylinder(Strict):
     """Along Y, from end to end."""
 
 
+def _has_extent(scales: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not all(scales):
+        raise ValueError("a scale is not 0")
+    return scales
+
+
+def _one_or_three(given: Any) -> str:
+    return "number" if isinstance(given, int | float) else "three"
+
+
+Scale = Annotated[
+    Annotated[Positive, Tag("number")] | Annotated[Vector, AfterValidator(_has_extent), Tag("three")],
+    Discriminator(_one_or_three),
+]
+"""One number, or three along the axes, of which negative ones mirror."""
+
+
 class Mesh(Strict):
     """A PLY or OBJ mesh in the scene's folder; its axes are the world's, about the object's position.
 
@@ -69,8 +86,9 @@ class Mesh(Strict):
     type: Literal["mesh"] = "mesh"
     file: MeshName
     """Name of a .ply or .obj file inside the scene's folder."""
-    scale: Positive = 1.0
-    """Millimetres for one unit of the file."""
+    scale: Scale = 1.0
+    """Millimetres for one unit of the file; or three numbers along the mesh's own axes, negative ones of
+    which mirror it."""
 
 
 Shape = Annotated[Sphere | Card | Box | Cylinder | Mesh, Field(discriminator="type")]

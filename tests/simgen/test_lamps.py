@@ -206,14 +206,14 @@ def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_
     ids=["behind", "in the plane", "a lamp behind", "a lamp that looks away", "a spot beside", "from behind"],
 )
 def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match=r"level: none of the lights shines on a surface at z_mm = 500"):
+    with pytest.raises(InputError, match=r"level: nothing shines on a surface at z_mm = 500"):
         made([FLAT], [light], level={"illuminance_lux": LUX, "z_mm": Z_MM})
 
 
 def test_surroundings_that_shine_only_from_ahead_give_the_plane_nothing(tmp_path: Path) -> None:
     pixels = np.zeros((16, 32, 3))
     pixels[6:10, 14:18] = 1
-    with pytest.raises(InputError, match="level: none of the lights shines"):
+    with pytest.raises(InputError, match="level: nothing shines"):
         made([FLAT], [sky(tmp_path, pixels)], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
     # Turned round they shine from behind the cameras.
     turned = sky(tmp_path, pixels, turn_deg=180.0)

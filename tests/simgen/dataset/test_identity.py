@@ -40,6 +40,9 @@ MATERIALS = [
     {"finish": {"type": "glass"}},
     {"reflectance": "dark skin", "finish": {"type": "principled", "metallic": 0.5}},
     {"reflectance": "dark skin", "normal_map": "a.png"},
+    {"reflectance": "dark skin", "opacity": "a.png", "tiled": True},
+    {"reflectance": "dark skin", "emission": {"luminance_cd_m2": 9.0}},
+    {"reflectance": "dark skin", "emission": {"luminance_cd_m2": 9.0, "texture": "a.png"}},
 ]
 SHAPES = [
     {"type": "sphere", "radius_mm": 20.0},

@@ -1,0 +1,154 @@
+"""Objects that shine: as an area light of the same size does, by colour and image, and photon by photon."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from lit_views import SCALAR, card, film, made, seen, surprise, thinned
+from PIL import Image
+
+from pcii.base.errors import InputError
+from pcii.base.srgb import LUMINANCE, srgb_to_linear
+from simgen.assets.asset_files import Assets
+from simgen.renderer import backend
+from simgen.renderer.emission import object_lux
+from simgen.renderer.mitsuba_colours import light_spectrum
+from simgen.spec.scene import Scene
+from simgen.spectral.spectra import FROM_XYZ, illuminant, integral, observer
+
+pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
+GRID = film()
+WALL = card(500.0, 600.0, {"reflectance": [0.6] * 3})
+BLACK = [0.0, 0.0, 0.0]
+L = 1000.0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def variant_is_put_back() -> Iterator[None]:
+    yield
+    backend.load()
+
+
+def shining(shape: dict[str, Any], emission: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A black object above the cameras' view that shines upon the wall."""
+    material = {"reflectance": BLACK, "emission": {"luminance_cd_m2": L, **emission}}
+    return {
+        "name": "panel",
+        "position_mm": (60.0, -250.0, 380.0),
+        "shape": shape,
+        "material": material,
+        **more,
+    }
+
+
+# Turned about X by 120 degrees a card, which faces -Z, faces the wall from above, at 60 degrees.
+PANEL = shining({"type": "card", "width_mm": 90.0, "height_mm": 50.0}, {}, rotation_deg=(120.0, 0.0, 0.0))
+
+
+def lamp() -> dict[str, Any]:
+    position = np.array(PANEL["position_mm"])
+    towards = np.array([0.0, np.sin(np.radians(120)), -np.cos(np.radians(120))])
+    size = {"width_mm": 90.0, "height_mm": 50.0}
+    where = {"position_mm": tuple(position), "target_mm": tuple(position + 100 * towards)}
+    return {"type": "area", **where, **size, "luminance_cd_m2": L}
+
+
+def test_a_card_that_shines_is_an_area_light() -> None:
+    by_lamp, by_card = seen(made([WALL], [lamp()]), GRID, 256), seen(made([WALL, PANEL], []), GRID, 256)
+    assert by_lamp.mean() > 1
+    np.testing.assert_allclose(by_card, by_lamp, rtol=0.04)
+    np.testing.assert_allclose(by_card.mean(), by_lamp.mean(), rtol=2e-3)
+
+
+@pytest.mark.skipif(SCALAR, reason="takes minutes without a compiled backend")
+@pytest.mark.parametrize("kind", ["card", "ball", "mesh with normals"])
+def test_photons_follow_the_image(kind: str, tmp_path: Path) -> None:
+    thing = PANEL
+    if kind == "ball":
+        thing = shining({"type": "sphere", "radius_mm": 30.0}, {"illuminant": [1.0, 0.6, 0.3]})
+    if kind == "mesh with normals":
+        write_octahedron(tmp_path / "lamp.ply")
+        thing = shining({"type": "mesh", "file": "lamp.ply", "scale": [40.0, 40.0, -60.0]}, {})
+    # In sight, so that its own light is among what is counted.
+    thing = thing | {"position_mm": (60.0, -120.0, 450.0)}
+    built = made([WALL, thing], [], max_depth=3, folder=tmp_path)
+    view = seen(built, GRID, 4096)
+    photons, _ = thinned(built, GRID, 3, gain=40_000 / view.mean() / GRID.height / GRID.width)
+    assert abs(surprise(photons, view, GRID, 40_000 / view.mean() / GRID.height / GRID.width)) < 4
+
+
+def write_octahedron(path: Path) -> None:
+    corners = ["1 0 0", "-1 0 0", "0 1 0", "0 -1 0", "0 0 1", "0 0 -1"]
+    faces = ["0 2 4", "2 1 4", "1 3 4", "3 0 4", "2 0 5", "1 2 5", "3 1 5", "0 3 5"]
+    names = [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
+    head = ["ply", "format ascii 1.0", "element vertex 6", *names]
+    head += ["element face 8", "property list uchar int vertex_indices", "end_header"]
+    body = [f"{corner} {corner}" for corner in corners] + [f"3 {face}" for face in faces]
+    path.write_text("\n".join([*head, *body]) + "\n")
+
+
+def test_the_level_counts_what_shines() -> None:
+    """A ball of radius r and radiance L gives a plane at distance d that faces it pi L (r / d)^2."""
+    ball = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, 200.0)}
+    thing = Scene.model_validate({"title": "t", "objects": [ball]}).objects[0]
+    lux = object_lux(backend.load(), thing, 500.0, Assets())
+    assert lux == pytest.approx(np.pi * L * (50 / 300) ** 2, rel=1e-3)
+    # Before the cameras, behind them it lights the wall.
+    behind = shining({"type": "sphere", "radius_mm": 50.0}, {}) | {"position_mm": (0.0, 0.0, -200.0)}
+    level = {"illuminance_lux": 300.0, "z_mm": 500.0}
+    view = seen(made([WALL, behind], [], level=level), GRID, 256)
+    reflectance = float(srgb_to_linear(np.array(0.6)))
+    assert view[15:17, 15:17].mean() == pytest.approx(reflectance / np.pi * 300, rel=0.01)
+
+
+def test_an_image_shines_where_it_is_bright(tmp_path: Path) -> None:
+    """Left red and at half the luminance, right black, against a red card of half the width."""
+    half = round(255 * 0.735357)  # sRGB of 0.5
+    Image.fromarray(np.array([[[half, 0, 0]] * 8 + [[0, 0, 0]] * 8] * 8, np.uint8)).save(tmp_path / "a.png")
+    shape = {"type": "card", "width_mm": 200.0, "height_mm": 100.0}
+    screen = shining(
+        shape, {"texture": "a.png"}, rotation_deg=(180.0, 0.0, 0.0), position_mm=(0.0, -300.0, 300.0)
+    )
+    luminance = 0.5 * L * LUMINANCE[0]
+    alone = shining(
+        shape | {"width_mm": 100.0},
+        {"illuminant": [1.0, 0.0, 0.0], "luminance_cd_m2": luminance},
+        rotation_deg=(180.0, 0.0, 0.0),
+        position_mm=(-50.0, -300.0, 300.0),
+    )
+    views = [seen(made([WALL, thing], [], folder=tmp_path), GRID, 256) for thing in (screen, alone)]
+    assert (views[0][..., 0] > 0).all()
+    assert not views[0][..., 1:].any()
+    np.testing.assert_allclose(views[0], views[1], rtol=0.1)
+    np.testing.assert_allclose(views[0].mean(), views[1].mean(), rtol=0.01)
+
+
+@pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (0.9, 0.5, 0.2), (0.2, 0.3, 1.0)])
+def test_the_spectrum_of_a_colour_has_it(colour: tuple[float, float, float]) -> None:
+    spectrum = light_spectrum(backend.load(), colour)
+    rgb = srgb_to_linear(np.array(colour))
+    seen_as = integral(observer() * spectrum)
+    assert seen_as[1] == pytest.approx(integral(observer()[1] * illuminant("D65")))
+    found = FROM_XYZ @ seen_as
+    np.testing.assert_allclose(found / found.max(), rgb / rgb.max(), atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("shape", "sentence"),
+    [
+        ({"type": "box", "width_mm": 9.0, "height_mm": 9.0, "depth_mm": 9.0}, "several times"),
+        ({"type": "mesh", "file": "lamp.ply"}, "no texture coordinates"),
+    ],
+)
+def test_images_that_cannot_shine_are_told(tmp_path: Path, shape: dict[str, Any], sentence: str) -> None:
+    Image.fromarray(np.full((4, 4, 3), 255, np.uint8)).save(tmp_path / "a.png")
+    write_octahedron(tmp_path / "lamp.ply")
+    with pytest.raises(InputError, match=rf"object 'panel', material.emission.texture: .*{sentence}"):
+        made([shining(shape, {"texture": "a.png"})], [], folder=tmp_path)
+
+
+def test_a_dark_scene_is_told() -> None:
+    with pytest.raises(ValueError, match="nothing shines"):
+        Scene.model_validate({"title": "t", "objects": [WALL]})
