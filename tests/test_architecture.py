@@ -40,6 +40,7 @@ ROOMS = {
         "spectral",
         "spec",
         "assets",
+        "importing",
         "cameras",
         "renderer",
         "sensor",

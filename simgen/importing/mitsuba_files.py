@@ -9,7 +9,7 @@ from simgen.base.asset_names import asset
 
 LARGEST_XML_BYTES = 1 << 23
 """Of a scene file and all that it includes."""
-MOST_ELEMENTS = 200_000
+MOST_ELEMENTS = 100_000
 MOST_FILES = 2000
 DEEPEST = 64
 LONGEST_ATTRIBUTE = 1 << 16
@@ -34,26 +34,42 @@ class SceneFiles:
         self._found: dict[tuple[Path, str], Path] = {}
         self._bytes = 0
         self._elements = 0
+        self._read = 0
 
     def find(self, name: str, place: str, beside: Path | None = None) -> Path:
         """A file of this name; `InputError`, beginning with `place`, unless it is inside the scene's folder.
 
         A file in the folder of the file `beside`, which names it, goes before one in the scene's folder.
         """
-        near = (beside or self._scene).parent
+        near = (beside or self._scene).parent.resolve()
         if (near, name) not in self._found:
             if len(self._found) >= MOST_FILES:
-                raise InputError(f"{place}: a scene here may name {MOST_FILES} files, and this one names more")
-            root = self._folder.resolve()
-            local = name
-            if near.resolve() != root and not Path(name).is_absolute() and "\0" not in name:
-                inner = near.resolve().relative_to(root) / name
-                local = str(inner) if len(name) < 200 and (root / inner).is_file() else name
-            self._found[near, name] = asset(self._folder, local, place)
+                raise InputError(
+                    f"{place}: a scene here may name {MOST_FILES} files, and this one names more"
+                )
+            self._found[near, name] = self._near(near, name, place) or asset(self._folder, name, place)
         return self._found[near, name]
 
-    def read_xml(self, path: Path) -> Element:
-        """The root of an XML file; `InputError` with file and line if it is none, or beyond the limits."""
+    def _near(self, folder: Path, name: str, place: str) -> Path | None:
+        """A file in a folder inside the scene's, if it is there."""
+        root = self._folder.resolve()
+        if folder == root or Path(name).is_absolute():
+            return None
+        try:
+            return asset(self._folder, str(folder.relative_to(root) / name), place)
+        except InputError:
+            return None
+
+    def read_xml(self, path: Path, depth: int) -> Element:
+        """The root of an XML file; `InputError` with file and line if it is none, or beyond the limits.
+
+        Its elements count as nested in as many more as `depth` says: those around the place of an include.
+        """
+        self._read += 1
+        if self._read > MOST_FILES:
+            raise InputError(
+                f"{path}: a scene here may include {MOST_FILES} files, and this one includes more"
+            )
         if path.is_dir():
             raise InputError(f"{path}: this is a folder, not an XML file")
         if not path.is_file():  # nor a pipe, which would block
@@ -73,9 +89,9 @@ class SceneFiles:
         except UnicodeDecodeError as fault:
             line = data.count(b"\n", 0, fault.start) + 1
             raise InputError(f"{path}: line {line}: not UTF-8 text; save it as UTF-8") from None
-        return self._tree(path, data)
+        return self._tree(path, data, depth)
 
-    def _tree(self, path: Path, data: bytes) -> Element:
+    def _tree(self, path: Path, data: bytes, depth: int) -> Element:
         # Whatever encoding a document claims, it is UTF-8.
         parser = expat.ParserCreate("utf-8")
         top = Element("", {}, 0)
@@ -88,7 +104,7 @@ class SceneFiles:
             self._elements += 1
             if self._elements > MOST_ELEMENTS:
                 refuse(f"a scene here may have {MOST_ELEMENTS} elements, and this one has more")
-            if len(open_ones) > DEEPEST:
+            if depth + len(open_ones) > DEEPEST:
                 refuse(f"elements may be nested {DEEPEST} deep, and these are deeper")
             if any(len(text) > LONGEST_ATTRIBUTE for text in attributes.values()):
                 refuse(f"an attribute may have {LONGEST_ATTRIBUTE} characters, and this one has more")

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from simgen.importing.mitsuba_scene import Value
+from simgen.importing.mitsuba_scene import Value, Vector
 
 IGNORED = {"integrator", "film", "sampler", "rfilter"}
 """Categories that only tell how to render: whatever is in them, it is left out."""
@@ -67,8 +67,8 @@ def _colour(default: float | None = None) -> Parameter:
     return Parameter("colour", default)
 
 
-def _vector(*default: float) -> Parameter:
-    return Parameter("vector", default or None)
+def _vector(default: Vector | None = None) -> Parameter:
+    return Parameter("vector", default)
 
 
 def _index(default: str) -> Parameter:
@@ -133,12 +133,15 @@ ALLOWED: dict[tuple[str, str], Allowed] = {
     ("scene", "scene"): Allowed(
         {}, (Part("shape"), Part("bsdf"), Part("texture"), Part("emitter"), Part("sensor"))
     ),
-    ("shape", "sphere"): Allowed({"center": _vector(0.0, 0.0, 0.0), "radius": _number(1.0), **_SHAPE}, _DRESS),
+    ("shape", "sphere"): Allowed(
+        {"center": _vector((0.0, 0.0, 0.0)), "radius": _number(1.0), **_SHAPE}, _DRESS
+    ),
     ("shape", "rectangle"): Allowed(_SHAPE, _DRESS),
     ("shape", "cube"): Allowed(_SHAPE, _DRESS),
     ("shape", "disk"): Allowed(_SHAPE, _DRESS),
     ("shape", "cylinder"): Allowed(
-        {"p0": _vector(0.0, 0.0, 0.0), "p1": _vector(0.0, 0.0, 1.0), "radius": _number(1.0), **_SHAPE}, _DRESS
+        {"p0": _vector((0.0, 0.0, 0.0)), "p1": _vector((0.0, 0.0, 1.0)), "radius": _number(1.0), **_SHAPE},
+        _DRESS,
     ),
     ("shape", "obj"): Allowed({**_MESH, "flip_tex_coords": _flag(True)}, _DRESS),
     ("shape", "ply"): Allowed({**_MESH, "flip_tex_coords": _flag(False)}, _DRESS),
@@ -218,9 +221,9 @@ ALLOWED: dict[tuple[str, str], Allowed] = {
         {**_CAMERA, "principal_point_offset_x": _number(0.0), "principal_point_offset_y": _number(0.0)},
         not_both=_ONE_VIEW,
     ),
-    ("sensor", "thinlens"): Allowed(
-        {**_CAMERA, "aperture_radius": _number(needed=True)}, not_both=_ONE_VIEW
-    ),
+    ("sensor", "thinlens"): Allowed({**_CAMERA, "aperture_radius": _number(needed=True)}, not_both=_ONE_VIEW),
 }
-"""By category and type. `beam_width` of a spot is 3/4 of its `cutoff_angle` if missing, `alpha` 0.1 unless
-`alpha_u` and `alpha_v` are there, `specular` 0.5 unless `eta` is, `focal_length` 50 mm unless `fov` is."""
+"""By category and type. A parameter that is missing and has no default here: `beam_width` is 3/4 of
+`cutoff_angle`, `alpha` 0.1 unless there is `alpha_u`, `specular` 0.5 unless there is `eta`, `focal_length`
+50 mm unless there is `fov`. A metal with neither `material` nor `eta` reflects all light; a light without
+`position`, `direction` and `to_world` is at the origin or shines along +Z."""

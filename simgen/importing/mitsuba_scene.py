@@ -42,8 +42,8 @@ class Plugin:
     id: str
     """The name that references use; "" if it has none."""
     parameters: "Mapping[str, Value | Plugin]"
-    """By name, of the kinds in `mitsuba_plugins`; those that the file leaves out have Mitsuba's defaults and
-    are missing where there is none. The plugins among them are textures in the place of a colour or number."""
+    """By name, of the kinds in `mitsuba_plugins`. Those that the file leaves out have Mitsuba's defaults, and
+    are missing where it has none. A texture may stand in the place of a number or colour."""
     parts: "tuple[Plugin, ...]"
     """Nested plugins whose names have no meaning: the bsdf and emitter of a shape, the shapes of a group."""
     place: str

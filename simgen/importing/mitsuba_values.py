@@ -1,6 +1,6 @@
 """Values in Mitsuba scene files: numbers, vectors, colours, spectra and transforms.
 
-Mitsuba 3, "Scene XML file format". A `ValueError` of these functions is the end of a sentence.
+Mitsuba 3, "Scene XML file format". What these functions say in a `ValueError` is the end of a sentence.
 """
 
 import math
@@ -14,6 +14,8 @@ from simgen.importing.mitsuba_files import Element
 from simgen.importing.mitsuba_scene import Rgb, SpectrumValues, Value, Vector
 
 MOST_SAMPLES = 2000
+LONGER_AXIS = 0.01
+"""By so much the length of an axis may be off, as numbers of two digits are."""
 _AXES = ("x", "y", "z")
 _NUMBER = re.compile(r" *[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)? *")
 _WHOLE = re.compile(r" *-?[0-9]{1,18} *")
@@ -41,10 +43,11 @@ def check_attributes(element: Element, expected: tuple[str, ...] | None = None) 
         if name not in allowed and f"{name}?" not in allowed:
             raise ValueError(f"<{element.tag}> has no attribute {shown_value(name)}")
     for name in allowed:
-        if not name.endswith("?") and not element.attributes.get(name):
-            # An empty text is a text.
-            if not (element.tag in ("string", "default") and name == "value" and "value" in element.attributes):
-                raise ValueError(f"<{element.tag}> needs the attribute '{name}'")
+        # A name must not be empty; other attributes are looked at where their values are.
+        if not name.endswith("?") and not (
+            name in element.attributes and (element.attributes[name] or name != "name")
+        ):
+            raise ValueError(f"<{element.tag}> needs the attribute '{name}'")
 
 
 def value_of(element: Element) -> Value:
@@ -68,7 +71,9 @@ def value_of(element: Element) -> Value:
             return _vector(element, None)
         case "rgb":
             if given["value"].startswith("#"):
-                raise ValueError("Mitsuba 3 takes no hexadecimal colours; write red, green and blue as numbers")
+                raise ValueError(
+                    "Mitsuba 3 takes no hexadecimal colours; write red, green and blue as numbers"
+                )
             return Rgb(_one_or_three(given["value"]))
         case "spectrum":
             return _spectrum(given["value"])
@@ -84,11 +89,11 @@ def number(text: str) -> float:
     return value
 
 
-def spectrum_file(text: str) -> SpectrumValues:
+def spectrum_of_file(data: bytes) -> SpectrumValues:
     """The spectrum in a text file: a wavelength in nm and a value in each line, `#` before comments."""
-    lines = [line.strip() for line in text.splitlines()]
+    lines = [line.strip() for line in data.decode("latin-1").splitlines()]
     rows = [line.replace(",", " ").split() for line in lines if line and not line.startswith("#")]
-    if any(len(row) != 2 for row in rows[: MOST_SAMPLES + 1]):
+    if any(len(row) != 2 for row in rows):
         raise ValueError("each line needs a wavelength and a value")
     return _sampled(rows)
 
@@ -127,7 +132,10 @@ def _three(text: str) -> Vector:
 
 def _one_or_three(text: str) -> Vector:
     words = _words(text)
-    return (number(words[0]),) * 3 if len(words) == 1 else _three(text)
+    if len(words) != 1:
+        return _three(text)
+    value = number(words[0])
+    return value, value, value
 
 
 def _vector(element: Element, missing: float | None) -> Vector:
@@ -151,12 +159,12 @@ def _transform(element: Element) -> np.ndarray:
     total = np.eye(4)
     with np.errstate(all="ignore"):  # what overflows is refused below
         for step in element.children:
-            if step.tag not in _STEPS:
-                raise ValueError(f"<transform> takes {', '.join(_STEPS)}, not <{step.tag}>")
+            if step.tag not in STEPS:
+                raise ValueError(f"<transform> takes {', '.join(STEPS)}, not <{step.tag}>")
             if step.children:
                 raise ValueError(f"<{step.tag}> holds no other elements")
             check_attributes(step)
-            total = _STEPS[step.tag](step) @ total
+            total = STEPS[step.tag](step) @ total
     if not np.isfinite(total).all():
         raise ValueError("the numbers of this transform are too large")
     total.flags.writeable = False
@@ -175,7 +183,12 @@ def _scale(step: Element) -> np.ndarray:
 
 def _rotate(step: Element) -> np.ndarray:
     """By an angle in degrees, counter-clockwise about an axis that points at the observer (Rodrigues)."""
-    axis = _unit(np.array(_vector(step, 0.0)), "the axis of a rotation must not be 0")
+    given = np.array(_vector(step, 0.0))
+    axis = _unit(given, "the axis of a rotation must not be 0")
+    # A longer one makes Mitsuba 3 shear what it turns, but not older versions: which is meant cannot be told.
+    if abs(float(axis @ given) - 1) > LONGER_AXIS:
+        x, y, z = (f"{number:.6g}" for number in axis)
+        raise ValueError(f'the axis of a rotation must have length 1; write x="{x}" y="{y}" z="{z}"')
     angle = math.radians(number(step.attributes["angle"]))
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
@@ -198,7 +211,10 @@ def _look_at(step: Element) -> np.ndarray:
 
 
 def _any_across(x: float, y: float, z: float) -> np.ndarray:
-    """A unit vector at right angles to one (Duff et al., "Building an orthonormal basis, revisited", 2017)."""
+    """A unit vector at right angles to one.
+
+    Duff et al., "Building an orthonormal basis, revisited" (2017), as in Mitsuba.
+    """
     sign = math.copysign(1.0, z)
     a = -1 / (sign + z)
     return np.array([1 + sign * x * x * a, sign * x * y * a, -sign * x])
@@ -224,7 +240,7 @@ def _unit(vector: np.ndarray, otherwise: str) -> np.ndarray:
     return vector / length
 
 
-_STEPS = {
+STEPS = {
     "translate": _translate,
     "scale": _scale,
     "rotate": _rotate,

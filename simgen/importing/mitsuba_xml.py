@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.base.strict_models import LONGEST_PART, faults_of, shorten, shown_value, suggestion
-from simgen.importing.mitsuba_drafts import Draft, read_drafts
+from simgen.base.strict_models import faults_of, shown_value
+from simgen.importing.mitsuba_drafts import read_drafts
 from simgen.importing.mitsuba_files import SceneFiles
 from simgen.importing.mitsuba_plugins import ALLOWED, IGNORED, Allowed, Kind, Parameter
+from simgen.importing.mitsuba_references import Draft
 from simgen.importing.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues, Value
 
 _NEEDED: dict[Kind, str] = {
@@ -80,7 +81,7 @@ class _Checking:
         nested = {name: self._plugin(inner) for name, inner in draft.nested}
         allowed = ALLOWED.get((draft.category, draft.type))
         if allowed is None:
-            self._unknown_plugins[_called(draft)] = None
+            self._unknown_plugins[draft.called] = None
             return None
         parameters: dict[str, Value | Plugin] = {}
         parts: list[Plugin] = []
@@ -97,22 +98,18 @@ class _Checking:
                 if inner is not None:
                     parts.append(inner)
             else:
-                near = suggestion(name, allowed.parameters) if len(allowed.parameters) else ""
-                hint = near.removeprefix("; ") if near.startswith("; did") else ""
-                text = f"{shown_value(name)} of {_called(draft)}" + (f" ({hint})" if hint else "")
-                self._unknown_parameters[text] = None
+                self._unknown_parameters[f"{shown_value(name)} of {draft.called}"] = None
         self._count(draft, allowed, counted)
         for name, parameter in allowed.parameters.items():
             if name not in draft.values:
                 if parameter.needed:
-                    self._fault(draft, f"{_called(draft)} needs '{name}'")
+                    self._fault(draft, f"{draft.called} needs '{name}'")
                 if parameter.default is not None:
                     parameters[name] = parameter.default
         for one, other in allowed.not_both:
             if one in draft.values and other in draft.values:
-                self._fault(draft, f"{_called(draft)} takes either '{one}' or '{other}'")
-        place = f"{draft.file}: line {draft.line}"
-        return Plugin(draft.category, draft.type, draft.id, parameters, tuple(parts), place)
+                self._fault(draft, f"{draft.called} takes either '{one}' or '{other}'")
+        return Plugin(draft.category, draft.type, draft.id, parameters, tuple(parts), draft.place)
 
     def _count(self, draft: Draft, allowed: Allowed, nested: list[Draft]) -> None:
         """Faults of the number and kinds of nested plugins."""
@@ -120,17 +117,17 @@ class _Checking:
         categories = {part.category for part in allowed.parts}
         for inner in nested:
             if inner.category not in categories and (inner.category, inner.type) in ALLOWED:
-                self._fault(inner, f"{_called(inner)} has no place in {_called(draft)}")
+                self._fault(inner, f"{inner.called} has no place in {draft.called}")
         for part in allowed.parts:
             of_it = [inner for inner in nested if inner.category == part.category]
             for inner in of_it:
                 if part.type and inner.type != part.type and (inner.category, inner.type) in ALLOWED:
-                    self._fault(inner, f"{_called(draft)} takes no {_called(inner)}")
+                    self._fault(inner, f"{draft.called} takes no {inner.called}")
             if len(of_it) < part.fewest:
-                self._fault(draft, f"{_called(draft)} needs a {part.type or part.category} in it")
+                self._fault(draft, f"{draft.called} needs a {part.type or part.category} in it")
             if part.most is not None and len(of_it) > part.most:
                 self._fault(
-                    draft, f"{_called(draft)} takes {part.most} {part.category} in it, and has {len(of_it)}"
+                    draft, f"{draft.called} takes {part.most} {part.category} in it, and has {len(of_it)}"
                 )
 
     def _value(
@@ -151,24 +148,17 @@ class _Checking:
                 if not parameter.choices or text in parameter.choices:
                     return text
                 known = ", ".join(parameter.choices)
-                self._fault(draft, f"'{name}' of {_called(draft)} is {shown_value(value)}; known are {known}")
+                self._fault(draft, f"'{name}' of {draft.called} is {shown_value(value)}; known are {known}")
             case ("file", str()):
                 try:
-                    self._files.find(value, f"'{name}' of {_called(draft)}")
+                    self._files.find(value, f"'{name}' of {draft.called}")
                     return value
                 except InputError as fault:
                     self._fault(draft, str(fault))
             case _:
-                self._fault(draft, f"'{name}' of {_called(draft)} must be {_NEEDED[parameter.kind]}")
+                self._fault(draft, f"'{name}' of {draft.called} must be {_NEEDED[parameter.kind]}")
         return None
 
     def _fault(self, draft: Draft, what: str) -> None:
         file = "" if draft.file == self._path else f" of {draft.file.name}"
         self._faults.append(f"line {draft.line}{file}: {what}")
-
-
-def _called(draft: Draft) -> str:
-    """As messages name it."""
-    if draft.category == "scene":
-        return "the scene"
-    return f"{draft.category} {shorten(repr(draft.type), LONGEST_PART)}"
