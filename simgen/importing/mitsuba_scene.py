@@ -19,7 +19,7 @@ class Rgb:
 
 @dataclass(frozen=True)
 class SpectrumValues:
-    """A value by wavelength, linear in between and 0 beyond the ends; without wavelengths the same at all."""
+    """A value by wavelength, linear in between and 0 beyond the ends; or the same at all wavelengths."""
 
     wavelength_nm: tuple[float, ...]
     """Growing wavelengths, in nm: two at least, or none."""

@@ -20,13 +20,12 @@ _AXES = ("x", "y", "z")
 _NUMBER = re.compile(r" *[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)? *")
 _WHOLE = re.compile(r" *-?[0-9]{1,18} *")
 _ATTRIBUTES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(("float", "integer", "boolean", "string", "rgb"), ("name", "value")),
+    **dict.fromkeys(("float", "integer", "boolean", "string", "rgb", "spectrum"), ("name", "value")),
     **dict.fromkeys(("vector", "point"), ("name", "value?", "x?", "y?", "z?")),
     **dict.fromkeys(("translate", "scale"), ("value?", "x?", "y?", "z?")),
     "rotate": ("angle", "value?", "x?", "y?", "z?"),
     "lookat": ("origin", "target", "up?"),
     "matrix": ("value",),
-    "spectrum": ("name", "value?", "filename?"),
     "transform": ("name",),
     "default": ("name", "value"),
     "ref": ("id", "name?"),
@@ -187,7 +186,7 @@ def _rotate(step: Element) -> np.ndarray:
     axis = _unit(given, "the axis of a rotation must not be 0")
     # A longer one makes Mitsuba 3 shear what it turns, but not older versions: which is meant cannot be told.
     if abs(float(axis @ given) - 1) > LONGER_AXIS:
-        x, y, z = (f"{number:.6g}" for number in axis)
+        x, y, z = (f"{one:.6g}" for one in axis)
         raise ValueError(f'the axis of a rotation must have length 1; write x="{x}" y="{y}" z="{z}"')
     angle = math.radians(number(step.attributes["angle"]))
     x, y, z = axis

@@ -358,6 +358,8 @@ VALUES: dict[str, tuple[str, str]] = {
     "no z": ('<point name="a" x="1" y="2"/>', "<point> needs 'value', or 'x', 'y' and 'z'"),
     "both": ('<point name="a" value="1" x="1"/>', "<point> takes either 'value' or 'x', 'y' and 'z'"),
     "hexadecimal": ('<rgb name="a" value="#ff0000"/>', "takes no hexadecimal colours"),
+    "no spectrum": ('<spectrum name="a"/>', "<spectrum> needs the attribute 'value'"),
+    "two spectra": ('<spectrum name="a" value="1" filename="a.spd"/>', "has no attribute 'value'"),
     "falling": ('<spectrum name="a" value="500:1, 400:1"/>', "the wavelengths of a spectrum must grow"),
     "one sample": ('<spectrum name="a" value="500:1"/>', "a spectrum has 2 to 2000 wavelengths, not 1"),
     "no pair": ('<spectrum name="a" value="1 2"/>', "pairs such as 400:0.1, 500:0.2 are needed"),
