@@ -40,6 +40,8 @@ ROOMS = {
         "spectral",
         "spec",
         "assets",
+        "mitsuba_xml",
+        "gltf",
         "importing",
         "cameras",
         "renderer",

@@ -122,11 +122,12 @@ def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS)
     return picture
 
 
-def decode(picture: Picture, *, turn: bool = False) -> Iterator[np.ndarray]:
+def decode(picture: Picture, *, turn: bool = False, alpha: bool = False) -> Iterator[np.ndarray]:
     """Pixels (H, W, C) of each page of a picture, as they are in the file, without alpha.
 
     Raises `InputError`, naming the file, if they cannot be decoded, are not as the header says, are not
-    opaque, or have to be turned and may not be: with `turn` they are returned upright.
+    opaque, or have to be turned and may not be: with `turn` they are returned upright, and with `alpha` with
+    that as a further channel if the file has it.
     """
     path = picture.path
     height, width, channels = picture.shape
@@ -145,7 +146,7 @@ def decode(picture: Picture, *, turn: bool = False) -> Iterator[np.ndarray]:
         pixels = pixels.reshape(*pixels.shape[:2], -1)
         if pixels.shape != (height, width, channels + picture.alpha) or pixels.dtype != picture.dtype:
             raise InputError(f"{path}: {DAMAGED} (its content is not as its header says)")
-        if picture.alpha and not (pixels[..., -1] == picture.most).all():
+        if picture.alpha and not alpha and not (pixels[..., -1] == picture.most).all():
             raise InputError(
                 f"{path}: has an alpha channel that is not opaque everywhere; save it without transparency"
             )
@@ -153,7 +154,7 @@ def decode(picture: Picture, *, turn: bool = False) -> Iterator[np.ndarray]:
             raise InputError(
                 f"{path}: says that it has to be turned (EXIF orientation {orientation}); save it upright"
             )
-        yield _turned(pixels[..., :channels], orientation)
+        yield _turned(pixels if alpha else pixels[..., :channels], orientation)
 
 
 def check_unpacked(path: Path, unpacked: int, packed: int, instead: str) -> None:

@@ -5,6 +5,7 @@ asset_files     Files that a scene brings along, as plain arrays: decoded in a p
 asset_worker    The process that decodes strangers' files: whatever they do to it, the parent lives.
 cutouts         Surfaces with holes: what an image of opacity leaves of a mesh, as a mesh.
 image_files     Pictures of strangers: textures as 8 or 16 bit sRGB, environments as linear radiance.
+mesh_points     Points that are spread over a mesh, and whether each part of a picture lies on it once.
 obj_files       Wavefront OBJ meshes: polygons with normals and texture coordinates; no other file is ever
                 opened.
 pattern_areas   Exact means of sharp and smooth patterns over rectangular pixels.

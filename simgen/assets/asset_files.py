@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -97,6 +97,13 @@ def read_environment(path: Path) -> np.ndarray:
     """An OpenEXR picture as linear RGB, (H, W, 3) float32, finite and not negative, or `InputError`."""
     with _Worker() as worker:
         return worker.read("environment", path)["pixels"]
+
+
+def read_pictures(paths: Iterable[Path]) -> Iterator[np.ndarray]:
+    """Pictures as sRGB (H, W, 3), or with alpha (H, W, 4), uint8 or uint16; `InputError` as of textures."""
+    with _Worker() as worker:
+        for path in paths:
+            yield worker.read("picture with alpha", path)["pixels"]
 
 
 class _Worker:

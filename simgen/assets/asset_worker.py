@@ -63,10 +63,10 @@ def _decode(kind: str, path: Path) -> Iterator[tuple[str, np.ndarray]]:
         from simgen.assets.image_files import read_environment
 
         yield "pixels", read_environment(path)
-    elif kind == "image":
+    elif kind in ("image", "picture with alpha"):
         from simgen.assets.image_files import read_texture
 
-        yield "pixels", read_texture(path)
+        yield "pixels", read_texture(path, alpha=kind != "image")
     else:
         from simgen.assets.obj_files import read_obj
         from simgen.assets.ply_files import read_ply

@@ -43,11 +43,11 @@ Polygons = tuple[np.ndarray, np.ndarray]
 """Corners (N, V, 2), x right and y up in pixels, and how many of them (N,) each polygon has."""
 
 
-def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles:
-    """The part of a mesh with texture coordinates on which `opacity` (H, W), row 0 on top, is full.
+def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles | None:
+    """The part of a mesh with texture coordinates on which `opacity` (H, W), row 0 on top, is full, if any.
 
     Beyond its borders the image is repeated if `tiled`, else its outermost pixels go on. Raises `ValueError`
-    with the end of a sentence if nothing is left, or more triangles than a mesh may have.
+    with the end of a sentence for more triangles than a mesh may have.
     """
     assert mesh.texcoords is not None
     height, width = opacity.shape
@@ -197,10 +197,10 @@ def _lifted(
 
 def _joined(
     mesh: Triangles, kept: np.ndarray, parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
-) -> Triangles:
+) -> Triangles | None:
     """The faces that stay whole, and those of the parts, whose corners lie between a face's."""
     if not len(kept) and not any(len(faces) for faces, _, _ in parts):
-        raise ValueError("leaves nothing of the surface")
+        return None
     check_counts(0, len(kept) + sum(len(faces) for faces, _, _ in parts))
 
     def of_corners(values: np.ndarray) -> np.ndarray:

@@ -10,20 +10,23 @@ from pcii.pictures.picture_files import decode, kind_of, picture_of
 MOST_TEXTURE_PIXELS = 1 << 26
 
 
-def read_texture(path: Path) -> np.ndarray:
+def read_texture(path: Path, *, alpha: bool = False) -> np.ndarray:
     """A PNG, JPEG or TIFF file as sRGB (H, W, 3), uint8 or uint16, upright as its EXIF entry says.
 
-    `InputError` for a file that is no single opaque RGB, grey or palette picture.
+    `InputError` for a file that is no single RGB, grey or palette picture, or is not opaque; with `alpha`
+    that is a fourth channel if the file has it.
     """
     picture = picture_of(path, ("PNG", "JPEG", "TIFF"), MOST_TEXTURE_PIXELS)
     if picture.pages != 1:
         raise InputError(f"{path}: holds {picture.pages} pictures; give a file with one")
     if picture.dtype.kind == "f":
         raise InputError(f"{path}: a picture of {picture.dtype}; save it as RGB or grey with 8 or 16 bits")
-    (pixels,) = decode(picture, turn=True)
+    (pixels,) = decode(picture, turn=True, alpha=alpha)
     if picture.dtype == np.bool_ or picture.bits is not None:
         pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
-    return np.repeat(pixels, 3, axis=2) if pixels.shape[2] == 1 else pixels
+    if picture.shape[2] == 1:
+        pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=2), pixels[..., 1:]], axis=2)
+    return pixels
 
 
 def read_environment(path: Path) -> np.ndarray:

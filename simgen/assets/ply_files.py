@@ -105,6 +105,19 @@ def _header(data: bytes) -> tuple[str, list[_Element], int]:
     return order, elements, line_end + 1
 
 
+def ply_bytes(mesh: Triangles) -> bytes:
+    """A mesh as a binary PLY file, with normals and the texture coordinates s, t where it has them."""
+    columns = {"x y z": mesh.positions, "nx ny nz": mesh.normals, "s t": mesh.texcoords}
+    present = {names: values for names, values in columns.items() if values is not None}
+    head = ["ply", "format binary_little_endian 1.0", f"element vertex {len(mesh.positions)}"]
+    head += [f"property float {name}" for names in present for name in names.split()]
+    head += [f"element face {len(mesh.faces)}", "property list uchar int vertex_indices", "end_header"]
+    faces = np.empty(len(mesh.faces), dtype=[("corners", "u1"), ("vertex", "<i4", 3)])
+    faces["corners"], faces["vertex"] = 3, mesh.faces
+    vertices = np.concatenate(list(present.values()), axis=1).astype("<f4")
+    return "\n".join(head).encode() + b"\n" + vertices.tobytes() + faces.tobytes()
+
+
 def _property(words: list[str], order: str) -> _Property:
     match words:
         case [kind, name] if kind in _TYPES:

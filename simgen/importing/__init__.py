@@ -1,12 +1,14 @@
-"""Scene files of other programs, read as plain values; nothing in them is ever run.
+"""Scenes of other programs as our own.
 
-mitsuba_drafts      Mitsuba scene files as plugins that refer to each other: includes, defaults and old
-                    names.
-mitsuba_files       Files of one Mitsuba scene: found only inside its folder, and XML read under limits.
-mitsuba_plugins     The plugins of Mitsuba that can be imported, with their parameters and defaults.
-mitsuba_references  Plugins of Mitsuba as they are written, and what they are once references among them are
-                    followed.
-mitsuba_scene       What a Mitsuba scene file says: nested plugins with checked parameters.
-mitsuba_values      Values in Mitsuba scene files: numbers, vectors, colours, spectra and transforms.
-mitsuba_xml         A Mitsuba scene file as checked plugins; what cannot be imported is named.
+foreign_scene   What a scene file of another program says, in its own axes and unit.
+gltf_materials  Materials of a glTF file as ours: what its metallic-roughness model says in numbers and
+                pictures.
+gltf_pictures   Pictures that a glTF file names or holds, decoded in a process that may die.
+gltf_scene      A glTF file as a foreign scene: its nodes, meshes, cameras and lights (sections 3.5 to 3.10).
+placement       Where a foreign scene stands: before one of its own cameras, or at a place and of a size that
+                are given.
+scene_folder    A foreign scene as a folder of its own: scene.toml, meshes as PLY, pictures as PNG and
+                OpenEXR.
+scene_import    From a scene file of another program to a scene's folder.
+turned_images   Images of what shines from all around, turned with the scene.
 """

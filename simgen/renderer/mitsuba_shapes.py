@@ -52,9 +52,12 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
         raise InputError(f"{where}: it cannot be laid on a sphere; give a mesh")
     check_texcoords(where, "leave it out", shape, assets)
     try:
-        return cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
+        left = cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
     except ValueError as fault:
         raise InputError(f"{where}: {fault}") from None
+    if left is None:
+        raise InputError(f"{where}: leaves nothing of the surface")
+    return left
 
 
 def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:

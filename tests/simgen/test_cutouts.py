@@ -28,7 +28,8 @@ def variant_is_put_back() -> Iterator[None]:
     backend.load()
 
 
-def area(mesh: Triangles) -> float:
+def area(mesh: Triangles | None) -> float:
+    assert mesh is not None
     corner = mesh.positions.astype(np.float64)[mesh.faces]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return float(np.linalg.norm(across, axis=1).sum() / 2)
@@ -42,6 +43,7 @@ def disc(side: int, radius: float) -> np.ndarray:
 
 def test_a_disc_is_cut_where_its_opacity_is_a_half() -> None:
     mesh = cut_out(card_triangles(200.0, 100.0), disc(64, 0.3), tiled=False)
+    assert mesh is not None
     # Chords of 1/64 of the width, less than 1e-3; pieces overlap by a thousandth of a pixel.
     assert area(mesh) == pytest.approx(np.pi * 0.3**2 * 200 * 100, rel=2e-3)
     x, y = mesh.positions[:, 0] / 200, mesh.positions[:, 1] / 100
@@ -57,8 +59,7 @@ def test_what_is_kept_and_what_is_cut_are_the_whole(shape: Triangles) -> None:
     assert sum(parts) == pytest.approx(area(shape), rel=6e-3)
     assert min(parts) > 0.2 * area(shape)
     assert area(cut_out(shape, np.ones((5, 5)), tiled=False)) == area(shape)
-    with pytest.raises(ValueError, match="leaves nothing"):
-        cut_out(shape, np.zeros((5, 5)), tiled=False)
+    assert cut_out(shape, np.zeros((5, 5)), tiled=False) is None
 
 
 def test_beyond_its_borders_an_image_is_repeated_or_goes_on() -> None:
@@ -69,6 +70,7 @@ def test_beyond_its_borders_an_image_is_repeated_or_goes_on() -> None:
     once, again = (cut_out(twice, left_half, tiled=tiled) for tiled in (False, True))
     assert area(once) == pytest.approx(0.25 * 200 * 100, rel=3e-3)
     assert area(again) == pytest.approx(0.5 * 200 * 100, rel=3e-3)
+    assert once is not None
     assert np.ptp(once.positions[:, 0]) == pytest.approx(50, rel=3e-3)
 
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from simgen.base.strict_models import shown_value
-from simgen.importing.mitsuba_files import Element
-from simgen.importing.mitsuba_scene import Rgb, SpectrumValues, Value, Vector
+from simgen.mitsuba_xml.mitsuba_files import Element
+from simgen.mitsuba_xml.mitsuba_scene import Rgb, SpectrumValues, Value, Vector
 
 MOST_SAMPLES = 2000
 LONGER_AXIS = 0.01

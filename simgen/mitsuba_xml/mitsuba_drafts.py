@@ -11,10 +11,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.base.strict_models import shown_value
-from simgen.importing.mitsuba_files import LARGEST_XML_BYTES, Element, SceneFiles
-from simgen.importing.mitsuba_references import Draft, Reference, follow
-from simgen.importing.mitsuba_scene import SpectrumValues, Value
-from simgen.importing.mitsuba_values import STEPS, check_attributes, spectrum_of_file, value_of
+from simgen.mitsuba_xml.mitsuba_files import LARGEST_XML_BYTES, Element, SceneFiles
+from simgen.mitsuba_xml.mitsuba_references import Draft, Reference, follow
+from simgen.mitsuba_xml.mitsuba_scene import SpectrumValues, Value
+from simgen.mitsuba_xml.mitsuba_values import STEPS, check_attributes, spectrum_of_file, value_of
 
 DEEPEST_INCLUDE = 15
 LONGEST_NAME = 100

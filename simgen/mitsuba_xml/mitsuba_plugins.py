@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from simgen.importing.mitsuba_scene import Value, Vector
+from simgen.mitsuba_xml.mitsuba_scene import Value, Vector
 
 IGNORED = {"integrator", "film", "sampler", "rfilter"}
 """Categories that only tell how to render: whatever is in them, it is left out."""

@@ -10,11 +10,11 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.base.strict_models import faults_of, shown_value
-from simgen.importing.mitsuba_drafts import read_drafts
-from simgen.importing.mitsuba_files import SceneFiles
-from simgen.importing.mitsuba_plugins import ALLOWED, IGNORED, Allowed, Kind, Parameter
-from simgen.importing.mitsuba_references import Draft
-from simgen.importing.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues, Value
+from simgen.mitsuba_xml.mitsuba_drafts import read_drafts
+from simgen.mitsuba_xml.mitsuba_files import SceneFiles
+from simgen.mitsuba_xml.mitsuba_plugins import ALLOWED, IGNORED, Allowed, Kind, Parameter
+from simgen.mitsuba_xml.mitsuba_references import Draft
+from simgen.mitsuba_xml.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues, Value
 
 _NEEDED: dict[Kind, str] = {
     "number": "a number",

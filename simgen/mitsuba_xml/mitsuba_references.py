@@ -6,8 +6,8 @@ from pathlib import Path
 
 from pcii.base.errors import InputError
 from simgen.base.strict_models import shown_value
-from simgen.importing.mitsuba_files import DEEPEST, MOST_ELEMENTS
-from simgen.importing.mitsuba_scene import Value
+from simgen.mitsuba_xml.mitsuba_files import DEEPEST, MOST_ELEMENTS
+from simgen.mitsuba_xml.mitsuba_scene import Value
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pcii.base.errors import InputError
-from simgen.importing.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues
-from simgen.importing.mitsuba_xml import read_mitsuba
+from simgen.mitsuba_xml.mitsuba_reader import read_mitsuba
+from simgen.mitsuba_xml.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues
 from simgen.renderer import backend
 
 LIMIT_S = 2.0

@@ -1,0 +1,192 @@
+"""What of a glTF file's JSON is read, as models that check it.
+
+Khronos Group, "glTF 2.0 Specification" (2021), section 5, and the extension
+KHR_lights_punctual. What is not listed is not read.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from simgen.base.strict_models import NonNegative, Positive, Real
+from simgen.gltf.gltf_surfaces import Image, Index, Material, Name, Read, Rgb, Sampler, Texture
+
+MOST_ITEMS = 100_000
+"""Of one kind, such as nodes or accessors."""
+
+Bytes = Annotated[int, Field(strict=True, ge=0, le=1 << 31)]
+
+
+class Buffer(Read):
+    """A run of bytes, in a file of its own, in the address itself, or behind the JSON of a .glb."""
+
+    uri: Annotated[str, Field(max_length=1 << 29)] | None = None
+    byte_length: Bytes
+
+
+class BufferView(Read):
+    """A part of a buffer."""
+
+    buffer: Index
+    byte_offset: Bytes = 0
+    byte_length: Bytes
+    byte_stride: Annotated[int, Field(ge=4, le=252)] | None = None
+
+
+class SparseIndices(Read):
+    """Which elements of an accessor are given one by one."""
+
+    buffer_view: Index
+    byte_offset: Bytes = 0
+    component_type: Literal[5121, 5123, 5125]
+
+
+class SparseValues(Read):
+    """What those elements are."""
+
+    buffer_view: Index
+    byte_offset: Bytes = 0
+
+
+class Sparse(Read):
+    """Elements of an accessor that differ from its buffer view."""
+
+    count: Bytes
+    indices: SparseIndices
+    values: SparseValues
+
+
+class Accessor(Read):
+    """Numbers in a buffer view."""
+
+    buffer_view: Index | None = None
+    byte_offset: Bytes = 0
+    component_type: Literal[5120, 5121, 5122, 5123, 5125, 5126]
+    normalized: bool = False
+    count: Annotated[int, Field(strict=True, ge=1)]
+    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    sparse: Sparse | None = None
+
+
+class Primitive(Read):
+    """Triangles, lines or points with one material."""
+
+    attributes: dict[str, Index]
+    indices: Index | None = None
+    material: Index | None = None
+    mode: Annotated[int, Field(strict=True, ge=0, le=6)] = 4
+    targets: tuple[Any, ...] = ()
+
+
+class Mesh(Read):
+    """Primitives that stand together."""
+
+    name: Name = ""
+    primitives: Annotated[tuple[Primitive, ...], Field(min_length=1)]
+
+
+class LightOfNode(Read):
+    """The light that stands at a node."""
+
+    light: Index
+
+
+class NodeExtensions(Read):
+    """Extensions of nodes."""
+
+    lights_punctual: LightOfNode | None = Field(default=None, validation_alias="KHR_lights_punctual")
+    mesh_gpu_instancing: Any = Field(default=None, validation_alias="EXT_mesh_gpu_instancing")
+
+
+class Node(Read):
+    """A place in the tree of places."""
+
+    name: Name = ""
+    children: tuple[Index, ...] = ()
+    mesh: Index | None = None
+    camera: Index | None = None
+    skin: Index | None = None
+    matrix: Annotated[tuple[Real, ...], Field(min_length=16, max_length=16)] | None = None
+    translation: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
+    rotation: tuple[Real, Real, Real, Real] = (0.0, 0.0, 0.0, 1.0)
+    scale: tuple[Real, Real, Real] = (1.0, 1.0, 1.0)
+    extensions: NodeExtensions = NodeExtensions()
+
+
+class SceneNodes(Read):
+    """The roots of a scene."""
+
+    name: Name = ""
+    nodes: tuple[Index, ...] = ()
+
+
+class Perspective(Read):
+    """The view of a camera."""
+
+    yfov: Positive
+    aspect_ratio: Positive | None = None
+
+
+class Camera(Read):
+    """A camera, which looks along -Z with Y up."""
+
+    name: Name = ""
+    type: Literal["perspective", "orthographic"]
+    perspective: Perspective | None = None
+
+
+class Spot(Read):
+    """The cone of a spot, in radians."""
+
+    inner_cone_angle: NonNegative = 0.0
+    outer_cone_angle: Positive = 0.7853981633974483
+
+
+class PunctualLight(Read):
+    """A lamp without size along -Z: in candela, or in lux if it is directional."""
+
+    name: Name = ""
+    type: Literal["directional", "point", "spot"]
+    color: Rgb = (1.0, 1.0, 1.0)
+    intensity: NonNegative = 1.0
+    spot: Spot = Spot()
+
+
+class PunctualLights(Read):
+    """All lamps of a file."""
+
+    lights: tuple[PunctualLight, ...] = ()
+
+
+class Asset(Read):
+    """The version."""
+
+    version: Annotated[str, Field(pattern=r"^2\.\d+$")]
+
+
+class DocumentExtensions(Read):
+    """Extensions of the file."""
+
+    lights_punctual: PunctualLights = Field(default=PunctualLights(), validation_alias="KHR_lights_punctual")
+
+
+class Document(Read):
+    """The JSON of a glTF file."""
+
+    asset: Asset
+    extensions_used: tuple[Name, ...] = ()
+    extensions_required: tuple[Name, ...] = ()
+    scene: Index | None = None
+    scenes: Annotated[tuple[SceneNodes, ...], Field(max_length=MOST_ITEMS)] = ()
+    nodes: Annotated[tuple[Node, ...], Field(max_length=MOST_ITEMS)] = ()
+    meshes: Annotated[tuple[Mesh, ...], Field(max_length=MOST_ITEMS)] = ()
+    accessors: Annotated[tuple[Accessor, ...], Field(max_length=MOST_ITEMS)] = ()
+    buffer_views: Annotated[tuple[BufferView, ...], Field(max_length=MOST_ITEMS)] = ()
+    buffers: Annotated[tuple[Buffer, ...], Field(max_length=MOST_ITEMS)] = ()
+    materials: Annotated[tuple[Material, ...], Field(max_length=MOST_ITEMS)] = ()
+    textures: Annotated[tuple[Texture, ...], Field(max_length=MOST_ITEMS)] = ()
+    images: Annotated[tuple[Image, ...], Field(max_length=MOST_ITEMS)] = ()
+    samplers: Annotated[tuple[Sampler, ...], Field(max_length=MOST_ITEMS)] = ()
+    cameras: Annotated[tuple[Camera, ...], Field(max_length=MOST_ITEMS)] = ()
+    animations: tuple[Any, ...] = ()
+    extensions: DocumentExtensions = DocumentExtensions()

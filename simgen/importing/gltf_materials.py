@@ -1,0 +1,264 @@
+"""Materials of a glTF file as ours: what its metallic-roughness model says in numbers and pictures.
+
+Sections 3.9 and 5.19 of the specification, and KHR_materials_*. Factors multiply pictures in linear light.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
+from simgen.gltf.gltf_file import GltfFile
+from simgen.gltf.gltf_surfaces import Material, MaterialExtensions, Texture, TextureInfo
+from simgen.importing.foreign_scene import ForeignScene
+from simgen.importing.gltf_pictures import pictures_of
+
+HALF = 0.5
+REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
+"""How pictures go on beyond their borders, as OpenGL numbers it."""
+OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+LEAST_IOR, MOST_IOR = 1.01, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceOfPrimitive:
+    """What a primitive looks like: a material as in a scene.toml, and how its pictures are laid out."""
+
+    material: dict[str, Any]
+    texcoord: int | None
+    """The set of texture coordinates that its pictures take; None without pictures."""
+    uv_matrix: np.ndarray
+    """(3, 3), which moves them."""
+    pictures_repeat: bool
+
+
+class GltfMaterials:
+    """The materials of one file, each made once; pictures and what is lost go into the scene."""
+
+    def __init__(self, gltf: GltfFile, scene: ForeignScene) -> None:
+        self.gltf, self.scene = gltf, scene
+        self._made: dict[int | None, SurfaceOfPrimitive | None] = {}
+
+    def surface(self, index: int | None, where: str) -> SurfaceOfPrimitive | None:
+        """That of a material, or of the default one; None for one that is all clear."""
+        materials = self.gltf.document.materials
+        if index is not None and index >= len(materials):
+            raise self.gltf.fault(f"{where}: there is no materials[{index}]")
+        if index not in self._made:
+            material = Material() if index is None else materials[index]
+            name = material.name or ("default" if index is None else f"material-{index}")
+            self._made[index] = _Making(self, material, name).surface()
+        return self._made[index]
+
+    @cached_property
+    def pictures(self) -> dict[int, np.ndarray]:
+        """Pixels of the file's images, by their numbers."""
+        return pictures_of(self.gltf)
+
+
+class _Making:
+    """One material as it is made."""
+
+    def __init__(self, materials: GltfMaterials, material: Material, name: str) -> None:
+        self.all, self.material, self.name = materials, material, name
+        self.scene = materials.scene
+        self.layout: tuple[int, tuple[float, ...], tuple[int, int]] | None = None
+
+    def surface(self) -> SurfaceOfPrimitive | None:
+        material, more, pbr = self.material, self.material.extensions, self.material.pbr_metallic_roughness
+        base = self._pixels(pbr.base_color_texture, "base colour")
+        made: dict[str, Any] = {}
+        if not self._opacity(base, made):
+            return None
+        factor = np.array(pbr.base_color_factor[:3])
+        if base is None:
+            made["reflectance"] = _colour(factor)
+        else:
+            made["texture"] = self.scene.keep(f"{self.name}-colour", _tinted(base[..., :3], factor))
+        finish: dict[str, Any] = {"type": "principled"}
+        rough = self._pixels(pbr.metallic_roughness_texture, "roughness")
+        finish["metallic"] = self._share(pbr.metallic_factor, rough, 2, "metallic")
+        finish["roughness"] = self._share(pbr.roughness_factor, rough, 1, "roughness")
+        if more.transmission is not None:
+            through = self._pixels(more.transmission.transmission_texture, "transmission")
+            finish["transmission"] = self._share(
+                more.transmission.transmission_factor, through, 0, "transmission"
+            )
+        if more.clearcoat is not None:
+            coat = self._pixels(more.clearcoat.clearcoat_texture, "clearcoat")
+            finish["clearcoat"] = self._share(more.clearcoat.clearcoat_factor, coat, 0, "clearcoat")
+            finish["clearcoat_gloss"] = _gloss(more.clearcoat.clearcoat_roughness_factor)
+        finish["refractive_index"] = self._refractive_index(more)
+        made["finish"] = finish
+        self._normals(made, is_clear=bool(finish.get("transmission")))
+        self._emission(made)
+        self._lost(material, more)
+        if self.layout is None:
+            return SurfaceOfPrimitive(made, None, np.eye(3), False)
+        texcoord, transform, wrap = self.layout
+        return SurfaceOfPrimitive(made, texcoord, _uv_matrix(transform), wrap != (CLAMP, CLAMP))
+
+    def _pixels(self, info: TextureInfo | None, what: str) -> np.ndarray | None:
+        """The picture of a reference, None if there is none or it is laid out unlike the others."""
+        if info is None:
+            return None
+        gltf, name = self.all.gltf, f"material '{self.name}'"
+        textures, samplers = gltf.document.textures, gltf.document.samplers
+        if info.index >= len(textures):
+            raise gltf.fault(f"{name}: there is no textures[{info.index}]")
+        texture = textures[info.index]
+        if texture.source is None:
+            self.scene.lose(f"the {what} picture of {name}, which {_kind_of(texture)}")
+            return None
+        moved = info.extensions.texture_transform
+        transform, texcoord = (0.0, 0.0, 0.0, 1.0, 1.0), info.tex_coord
+        if moved is not None:
+            transform = (*moved.offset, moved.rotation, *moved.scale)
+            texcoord = texcoord if moved.tex_coord is None else moved.tex_coord
+        wrap = (REPEAT, REPEAT)
+        if texture.sampler is not None:
+            if texture.sampler >= len(samplers):
+                raise gltf.fault(f"textures[{info.index}]: there is no samplers[{texture.sampler}]")
+            wrap = samplers[texture.sampler].wrap_s, samplers[texture.sampler].wrap_t
+        if MIRROR in wrap:
+            self.scene.lose("every other repetition of a picture mirrored: pictures are repeated as they are")
+        layout = (texcoord, transform, wrap)
+        self.layout = self.layout or layout
+        if layout[:2] != self.layout[:2]:
+            self.scene.lose(f"the {what} picture of {name}, which is laid out unlike its other pictures")
+            return None
+        return self.all.pictures[texture.source]
+
+    def _opacity(self, base: np.ndarray | None, made: dict[str, Any]) -> bool:
+        """Sets holes; returns whether there is any surface."""
+        mode, factor = self.material.alpha_mode, self.material.pbr_metallic_roughness.base_color_factor[3]
+        if mode == OPAQUE:
+            return True
+        cutoff = self.material.alpha_cutoff if mode == MASK else HALF
+        has_alpha = base is not None and base.shape[2] == 4
+        if mode == BLEND and (has_alpha or factor < 1):
+            self.scene.lose(
+                f"surfaces of '{self.name}' that are partly clear: they are there from an alpha of a half"
+            )
+        if base is None or not has_alpha:
+            return factor >= cutoff
+        alpha = base[..., 3] * (factor / np.iinfo(base.dtype).max)
+        if alpha.min() >= cutoff:
+            return True
+        if alpha.max() < cutoff:
+            return False
+        # The cutoff becomes a half; below and above it alpha stays linear.
+        below = HALF * alpha / cutoff
+        above = HALF + HALF * (alpha - cutoff) / max(1 - cutoff, 1e-6)
+        opacity = np.where(alpha < cutoff, np.minimum(below, HALF - 1 / 255), above)
+        made["opacity"] = self.scene.keep(f"{self.name}-opacity", _stored(opacity))
+        return True
+
+    def _share(self, factor: float, pixels: np.ndarray | None, channel: int, what: str) -> float | str:
+        """A number from 0 to 1, or the file of a grey picture of such."""
+        if pixels is None or factor == 0:
+            return round(factor, 6)
+        shares = pixels[..., channel] * (factor / np.iinfo(pixels.dtype).max)
+        if np.ptp(shares) == 0:
+            return round(float(shares.flat[0]), 6)
+        return self.scene.keep(f"{self.name}-{what}", _stored(shares))
+
+    def _refractive_index(self, more: MaterialExtensions) -> float:
+        """With `specular` that index whose highlights are as strong as the file says."""
+        index = 1.5 if more.ior is None else more.ior.ior
+        if index == 0:  # by KHR_materials_ior the largest of all
+            index = MOST_IOR
+        if more.specular is not None:
+            spec = more.specular
+            if spec.specular_texture is not None or spec.specular_color_texture is not None:
+                self.scene.lose(f"the specular picture of material '{self.name}'")
+            if spec.specular_color_factor != (1.0, 1.0, 1.0):
+                self.scene.lose(f"the specular colour of material '{self.name}'")
+            straight = abs((index - 1) / (index + 1)) * np.sqrt(spec.specular_factor)
+            index = (1 + straight) / (1 - straight)
+        return round(float(np.clip(index, LEAST_IOR, MOST_IOR)), 6)
+
+    def _normals(self, made: dict[str, Any], *, is_clear: bool) -> None:
+        info = self.material.normal_texture
+        pixels = self._pixels(info, "normal")
+        if info is None or pixels is None:
+            return
+        if is_clear:
+            self.scene.lose(f"the normal picture of material '{self.name}', which light passes through")
+            return
+        rgb = pixels[..., :3]
+        if info.scale != 1:
+            tilt = rgb.astype(np.float64) * (2 / np.iinfo(rgb.dtype).max) - 1
+            tilt[..., :2] *= info.scale
+            tilt /= np.linalg.norm(tilt, axis=-1, keepdims=True)
+            rgb = _stored(np.clip(tilt / 2 + 0.5, 0, 1))
+        made["normal_map"] = self.scene.keep(f"{self.name}-normals", rgb)
+
+    def _emission(self, made: dict[str, Any]) -> None:
+        strength = self.material.extensions.emissive_strength
+        factor = np.array(self.material.emissive_factor) * (
+            1.0 if strength is None else strength.emissive_strength
+        )
+        if not factor.any():
+            return
+        pixels = self._pixels(self.material.emissive_texture, "emissive")
+        if self.material.emissive_texture is not None and pixels is None:
+            return
+        if pixels is None:
+            luminance = float(factor @ LUMINANCE)
+            made["emission"] = {"luminance_cd_m2": luminance, "illuminant": _colour(factor / factor.max())}
+        elif pixels[..., :3].any():
+            # White of the new picture has the luminance of the strongest factor.
+            file = self.scene.keep(f"{self.name}-emission", _tinted(pixels[..., :3], factor / factor.max()))
+            made["emission"] = {"luminance_cd_m2": float(factor.max()), "texture": file}
+
+    def _lost(self, material: Material, more: MaterialExtensions) -> None:
+        if material.occlusion_texture is not None:
+            self.scene.lose("pictures of ambient occlusion, which light itself makes here")
+        if more.clearcoat is not None:
+            coat = more.clearcoat
+            if coat.clearcoat_roughness_texture is not None or coat.clearcoat_normal_texture is not None:
+                self.scene.lose(f"roughness and normal pictures of the clearcoat of material '{self.name}'")
+        if "KHR_materials_unlit" in (more.model_extra or {}):
+            self.scene.lose("materials that are shown without light (KHR_materials_unlit): they are lit")
+        others = sorted(set(more.model_extra or {}) - {"KHR_materials_unlit"})
+        for other in others:
+            self.scene.lose(f"{other[:60]} of materials")
+
+
+def _kind_of(texture: Texture) -> str:
+    return f"is of the kind {', '.join(sorted(texture.extensions))}" if texture.extensions else "has no image"
+
+
+def _uv_matrix(transform: tuple[float, ...]) -> np.ndarray:
+    """KHR_texture_transform: scaled, turned counterclockwise as one looks at the picture, moved."""
+    x, y, angle, width, height = transform
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
+
+
+def _colour(linear: np.ndarray) -> list[float]:
+    return [round(float(part), 6) for part in linear_to_srgb(np.clip(linear, 0, 1))]
+
+
+def _tinted(pixels: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """sRGB pixels (H, W, 3) times a linear factor (3,)."""
+    if (factor == 1).all():
+        return pixels
+    most = np.iinfo(pixels.dtype).max
+    curve = srgb_to_linear(np.arange(most + 1) / most)
+    tables = [
+        np.round(linear_to_srgb(np.clip(curve * part, 0, 1)) * most).astype(pixels.dtype) for part in factor
+    ]
+    return np.stack([table[pixels[..., channel]] for channel, table in enumerate(tables)], axis=-1)
+
+
+def _stored(shares: np.ndarray) -> np.ndarray:
+    return np.round(shares * 255).astype(np.uint8)
+
+
+def _gloss(roughness: float) -> float:
+    """The gloss g with the same GGX alpha: ours goes from 0.1 to 0.001 linearly, theirs is roughness^2."""
+    return round(float(np.clip((0.1 - roughness**2) / 0.099, 0, 1)), 6)

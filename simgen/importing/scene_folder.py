@@ -1,0 +1,237 @@
+"""A foreign scene as a folder of its own: scene.toml, meshes as PLY, pictures as PNG and OpenEXR."""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.io.dataset_layout import write_exr_safely
+from pcii.pictures.written_pixels import write_png
+from pcii.store.safe_files import new_folder_safely
+from simgen.assets.ply_files import ply_bytes
+from simgen.assets.triangles import Triangles
+from simgen.base.strict_models import LARGEST_TOML_BYTES, validate
+from simgen.base.toml_layout import toml_text
+from simgen.importing.foreign_scene import ForeignScene, Lamp, Part
+from simgen.importing.placement import Placement, bounds
+from simgen.importing.turned_images import turned
+from simgen.spec.scene import MOST_LIGHTS, MOST_OBJECTS, Scene
+from simgen.spec.shapes import Box, Card, Shape, Sphere
+
+SQUARE = 1e-5
+"""Axes of a matrix whose cosine is less than this are square to each other."""
+FAR_MM = 100.0
+"""How far before a spot its target is written."""
+EVEN_LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
+"""For files without any light."""
+LONGEST_NAME = 64
+
+
+@dataclass(frozen=True)
+class ImportedScene:
+    """What was written, and what could not be."""
+
+    folder: Path
+    objects: int
+    meshes: int
+    triangles: int
+    materials: int
+    lights: int
+    size_mm: tuple[float, float, float]
+    """Of the bounding box of all objects along X, Y and Z."""
+    camera: str | None
+    """The one that became the virtual centre."""
+    camera_angle_deg: float | None
+    """Its horizontal angle of view."""
+    left_out: tuple[str, ...]
+
+
+def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> ImportedScene:
+    """Write a scene's folder, which must not be there yet.
+
+    Raises `InputError` with a clause about the file for one without surfaces, and for more objects or lights
+    than a scene may have.
+    """
+    if len(scene.parts) > MOST_OBJECTS:
+        raise InputError(
+            f"it has {len(scene.parts)} objects, and a scene at most {MOST_OBJECTS}; join some that have one "
+            "material"
+        )
+    if len(scene.lamps) > MOST_LIGHTS:
+        raise InputError(f"it has {len(scene.lamps)} lights, and a scene at most {MOST_LIGHTS}")
+    meshes = _Meshes()
+    names = _unique([part.name for part in scene.parts])
+    objects = [_object(part, name, placement, meshes) for part, name in zip(scene.parts, names, strict=True)]
+    lights = [_light(lamp, placement, scene.mm) for lamp in scene.lamps]
+    left_out = list(scene.left_out)
+    environment = None
+    if scene.surroundings is not None:
+        environment, turn_deg = turned(scene.surroundings, placement.rotation)
+        light = {"type": "environment", "file": "surroundings.exr", "turn_deg": turn_deg}
+        lights.append(light | {"luminance_cd_m2": scene.surroundings.luminance_cd_m2})
+    lit = any("emission" in part.material for part in scene.parts)
+    if not lights and not lit:
+        lights.append(EVEN_LIGHT)
+        left_out.append("the file has no light: the scene is lit evenly from all around")
+    values = {"title": scene.title, "objects": objects, "lights": lights}
+    written = validate(Scene, values, "what is made of it")
+    comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in left_out)]
+    text = toml_text(written, comments).encode()
+    if len(text) > LARGEST_TOML_BYTES:
+        raise InputError(f"its scene.toml has {len(text)} bytes, and {LARGEST_TOML_BYTES} are allowed")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder_safely(out) as new:
+        (new / "scene.toml").write_bytes(text)
+        for name, mesh in meshes.files.items():
+            (new / name).write_bytes(ply_bytes(mesh))
+        for name, pixels in scene.images.items():
+            write_png(new / name, pixels)
+        if environment is not None:
+            write_exr_safely(new / "surroundings.exr", environment)
+    box = placement.scale * np.ptp(bounds(scene.parts, placement.rotation), axis=0)
+    materials = {repr(sorted(part.material.items(), key=str)) for part in scene.parts}
+    view = placement.camera
+    return ImportedScene(
+        folder=out,
+        objects=len(objects),
+        meshes=len(meshes.files),
+        triangles=sum(len(part.shape.faces) for part in scene.parts if isinstance(part.shape, Triangles)),
+        materials=len(materials),
+        lights=len(lights),
+        size_mm=(float(box[0]), float(box[1]), float(box[2])),
+        camera=None if view is None else view.name,
+        camera_angle_deg=None if view is None else view.angle_deg,
+        left_out=tuple(left_out),
+    )
+
+
+class _Meshes:
+    """Files of meshes by name: one for all parts that have the same triangles."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, Triangles] = {}
+        self._names: dict[tuple[int, bytes], str] = {}
+
+    def name(self, stem: str, mesh: Triangles, matrix: np.ndarray | None = None) -> str:
+        """The file of a mesh, moved by a matrix (3, 3) if there is one."""
+        key = id(mesh), b"" if matrix is None else matrix.tobytes()
+        if key not in self._names:
+            taken = {name.removesuffix(".ply") for name in self.files}
+            self._names[key] = f"{_unique([stem], taken)[0]}.ply"
+            self.files[self._names[key]] = mesh if matrix is None else _moved(mesh, matrix)
+        return self._names[key]
+
+
+def _moved(mesh: Triangles, matrix: np.ndarray) -> Triangles:
+    normals = None if mesh.normals is None else mesh.normals @ np.linalg.inv(matrix)
+    faces = mesh.faces if np.linalg.det(matrix) > 0 else mesh.faces[:, ::-1]
+    return Triangles.checked(mesh.positions @ matrix.T, faces, normals, mesh.texcoords)
+
+
+def _object(part: Part, name: str, placement: Placement, meshes: _Meshes) -> dict[str, Any]:
+    matrix = placement.to_world @ part.matrix
+    linear = matrix[:3, :3]
+    parts = _rotation_and_scales(linear)
+    rotation, scales = (np.eye(3), np.ones(3)) if parts is None else parts
+    if isinstance(part.shape, Triangles):
+        file = meshes.name(part.file, part.shape, linear if parts is None else None)
+        shape: dict[str, Any] = {"type": "mesh", "file": file}
+        if parts is not None:
+            alike = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
+            shape["scale"] = _significant(scales[0]) if alike else [_significant(one) for one in scales]
+    else:
+        shape = _sized(part.shape, np.abs(scales))
+    return {
+        "name": name,
+        "position_mm": _rounded(matrix[:3, 3]),
+        "rotation_deg": [0.0] * 3 if isinstance(part.shape, Sphere) else _angles_deg(rotation),
+        "shape": shape,
+        "material": part.material,
+    }
+
+
+def _sized(shape: Shape, scales: np.ndarray) -> dict[str, Any]:
+    match shape:
+        case Sphere():
+            sizes = {"radius_mm": shape.radius_mm * scales[0]}
+        case Card():
+            sizes = {"width_mm": shape.width_mm * scales[0], "height_mm": shape.height_mm * scales[1]}
+        case Box():
+            sizes = {"width_mm": shape.width_mm * scales[0], "height_mm": shape.height_mm * scales[1]}
+            sizes["depth_mm"] = shape.depth_mm * scales[2]
+        case _:
+            raise AssertionError(shape)
+    return {"type": shape.type} | {name: _significant(size) for name, size in sizes.items()}
+
+
+def _rotation_and_scales(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """A matrix (3, 3) as a rotation after scales (3,) along the axes; None if it also shears."""
+    scales = np.linalg.norm(linear, axis=0)
+    if not scales.all():
+        return None
+    axes = linear / scales
+    if np.abs(axes.T @ axes - np.eye(3)).max() > SQUARE:
+        return None
+    if np.linalg.det(axes) < 0:
+        axes, scales = axes * [-1, 1, 1], scales * [-1, 1, 1]
+    return axes, scales
+
+
+def _angles_deg(rotation: np.ndarray) -> list[float]:
+    """Turns about the fixed X, Y and Z axes, in this order."""
+    if abs(rotation[2, 0]) > 1 - 1e-12:  # Y by a right angle: of the turns about X and Z only one is needed
+        angles = 0.0, -np.arcsin(np.clip(rotation[2, 0], -1, 1)), np.arctan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        angles = (
+            np.arctan2(rotation[2, 1], rotation[2, 2]),
+            -np.arcsin(rotation[2, 0]),
+            np.arctan2(rotation[1, 0], rotation[0, 0]),
+        )
+    return [round(float(np.degrees(angle)), 9) + 0.0 for angle in angles]
+
+
+def _light(lamp: Lamp, placement: Placement, mm: float) -> dict[str, Any]:
+    """A lamp of a scene that was made larger is as much brighter: surfaces keep their brightness."""
+    matrix = placement.to_world @ lamp.matrix
+    position, forward = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    values = dict(lamp.values)
+    if "intensity_cd" in values:
+        values["intensity_cd"] = _significant(values["intensity_cd"] * (placement.scale / mm) ** 2)
+    if values["type"] in ("point", "spot"):
+        values["position_mm"] = _rounded(position)
+    if values["type"] == "spot":
+        values["target_mm"] = _rounded(position + FAR_MM * forward)
+    if values["type"] == "directional":
+        values["direction"] = [round(float(part), 9) + 0.0 for part in forward]
+    return values
+
+
+def _rounded(position_mm: np.ndarray) -> list[float]:
+    """To a millionth of a millimetre; without -0."""
+    return [round(float(part), 6) + 0.0 for part in position_mm]
+
+
+def _significant(value: float) -> float:
+    return float(f"{value:.7g}")
+
+
+def _unique(names: Sequence[str], taken: set[str] | None = None) -> list[str]:
+    """Names as scenes have them, each different: a letter, then letters, digits, _ and -."""
+    found: list[str] = []
+    used = Counter[str]() if taken is None else Counter(taken)
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "object"
+        plain = plain if plain[0].isalpha() else f"object-{plain}"
+        short, number = plain[: LONGEST_NAME - 6], 1
+        wanted = short
+        while used[wanted]:
+            number += 1
+            wanted = f"{short}-{number}"
+        used[wanted] += 1
+        found.append(wanted)
+    return found
