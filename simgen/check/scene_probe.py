@@ -132,9 +132,7 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
     masks = {camera: hits.object_id == number for camera, hits in look.corners.items()}
     full = [camera for camera, mask in masks.items() if mask.all()]
     unseen_behind = (
-        ()
-        if here.any()
-        else hidden_by(look.render_scene, target.scene, target.folder, number, look.alone, look.together)
+        () if here.any() else hidden_by(look.render_scene, target.scene, number, look.alone, look.together)
     )
     return ObjectFacts(
         name=name,
@@ -203,9 +201,7 @@ def _hidden_share(look: _Look, number: int) -> float:
     others = [box for other, box in boxes.items() if other != number]
     if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
         return 0.0
-    alone = pixels_without_occluders(
-        look.render_scene, look.target.scene, look.target.folder, number, look.alone
-    )
+    alone = pixels_without_occluders(look.render_scene, number, look.alone)
     owner = look.together.object_id
     before = alone & (owner > 0) & (owner != number)
     return float(before.sum() / alone.sum()) if alone.any() else 0.0

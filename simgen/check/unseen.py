@@ -2,15 +2,13 @@
 
 from collections import Counter
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, as_rig, centre_camera, corners
-from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.lights import AreaLight, UniformLight
-from simgen.spec.materials import Material
+from simgen.renderer.mitsuba_scene import RenderScene, alone
+from simgen.spec.lights import AreaLight
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre
 
@@ -30,27 +28,24 @@ class OnFilm:
     """Whether part of it falls on the film of the virtual centre or of a corner camera."""
 
 
-def pixels_without_occluders(
-    render_scene: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid
-) -> np.ndarray:
+def pixels_without_occluders(render_scene: RenderScene, number: int, grid: CameraGrid) -> np.ndarray:
     """Pixels (H, W), bool, of object `number` (from 1) at the virtual centre with all other objects removed.
 
     Area lamps stay: they may hide it too.
     """
-    lamps = tuple(light for light in scene.lights if isinstance(light, AreaLight))
-    return _seen(render_scene, scene, folder, number, grid, lamps)
+    return first_hits_at_centre(alone(render_scene, number, with_lamps=True), grid).object_id == number
 
 
 def hidden_by(
-    render_scene: RenderScene, scene: Scene, folder: Path, number: int, grid: CameraGrid, centre: FirstHits
+    render_scene: RenderScene, scene: Scene, number: int, grid: CameraGrid, centre: FirstHits
 ) -> tuple[str, ...]:
     """What stands before object `number` (from 1), which the virtual centre does not see.
 
     Names of objects, "the backdrop", and lamps as "lamp 1 (lights[0])"; what hides most of it comes first.
     `centre` are the first hits of the whole scene on the same grid. Empty if nothing hides it.
     """
-    alone = _seen(render_scene, scene, folder, number, grid, ())
-    row, col = np.nonzero(alone & np.isfinite(centre.z_mm))
+    shown = first_hits_at_centre(alone(render_scene, number, with_lamps=False), grid).object_id == number
+    row, col = np.nonzero(shown & np.isfinite(centre.z_mm))
     z_mm, owner = centre.z_mm[row, col].astype(np.float64), centre.object_id[row, col]
     point = centre_camera(grid).towards(row, col) * z_mm[:, None]
     found = Counter(render_scene.names[number] for number in owner[owner > 0].tolist())
@@ -78,22 +73,6 @@ def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
     points = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
     across, down = np.ptp(centre.film_px(points), axis=0).tolist()
     return OnFilm((across, down), any(_meets(points, one) for one in (centre, *ends)))
-
-
-def _seen(
-    render_scene: RenderScene,
-    scene: Scene,
-    folder: Path,
-    number: int,
-    grid: CameraGrid,
-    lamps: tuple[AreaLight, ...],
-) -> np.ndarray:
-    # Only its shape with its holes and lamps in view matter: no other files are needed.
-    thing = scene.objects[number - 1]
-    shown = {"opacity": thing.material.opacity, "tiled": thing.material.tiled}
-    plain = thing.model_copy(update={"material": Material(reflectance=(0.5, 0.5, 0.5), **shown)})
-    single = Scene(title="", objects=(plain,), lights=(UniformLight(luminance_cd_m2=1), *lamps))
-    return first_hits_at_centre(build(render_scene.mi, single, folder, 2), grid).object_id == 1
 
 
 def _lamps_at(scene: Scene, points: np.ndarray) -> Counter[str]:

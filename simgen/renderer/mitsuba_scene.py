@@ -1,7 +1,7 @@
 """From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never names one."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +14,13 @@ from simgen.renderer.emission import emission_plugin, object_lux
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape
-from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_plugin, two_sided
+from simgen.renderer.mitsuba_surfaces import look_of, matt, painted_patterns, surface_plugin, two_sided
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spectral.filters import Filters, filters_for
 
-BACKDROP = "backdrop"
+BACKDROP, OBJECT, LIGHT = "backdrop", "object", "light"
+"""Ids of shapes; those of objects and lights end in their numbers."""
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,9 @@ def build(
         surroundings,
         lambda z_mm: sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects),
     )
-    patterns = painted_patterns(scene.objects)
+    patterns, surfaces = painted_patterns(scene.objects), dict[Hashable, Any]()
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        plugins[f"object{number}"] = _object(mi, thing, assets, pattern, gain)
+        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
@@ -74,7 +75,7 @@ def build(
             "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
         }
     for number, light in enumerate(scene.lights, start=1):
-        plugins[f"light{number}"] = light_plugin(mi, light, gain, surroundings)
+        plugins[f"{LIGHT}{number}"] = light_plugin(mi, light, gain, surroundings)
     try:
         # Without optimisation: it merges shapes, and merged shapes lose their names. One after the other:
         # things are numbered as they come, and kernels that know them by other numbers are compiled anew.
@@ -84,6 +85,15 @@ def build(
     _numbers_as_data(mi, loaded)
     filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
     return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain)
+
+
+def alone(render_scene: RenderScene, number: int, *, with_lamps: bool) -> RenderScene:
+    """The same without backdrop and objects but for `number` (from 1), with or without area lights."""
+    shapes = {shape.id(): shape for shape in render_scene.scene.shapes()}
+    lamps = {name: shape for name, shape in shapes.items() if with_lamps and name.startswith(LIGHT)}
+    name = f"{OBJECT}{number}"
+    scene = render_scene.mi.load_dict({"type": "scene", name: shapes[name], **lamps}, optimize=False)
+    return replace(render_scene, scene=scene, object_of_shape=_object_of_shape(scene))
 
 
 def _numbers_as_data(mi: Any, loaded: Any) -> None:
@@ -112,13 +122,23 @@ def _object_of_shape(loaded: Any) -> np.ndarray:
 
 
 def _object_id(shape_id: str) -> int:
-    return int(shape_id.removeprefix("object")) if shape_id.startswith("object") else 0
+    return int(shape_id.removeprefix(OBJECT)) if shape_id.startswith(OBJECT) else 0
 
 
-def _object(mi: Any, thing: SceneObject, assets: Assets, pattern: np.ndarray | None, gain: float) -> Any:
+def _object(
+    mi: Any,
+    thing: SceneObject,
+    assets: Assets,
+    pattern: np.ndarray | None,
+    gain: float,
+    surfaces: dict[Hashable, Any],
+) -> Any:
+    """The shape of an object; `surfaces` are those made so far, which objects that look alike share."""
     try:
-        surface = surface_plugin(mi, thing.material, thing.shape, assets, pattern)
-        return placed_shape(mi, thing, assets, surface, emission_plugin(mi, thing, assets, gain))
+        look = look_of(thing.material, thing.shape, assets)
+        if look not in surfaces:
+            surfaces[look] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
+        return placed_shape(mi, thing, assets, surfaces[look], emission_plugin(mi, thing, assets, gain))
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None
 

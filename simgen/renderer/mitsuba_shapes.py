@@ -24,11 +24,11 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
 
 
 def placed_shape(
-    mi: Any, thing: SceneObject, assets: Assets, surface: dict[str, Any], emitter: dict[str, Any] | None
+    mi: Any, thing: SceneObject, assets: Assets, surface: Any, emitter: dict[str, Any] | None
 ) -> Any:
-    """The Mitsuba shape (or the plugin that makes it) of an object with this surface and emitter."""
+    """The Mitsuba shape (or the plugin that makes it) of an object with a Mitsuba surface and emitter."""
     T, pose, shape = mi.ScalarTransform4f, pose_of(mi, thing), thing.shape
-    plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": emitter})
+    plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
     if thing.material.opacity is None:
         if isinstance(shape, Sphere):
             return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | plain
@@ -36,7 +36,7 @@ def placed_shape(
             to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
             return {"type": "rectangle", "to_world": to_world} | plain
     matrix = np.array(pose.matrix, dtype=np.float64)
-    return mesh_of(mi, solid_parts(shape, thing.material, assets), matrix, plain)
+    return _mesh(mi, solid_parts(shape, thing.material, assets), matrix, plain)
 
 
 def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
@@ -87,11 +87,10 @@ def globe_pose(mi: Any) -> Any:
     return mi.ScalarTransform4f([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
-def mesh_of(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, dict[str, Any]]) -> Any:
-    """Triangles, moved by a matrix (4, 4), as a Mitsuba mesh; `parts` are its "bsdf" and "emitter"."""
+def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
     properties = mi.Properties()
     for name, plugin in parts.items():
-        properties[name] = mi.load_dict(plugin)
+        properties[name] = plugin
     # The renderer aims at lamps as if their faces were flat; with smoothed normals it would be off.
     normals = None if "emitter" in parts else triangles.normals
     mesh = mi.Mesh(

@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -14,7 +14,7 @@ from simgen.renderer.mitsuba_colours import is_spectral, reflectance_plugin
 from simgen.renderer.mitsuba_shapes import check_texcoords
 from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, is_clear
 from simgen.spec.scene import SceneObject
-from simgen.spec.shapes import Box, Card, Cylinder, Shape, Sphere
+from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
 
 PRINCIPLED = {
     "metallic": "metallic",
@@ -44,6 +44,12 @@ def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | Non
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         yield from pool.map(pixels, things)
+
+
+def look_of(material: Material, shape: Shape, assets: Assets) -> Hashable:
+    """What is the same for objects that can share a surface: how pictures lie on the shape counts, too."""
+    laid_out = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
+    return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), laid_out
 
 
 def surface_plugin(
