@@ -67,7 +67,7 @@ class Mesh(Strict):
     """
 
     type: Literal["mesh"] = "mesh"
-    file: MeshName
+    file: Annotated[str, MeshName]
     """Name of a .ply or .obj file inside the scene's folder."""
     scale: Positive = 1.0
     """Millimetres for one unit of the file."""
