@@ -25,7 +25,7 @@ from simgen.photons.counting_plan import plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.detector import detect
+from simgen.sensor.detector import detect, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import CalibrationErrors, Lens
 from simgen.spec.recipe import Recipe, Sensor
@@ -87,7 +87,8 @@ def draw_photons(
         return sense(image, recipe.cfa)
 
     arrivals, _ = drawn or draw_from_views(capture, mosaic_of, made, report)
-    counted = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed).by_pixel(grid)
+    detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
+    counted = read_out(detected, grid, recipe.sensor, capture.seed)
     counts = PhotonCounts.from_events(
         counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
     )

@@ -11,5 +11,5 @@ round_numbers   Numbers of two digits for messages, and by how much they may be 
 srgb            sRGB primaries (IEC 61966-2-1) from CIE XYZ.
 strict_models   What scene and recipe files share: strict models, TOML, and errors that point at the
                 field.
-toml_text       Strict models as TOML that a person can read and edit.
+toml_layout     Strict models as TOML that a person can read and edit.
 """

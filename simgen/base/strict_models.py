@@ -32,8 +32,9 @@ _IN_TOML = {
     "a valid tuple": "a list in brackets",
     "a valid dictionary or object to extract fields from": 'a table such as { type = "..." }',
     "a valid dictionary or instance of": "a table, as of",
+    "instance is frozen": "this is frozen, and change() gives a copy",
 }
-"""What pydantic calls things, and what they are to whoever writes TOML."""
+"""What pydantic calls things, and what they are to whoever writes TOML or Python."""
 
 
 class Strict(BaseModel):
@@ -47,6 +48,10 @@ class Strict(BaseModel):
 
     # So pydantic validates a table within another without a call of it, and faults keep their place.
     __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        with _told(type(self), type(self).__name__):
+            super().__setattr__(name, value)
 
     def change(self, **fields: Any) -> Self:
         """A copy with other values of these fields, checked as a new one is."""

@@ -73,4 +73,6 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     draw_truth(depth, objects, hits.z_mm[box], hits.object_id[box], render_scene.names)
     title = recipe.title or target.scene.title
     figure.suptitle(title, parse_math=False)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # which would move the panels each time that the picture is written
     return Preview(title, figure)

@@ -29,10 +29,11 @@ from simgen.base.strict_models import (
     faults_of,
     read_toml,
     shorten,
+    shown_value,
     suggestion,
     validate,
 )
-from simgen.base.toml_text import toml_text
+from simgen.base.toml_layout import toml_text
 from simgen.spec.distributions import is_distribution
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
@@ -112,13 +113,16 @@ class Scene(Strict):
     """
 
     _folder: Path | None = PrivateAttr(default=None)
-    # No field, since fields are what a scene.toml holds and what digests of scenes are made of.
+    # No field, since fields are what a scene.toml holds and what digests of scenes are made of; for type
+    # checkers it is one, so that they know it among the arguments.
     if TYPE_CHECKING:
         folder: Path | None = None
     else:
 
         def __init__(self, *, folder: str | Path | None = None, **values: Any) -> None:
             super().__init__(**values)
+            if not isinstance(folder, str | Path | None):
+                raise InputError(f"Scene: 'folder': expected a path, got {shown_value(folder)}")
             self._folder = None if folder is None else Path(folder)
 
         __init__.__pydantic_base_init__ = True
