@@ -158,5 +158,5 @@ def preview(
         raise InputError("scene_number: this is one scene, of which there are no draws; leave it out")
     picture = draw_preview(target, samples_per_pixel)
     if out is not None:
-        picture.write(Path(out))
+        picture.write(out)
     return picture

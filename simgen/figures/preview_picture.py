@@ -40,10 +40,10 @@ class Preview:
     title: str
     figure: "Figure" = field(repr=False)
 
-    def write(self, out: Path, dots_per_inch: float | None = None) -> None:
+    def write(self, out: str | Path, dots_per_inch: float | None = None) -> None:
         """Write it as PNG or JPEG; `InputError` for another name and where writing is not allowed."""
-        check_picture_path(out)
-        save_figure(self.figure, out, dots_per_inch)
+        check_picture_path(Path(out))
+        save_figure(self.figure, Path(out), dots_per_inch)
 
     def _repr_png_(self) -> bytes:
         return encoded(self.figure, "png")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from property_settings import at_least
-from test_scene_objects import NAMED, SCENE, SKY
+from two_things import NAMED, SCENE, SKY
 
 from pcii.base.errors import InputError
 from simgen import Material, Scene, SceneObject, Sphere, load_scene

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from two_things import BALL, CARD, NAMED, SCENE, SKY
 
 from pcii.base.errors import InputError
 from simgen import (
     AreaLight,
     Backdrop,
     Box,
-    Card,
     Checks,
     Glass,
     Level,
@@ -24,17 +24,9 @@ from simgen import (
     SceneObject,
     Spectrum,
     Sphere,
-    UniformLight,
 )
 from simgen.base.strict_models import validate
 from simgen.spec.scene import checked_folder
-
-RED = Material(reflectance=(0.8, 0.1, 0.1))
-BALL = SceneObject(name="ball", position_mm=(10, 0, 540), shape=Sphere(radius_mm=30), material=RED)
-CARD = SceneObject(name="card", position_mm=(0, 5, 620), shape=Card(width_mm=9, height_mm=8), material=RED)
-SKY = UniformLight(luminance_cd_m2=100)
-SCENE = Scene(title="Two things", objects=(BALL, CARD), lights=(SKY,), planes_mm=(540,))
-NAMED = SCENE.replace("ball", material=Material(texture="a.png"))
 
 
 def fault_of(make: Callable[[], Any]) -> str:
