@@ -1,10 +1,12 @@
 """How Sphinx builds the pages of this folder: `make docs`."""
 
 from dataclasses import fields, is_dataclass
+from inspect import Signature, signature
 from pathlib import Path
 from typing import Any
 
 from docutils import nodes
+from pydantic import BaseModel
 
 import pcii
 import simgen
@@ -13,6 +15,8 @@ project = "Photon-starved integral imaging"
 author = copyright = "The photon-integral-imaging authors"
 version = release = pcii.__version__
 
+RULES = "Annotated[", "custom_error"
+"""What stands in the types of fields that have rules of what is valid."""
 BENCHMARKS = "benchmarks"
 """The page that `make bench-publish` writes: it joins the others once it is there."""
 
@@ -52,14 +56,35 @@ html_theme_options = {"navigation_with_keys": True}
 
 
 def setup(app: Any) -> None:
-    """Have equations written as MathML, which browsers show without a script and without the network."""
+    """Have equations written as MathML, which browsers show without a script and without the network.
+
+    Of the models of scenes and recipes only names and defaults are shown: their types hold all the rules of
+    what is valid, which the texts of the fields say in words.
+    """
     app.connect("source-read", _leave_out_benchmarks)
+    app.connect("autodoc-process-signature", _names_and_defaults)
+    app.connect("autodoc-skip-member", lambda app, what, name, *_: name.startswith("model_") or None)
+    app.connect("object-description-transform", _leave_out_rules)
     app.add_html_math_renderer("mathml", (_inline_equation, None), (_displayed_equation, None))
 
 
 def _leave_out_benchmarks(app: Any, page: str, source: list[str]) -> None:
     if page == "index" and not Path(app.srcdir, f"{BENCHMARKS}.md").exists():
         source[0] = source[0].replace(f"\n{BENCHMARKS}\n", "\n")
+
+
+def _names_and_defaults(app: Any, what: str, name: str, kind: Any, *_: Any) -> tuple[str, None] | None:
+    if not (isinstance(kind, type) and issubclass(kind, BaseModel)):
+        return None
+    given = [one.replace(annotation=one.empty) for one in signature(kind).parameters.values()]
+    return str(Signature(given)), None
+
+
+def _leave_out_rules(app: Any, domain: str, what: str, content: nodes.Element) -> None:
+    if what == "attribute" and content.parent is not None:
+        for node in list(content.parent.findall(nodes.Element)):
+            if node.tagname == "desc_annotation" and any(word in node.astext() for word in RULES):
+                node.parent.remove(node)
 
 
 def _inline_equation(translator: Any, node: nodes.math) -> None:

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from simgen.figures.preview_picture import write_preview
+from simgen.check.targets import load_target
+from simgen.figures.preview_picture import draw_preview
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import is_scene_distribution, load_scene
 
@@ -53,13 +54,8 @@ def main() -> None:
     folder = DOCS / "gallery"
     folder.mkdir(exist_ok=True)
     for name in scene_names():
-        write_preview(
-            str(SCENES / name),
-            folder / f"{name}.jpg",
-            SAMPLES_PER_PIXEL,
-            scene_number=shown_draw(name),
-            dots_per_inch=DOTS_PER_INCH,
-        )
+        target = load_target(str(SCENES / name), scene_number=shown_draw(name))
+        draw_preview(target, SAMPLES_PER_PIXEL).write(folder / f"{name}.jpg", DOTS_PER_INCH)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
 
 

@@ -33,6 +33,7 @@ CONDITIONS = {
     "bad depth": "depth not above 0",
     "beyond": "shifts beyond the image",
 }
+SCENES = {f"simgen.spec.{name}" for name in ("scene", "lights", "materials", "shapes", "textures")}
 NO_NUMBERS = {
     "Collection": "a table of datasets",
     "InputError": "the refusal itself",
@@ -49,13 +50,20 @@ NO_NUMBERS = {
     "Score": "made by `score`",
     "Executor": "worker processes",
     "RecipeFile": "made by `load_recipe`",
-    "SceneFile": "made by `load_scene`",
+    "import_scene": "reads a file of another program",
+    "ImportedScene": "what `import_scene` says",
     "load_scene": "reads a file",
+    "render": "takes its numbers as `load_recipe` does",
     "generate": "draws as `draw_photons` does, with the numbers of a recipe",
     "generate_collection": "draws as `draw_photons` does, with the numbers of a recipe",
     "preview": "a picture of a scene",
+    **dict.fromkeys(("CalibrationErrors", "Lens", "Sensor"), "checked as a part of a recipe is"),
+    **dict.fromkeys(
+        (name for name in simgen.__all__ if name != "Scene" and getattr(simgen, name).__module__ in SCENES),
+        "checked as a `Scene` is",
+    ),
 }
-"""Public names that take no numbers of their own, and why."""
+"""Public names that are not called, and why."""
 
 
 Options = dict[str, Any]
@@ -115,7 +123,7 @@ above 10^12. *Depth not above 0* is 0, −1, NaN and infinity. *Shifts beyond th
 
 {table}
 
-These take no numbers of their own: {without}.
+Not in the table: {without}.
 """
 
 
@@ -300,6 +308,16 @@ def _draw(case: Case) -> Any:
     return simgen.draw_photons(simgen.load_scene("two_objects"), case.grid, budget=budget)
 
 
+def _scene(case: Case) -> float:
+    """Light, or the depth of a wall."""
+    case.without("single", "constant", "1 x 1", "beyond")
+    luminance = {"black": 0.0, "bright": 1e12, "too bright": 1e308, "bad depth": 1.0}
+    lamp = simgen.UniformLight(luminance_cd_m2=luminance.get(case.condition, case.bad))
+    wall = simgen.Backdrop(z_mm=case.z_mm)
+    simgen.Scene(title="of numbers", lights=(lamp,), backdrop=wall)
+    return lamp.luminance_cd_m2
+
+
 def _recipe(case: Case) -> float:
     case.without("single", "constant", "beyond")
     budget = {"black": 0.0, "bright": 1e12, "too bright": 1e300, "1 x 1": 1.0}.get(case.condition, case.bad)
@@ -415,6 +433,7 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         ),
         "import_images": ("import_images", _of_light(_images)),
         "import_lens_array": ("import_lens_array", _of_light(_lens_array)),
+        "simgen.Scene": ("simgen.Scene", _scene),
         "simgen.load_recipe": ("simgen.load_recipe", _recipe),
         "simgen.draw_photons, budget": ("simgen.draw_photons", _draw),
     }
@@ -489,7 +508,11 @@ def row(label: str, name: str, call: Callable[[Case], Any]) -> str:
 
 def page() -> str:
     """The whole page."""
-    without = "; ".join(f"`{name}` ({reason})" for name, reason in NO_NUMBERS.items())
+    reasons = dict.fromkeys(NO_NUMBERS.values())
+    groups = {
+        reason: [f"`{name}`" for name in NO_NUMBERS if NO_NUMBERS[name] == reason] for reason in reasons
+    }
+    without = "; ".join(f"{', '.join(names)} ({reason})" for reason, names in groups.items())
     return TEXT.format(table=table(), without=without)
 
 

@@ -4,9 +4,11 @@
     counts, truth = simgen.draw_photons(scene, grid, budget=1000, cfa="GRBG", seed=1)
     manifest = simgen.generate(simgen.load_recipe("paper"), "out/paper")
 
-Importing this package loads no renderer: that happens when the first scene is rendered.
+Scenes can be made in Python too: `Scene`, its objects, lights, shapes and materials. Importing this package
+loads no renderer: that happens when the first scene is rendered.
 """
 
+from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -14,35 +16,96 @@ if TYPE_CHECKING:
     from simgen.app.library import (
         Executor,
         RecipeFile,
-        SceneFile,
         generate,
         generate_collection,
         load_recipe,
         load_scene,
         preview,
     )
-    from simgen.app.photons_in_memory import draw_photons
+    from simgen.app.without_files import draw_photons, render
+    from simgen.importing.scene_folder import ImportedScene
+    from simgen.importing.scene_import import import_scene
+    from simgen.spec.camera_grid import CalibrationErrors, Lens
+    from simgen.spec.lights import (
+        AreaLight,
+        DirectionalLight,
+        EnvironmentLight,
+        Level,
+        PointLight,
+        SpotLight,
+        UniformLight,
+    )
+    from simgen.spec.materials import Emission, Glass, Material, Matt, Metal, Plastic, Principled, Spectrum
+    from simgen.spec.recipe import Sensor
+    from simgen.spec.scene import Backdrop, Scene, SceneObject
+    from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Sphere
+    from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text
 
 __all__ = [
+    "AreaLight",
+    "Backdrop",
+    "Box",
+    "CalibrationErrors",
+    "Card",
+    "Checks",
+    "Cylinder",
+    "DirectionalLight",
+    "Edge",
+    "Emission",
+    "EnvironmentLight",
     "Executor",
+    "Glass",
+    "ImportedScene",
+    "Lens",
+    "Level",
+    "Material",
+    "Matt",
+    "Mesh",
+    "Metal",
+    "Noise",
+    "Plastic",
+    "PointLight",
+    "Principled",
     "RecipeFile",
-    "SceneFile",
+    "Scene",
+    "SceneObject",
+    "Sensor",
+    "Spectrum",
+    "Sphere",
+    "SpotLight",
+    "Star",
+    "Stripes",
+    "Text",
+    "UniformLight",
     "draw_photons",
     "generate",
     "generate_collection",
+    "import_scene",
     "load_recipe",
     "load_scene",
     "preview",
+    "render",
 ]
+_MODULES = (
+    "app.library",
+    "app.without_files",
+    "importing.scene_import",
+    "spec.scene",
+    "spec.shapes",
+    "spec.materials",
+    "spec.textures",
+    "spec.lights",
+)
+"""Where the names are, looked for in this order: `load_scene` is that of `app`."""
 __version__ = version("photon-integral-imaging")
 
 
 def __getattr__(name: str) -> Any:
-    if name not in __all__:
-        raise AttributeError(f"module 'simgen' has no attribute {name!r}")
-    from simgen.app import library, photons_in_memory
-
-    return getattr(photons_in_memory if name == "draw_photons" else library, name)
+    if name in __all__:
+        for module in (import_module(f"simgen.{where}") for where in _MODULES):
+            if hasattr(module, name):
+                return getattr(module, name)
+    raise AttributeError(f"module 'simgen' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

@@ -7,10 +7,12 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
+
+from pcii.base.errors import InputError
 
 
 def write_bytes_safely(path: Path, content: bytes) -> None:
@@ -28,6 +30,24 @@ def write_bytes_safely(path: Path, content: bytes) -> None:
         Path(temporary).unlink(missing_ok=True)
         raise
     sync_folder(path.parent)
+
+
+def add_files_safely(folder: Path, contents: Mapping[str, bytes], *, overwrite: bool) -> None:
+    """Write files of these names and contents into a folder, new or not, in this order, each safely.
+
+    What is there with the same content is left as it is. With other content it is refused by `InputError`
+    before anything is written, unless `overwrite`.
+    """
+    new = {folder / name: content for name, content in contents.items()}
+    for path, content in list(new.items()):
+        if path.is_file() and path.read_bytes() == content:
+            del new[path]
+        elif path.is_dir() or (path.exists() and not overwrite):
+            raise InputError(
+                f"{path}: is there with other content; name another folder, or give overwrite=True"
+            )
+    for path, content in new.items():
+        write_bytes_safely(path, content)
 
 
 def json_bytes(value: Any) -> bytes:

@@ -1,13 +1,15 @@
 """The `simgen` command.
 
-authoring_commands Commands that write files to start from: a scene, a recipe, one draw of a distribution of
-                   scenes.
-commands           The `simgen` command.
-draw_files         One draw of a distribution of scenes, written as a scene of its own.
-listings           Lists of the scenes and recipes that ship or stand in the working directory.
-library            What the commands do, as functions: scenes and recipes by name, datasets, pictures.
-photons_in_memory  Photon counts of a scene and its truth without a file.
-scene_commands     Commands about scenes and recipes: list, describe, check, look at.
-starting_points    Scenes and recipes to start from: commented files that work as they are written.
-templates/         What they are written from.
+authoring_commands   Commands that write files to start from: a scene, a recipe, one draw of a distribution of
+                     scenes.
+commands             The `simgen` command.
+distribution_schema  The JSON Schema of scene files: that of one scene, and a distribution wherever a
+                     value may be drawn.
+draw_files           One draw of a distribution of scenes, written as a scene of its own.
+listings             Lists of the scenes and recipes that ship or stand in the working directory.
+library              What the commands do, as functions: scenes and recipes by name, datasets, pictures.
+scene_commands       Commands about scenes and recipes: list, describe, check, look at.
+starting_points      Scenes and recipes to start from: commented files that work as they are written.
+templates/           What they are written from.
+without_files        Photon counts, truth and views of a scene without a file.
 """

@@ -1,6 +1,7 @@
-"""Commands that write files to start from: a scene, a recipe, one draw of a distribution of scenes."""
+"""Commands that write scenes and recipes: to start from, one draw of many, from another program's file."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -71,3 +72,46 @@ def draw(target: str, *, scene: int, out: Out) -> None:
 
     say(f"{write_drawn_scene(target, scene, out)}")
     say_next("simgen", "check", out)
+
+
+def import_scene(
+    file: Path,
+    *,
+    out: Out,
+    camera: str | None = None,
+    unit: Literal["mm", "cm", "m", "in", "ft"] = "m",
+    place_at_mm: tuple[float, float, float] | None = None,
+    fit_mm: float | None = None,
+) -> None:
+    """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
+
+    Objects keep their names. The scene stands before a camera of the file, or where you say. What has no
+    counterpart here is told.
+
+    Examples of use:
+
+        simgen import-scene room.glb -o scenes/room
+        simgen import-scene duck.glb -o scenes/duck --place-at-mm 0 0 600 --fit-mm 150
+
+    Parameters
+    ----------
+    file
+        The file; others that it names must lie in its folder or below.
+    out
+        Folder for scene.toml, meshes and pictures; it must not be there yet.
+    camera
+        The camera of the file that becomes the virtual centre, if it has several.
+    unit
+        The file's unit of length.
+    place_at_mm
+        X, Y and Z of the middle of the scene, upright, instead of a camera.
+    fit_mm
+        Length of the longest side of the scene's bounding box, whatever the unit.
+    """
+    from simgen.importing.scene_import import import_scene
+
+    for line in import_scene(
+        file, out, camera=camera, unit=unit, place_at_mm=place_at_mm, fit_mm=fit_mm
+    ).lines():
+        say(line)
+    say_next("simgen", "preview", out, "-o", f"{out.name}.png")

@@ -10,7 +10,7 @@ from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from simgen.app.authoring_commands import draw, new_recipe, new_scene
+from simgen.app.authoring_commands import draw, import_scene, new_recipe, new_scene
 from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
 
 app = command_line.command_app(
@@ -20,7 +20,7 @@ app = command_line.command_app(
 MOST_TOLD = 5
 """Faults of datasets that a collection's last lines tell."""
 
-for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, draw):
+for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, draw, import_scene):
     app.command(command)
 
 

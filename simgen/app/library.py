@@ -10,22 +10,17 @@ from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.exporting.card_files import write_card
 from pcii.io.collection import Collection, open_collection
+from simgen.check.targets import load_target, target_of_scene
 from simgen.collection import whole_collection as collections
 from simgen.dataset import generation
-from simgen.figures.preview_picture import write_preview
+from simgen.figures.picture_parts import check_picture_path
+from simgen.figures.preview_picture import Preview, draw_preview
 from simgen.spec import recipe as recipes
 from simgen.spec import scene as scenes
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
+from simgen.spec.scene_lookup import plain_values
 from simgen.spec.sweeps import load_sweep
-
-
-@dataclass(frozen=True)
-class SceneFile:
-    """A scene as its TOML file says, and the folder that its assets are in."""
-
-    scene: Scene
-    folder: Path
 
 
 @dataclass(frozen=True)
@@ -36,18 +31,30 @@ class RecipeFile:
     folder: Path
 
 
-def load_scene(name_or_path: str | Path, number: int | None = None) -> SceneFile:
-    """A scene by the name of one that ships, or by the path of its folder or scene.toml.
+def load_scene(
+    scene: str | Path | dict[str, Any], number: int | None = None, *, folder: str | Path | None = None
+) -> Scene:
+    """A scene by the name of one that ships, by the path of its folder or scene.toml, or by its values.
 
-    Of a distribution of scenes `number` says which one. Raises `pcii.InputError` for a scene that is missing
-    or wrong, with the field at fault.
+    Values are a dict with the fields of a scene.toml; files that they name are in `folder`. Of a distribution
+    of scenes `number` says which one. Raises `pcii.InputError` for a scene that is missing or wrong, with the
+    field at fault.
 
-    >>> load_scene("two_objects").scene.title
+    >>> load_scene("two_objects").title
     'Tricoloured ball and toy bird'
-    >>> len(load_scene("drawn_room", 17).scene.objects)
+    >>> len(load_scene("drawn_room", 17).objects)
     5
+    >>> load_scene({"title": "Fog", "lights": [{"type": "uniform", "luminance_cd_m2": 100}]}).title
+    'Fog'
     """
-    return SceneFile(*scenes.load_scene(str(name_or_path), number=number))
+    if isinstance(scene, dict):
+        values, source = plain_values(scene, number, "scene")
+        return scenes.scene_of(values, None if folder is None else Path(folder), source)
+    if not isinstance(scene, str | Path):
+        raise InputError(f"scene: expected a name, a path or a dict, got {type(scene).__name__}")
+    if folder is not None:
+        raise InputError("folder: a scene by name or path has its own; leave it out")
+    return scenes.load_scene(str(scene), number=number)[0]
 
 
 def load_recipe(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RecipeFile:
@@ -127,12 +134,29 @@ def generate_collection(
 
 
 def preview(
-    name_or_path: str | Path, out: str | Path, samples_per_pixel: int = 32, scene_number: int | None = None
-) -> None:
-    """Write a picture (PNG or JPEG) of a scene or recipe from the virtual centre, with depth and objects.
+    scene: Scene | str | Path,
+    out: str | Path | None = None,
+    samples_per_pixel: int = 32,
+    scene_number: int | None = None,
+) -> Preview:
+    """A picture of a scene from the virtual centre, with depth and objects, which notebooks show.
 
-    Of a distribution of scenes `scene_number` says which one.
+    With `out` it is written too, as PNG or JPEG. The scene, or a recipe with its scene, may be given by name
+    or path; of a distribution of scenes `scene_number` says which one. It takes seconds.
 
     Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
+
+    >>> preview(load_scene("two_objects").move("bird", by_mm=(0, -20, 0)))           # doctest: +SKIP
     """
-    write_preview(str(name_or_path), Path(out), samples_per_pixel, scene_number=scene_number)
+    if out is not None:
+        check_picture_path(Path(out))
+    if not isinstance(scene, Scene):
+        target = load_target(str(scene), scene_number=scene_number)
+    elif scene_number is None:
+        target = target_of_scene(scene)
+    else:
+        raise InputError("scene_number: this is one scene, of which there are no draws; leave it out")
+    picture = draw_preview(target, samples_per_pixel)
+    if out is not None:
+        picture.write(out)
+    return picture

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import shorten
-from simgen.spec.scene import is_scene_distribution, load_scene, scene_names
+from simgen.spec.scene import is_scene_distribution, load_scene
 from simgen.spec.scene_generators import generators
+from simgen.spec.scene_lookup import scene_names
 from simgen.spec.sweeps import load_sweep
 
 LONGEST_FAULT = 100

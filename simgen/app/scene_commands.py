@@ -76,8 +76,8 @@ def schema(what: Literal["scene", "recipe"]) -> None:
     what
         Which kind of file.
     """
+    from simgen.app.distribution_schema import scene_schema
     from simgen.base.strict_models import schema_of
-    from simgen.spec.distribution_schema import scene_schema
     from simgen.spec.recipe import Recipe
 
     answer_json(scene_schema() if what == "scene" else schema_of(Recipe))
@@ -161,11 +161,14 @@ def preview(
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
-    from simgen.figures.preview_picture import write_preview
+    from simgen.check.targets import load_target
+    from simgen.figures.picture_parts import check_picture_path
+    from simgen.figures.preview_picture import draw_preview
     from simgen.spec.recipe import recipe_file
-    from simgen.spec.scene import is_scene
+    from simgen.spec.scene_lookup import is_scene
 
-    write_preview(target, out, samples_per_pixel, overrides=set, scene_number=scene)
+    check_picture_path(out)
+    draw_preview(load_target(target, set, scene), samples_per_pixel).write(out)
     say(f"{out}")
     if is_scene(target) and scene is None:
         name = _name_of(target)
@@ -177,7 +180,8 @@ def preview(
 
 def _say_next_after_check(target: str, overrides: tuple[str, ...], scene: int | None) -> None:
     """Of a scene: look at it. Of a recipe: make it."""
-    from simgen.spec.scene import is_scene, is_scene_distribution
+    from simgen.spec.scene import is_scene_distribution
+    from simgen.spec.scene_lookup import is_scene
 
     name = _name_of(target)
     if not is_scene(target):

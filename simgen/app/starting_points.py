@@ -14,8 +14,9 @@ from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
 from simgen.check.scene_probe import probe_scene
 from simgen.check.targets import load_target
 from simgen.spec.recipe import recipe_file
-from simgen.spec.scene import NAME, is_scene, is_scene_distribution, load_scene, scene_names
+from simgen.spec.scene import NAME, is_scene_distribution, load_scene
 from simgen.spec.scene_generators import generators
+from simgen.spec.scene_lookup import is_scene, scene_names
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 ONE_PLANE_MM = 10.0

@@ -14,7 +14,10 @@ LARGEST_FILE_BYTES = 1 << 28
 
 
 class AssetName(str):
-    """Name of a file inside the scene's folder; a subclass says what the file holds."""
+    """Name of a file inside the scene's folder; a subclass says what the file holds.
+
+    A field is `Annotated[str, ImageName]`, so that type checkers allow any string; it holds an `ImageName`.
+    """
 
     __slots__ = ()
 

@@ -3,9 +3,10 @@
 import difflib
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, ValidationError
 
@@ -31,14 +32,30 @@ _IN_TOML = {
     "a valid tuple": "a list in brackets",
     "a valid dictionary or object to extract fields from": 'a table such as { type = "..." }',
     "a valid dictionary or instance of": "a table, as of",
+    "instance is frozen": "this is frozen, and change() gives a copy",
 }
-"""What pydantic calls things, and what they are to whoever writes TOML."""
+"""What pydantic calls things, and what they are to whoever writes TOML or Python."""
 
 
 class Strict(BaseModel):
-    """Frozen; an unknown key, NaN or infinity is an error."""
+    """Frozen; an unknown key, NaN or infinity is an error: `InputError`, for whoever makes one in Python."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+
+    def __init__(self, /, **values: Any) -> None:
+        with _told(type(self), type(self).__name__):
+            super().__init__(**values)
+
+    # So pydantic validates a table within another without a call of it, and faults keep their place.
+    __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        with _told(type(self), type(self).__name__):
+            super().__setattr__(name, value)
+
+    def change(self, **fields: Any) -> Self:
+        """A copy with other values of these fields, checked as a new one is."""
+        return type(self)(**{name: getattr(self, name) for name in self.model_fields_set} | fields)
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -112,8 +129,15 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
     """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy."""
-    try:
+    with _told(model, source):
         return model.model_validate(values)
+
+
+@contextmanager
+def _told(model: type[BaseModel], source: str) -> Iterator[None]:
+    """Tells what pydantic finds wrong with values of a model as `InputError`."""
+    try:
+        yield
     except ValidationError as fault:
         raise faults_of(source, *_sentences(model, fault)) from None
     except RecursionError:

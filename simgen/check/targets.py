@@ -7,11 +7,12 @@ from pathlib import Path
 from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import suggestion
-from simgen.dataset.prepared import Prepared, prepare
+from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.spec.materials import is_clear
-from simgen.spec.recipe import Render
-from simgen.spec.scene import is_scene, scene_names
+from simgen.spec.recipe import Recipe, Render
+from simgen.spec.scene import Scene
 from simgen.spec.scene_generators import generators
+from simgen.spec.scene_lookup import is_scene, scene_names
 from simgen.spec.sweeps import Sweep, load_sweep
 
 GLASS_DEPTH = 8
@@ -37,10 +38,20 @@ def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})
     target = prepare(recipe, recipe_folder)
-    if recipe_folder is None and any(is_clear(thing.material.finish) for thing in target.scene.objects):
-        longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
-        return replace(target, recipe=longer)
-    return target
+    return _with_long_paths(target) if recipe_folder is None else target
+
+
+def target_of_scene(scene: Scene) -> Prepared:
+    """A scene, looked at as `load_target` says; raises `InputError` for a file that it names and lacks."""
+    return _with_long_paths(prepare_scene(Recipe(scene="as given"), scene))
+
+
+def _with_long_paths(target: Prepared) -> Prepared:
+    """The same, with longer light paths if there is glass in the scene."""
+    if not any(is_clear(thing.material.finish) for thing in target.scene.objects):
+        return target
+    longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
+    return replace(target, recipe=longer)
 
 
 def target_sweep(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Sweep, Path | None]:

@@ -20,7 +20,7 @@ from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Analysis, Recipe
-from simgen.spec.scene import Scene, load_scene, scene_files
+from simgen.spec.scene import Scene, checked_folder, load_scene, scene_files
 
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""
@@ -87,7 +87,13 @@ class Prepared:
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
     """Look up what a recipe in `recipe_folder` names; `InputError` if it is missing or wrong."""
-    scene, folder = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
+    scene, _ = load_scene(recipe.scene, recipe_folder, recipe.scene_number)
+    return prepare_scene(recipe, scene, recipe_folder)
+
+
+def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = None) -> Prepared:
+    """A recipe with this scene, whatever scene it names; `InputError` for a file that is missing or wrong."""
+    folder = checked_folder(scene)
     resolved = recipe.model_copy(update={"analysis": _analysis_of(recipe.analysis, scene.planes_mm)})
     return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, recipe_folder or Path()))
 

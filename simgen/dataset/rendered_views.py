@@ -1,4 +1,4 @@
-"""Radiance images of every view on disk: products of a dataset, or what its photon counts are drawn from."""
+"""Radiance images of views; on disk as products of a dataset, or as what its photon counts are drawn from."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,14 @@ from simgen.spec.recipe import Exposure, Sensor
 
 RENDERED = ".rendered"
 """Folder of exact views that are no product in themselves; gone when the dataset is finished."""
+
+
+def exact_view(
+    render_scene: RenderScene, rig: Rig, k: int, l: int, samples_per_pixel: int, seed: int
+) -> np.ndarray:
+    """Radiance (H, W, C), float32, of camera (k, l), with noise of its own; `seed` is that of the draw."""
+    own = seeds.integer(seed, view=k * rig.grid.cols + l, stage="radiance")
+    return render_view(render_scene, rig, k, l, samples_per_pixel=samples_per_pixel, seed=own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,14 +51,7 @@ class RenderedViews:
         for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
             number, exact = k * grid.cols + l, self._exact_file(k, l)
             if not exact.is_file():
-                image = render_view(
-                    render_scene,
-                    self.rig,
-                    k,
-                    l,
-                    samples_per_pixel=self.samples_per_pixel,
-                    seed=seeds.integer(self.seed, view=number, stage="radiance"),
-                )
+                image = exact_view(render_scene, self.rig, k, l, self.samples_per_pixel, self.seed)
                 write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, cfa)[..., None])
             if self.sensor.full_light is not None and self.radiance != "none":
                 assert self.exposure is not None

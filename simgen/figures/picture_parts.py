@@ -63,14 +63,19 @@ def draw_truth(
     draw_objects(objects, object_id, names)
 
 
-def save_figure(figure: "Figure", out: Path, dots_per_inch: float | None = None) -> None:
-    """Write a figure whole or not at all; `InputError` where writing is not allowed."""
-    kind = "png" if out.suffix.lower() == ".png" else "jpeg"
+def encoded(figure: "Figure", kind: str, dots_per_inch: float | None = None) -> bytes:
+    """A figure as the bytes of a "png" or "jpeg"."""
     buffer = io.BytesIO()
     dpi = dots_per_inch or "figure"
     figure.savefig(buffer, format=kind, dpi=dpi, bbox_inches="tight", pad_inches=0.15)
+    return buffer.getvalue()
+
+
+def save_figure(figure: "Figure", out: Path, dots_per_inch: float | None = None) -> None:
+    """Write a figure whole or not at all; `InputError` where writing is not allowed."""
+    content = encoded(figure, "png" if out.suffix.lower() == ".png" else "jpeg", dots_per_inch)
     try:
-        write_bytes_safely(out, buffer.getvalue())
+        write_bytes_safely(out, content)
     except PermissionError as fault:
         raise InputError(f"{out}: cannot be written here ({fault.strerror})") from None
 

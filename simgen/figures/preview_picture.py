@@ -1,8 +1,8 @@
 """A quick look at a scene: the picture, depth and objects that the virtual centre camera sees."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,10 +11,11 @@ from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import to_srgb8, white_level
 from simgen.check.scene_probe import coarser
-from simgen.check.targets import load_target
+from simgen.dataset.prepared import Prepared
 from simgen.figures.picture_parts import (
     check_picture_path,
     draw_truth,
+    encoded,
     frame_part,
     part_of_interest,
     save_figure,
@@ -24,28 +25,34 @@ from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.truth.first_hits import first_hits_at_centre
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 SIDE_PX = 512
 PANEL_IN = 4.8
 """Height of a picture's panel."""
 
 
-def write_preview(
-    name_or_path: str,
-    out: Path,
-    samples_per_pixel: int,
-    *,
-    overrides: Sequence[str] = (),
-    scene_number: int | None = None,
-    dots_per_inch: float | None = None,
-) -> None:
-    """Write the preview of a scene or of a recipe's, a PNG or JPEG; `scene_number` says which draw of it.
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What a scene looks like, in one figure; notebooks show it."""
 
-    Raises `InputError` for a bad scene or recipe, and for a picture that cannot be written there.
-    """
+    title: str
+    figure: "Figure" = field(repr=False)
+
+    def write(self, out: str | Path, dots_per_inch: float | None = None) -> None:
+        """Write it as PNG or JPEG; `InputError` for another name and where writing is not allowed."""
+        check_picture_path(Path(out))
+        save_figure(self.figure, Path(out), dots_per_inch)
+
+    def _repr_png_(self) -> bytes:
+        return encoded(self.figure, "png")
+
+
+def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
+    """The preview of a recipe's scene. Raises `InputError` for samples below 1, and for a bad scene."""
     if samples_per_pixel < 1:
         raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
-    check_picture_path(out)
-    target = load_target(name_or_path, overrides, scene_number)
     recipe = target.recipe
     # The recipe's field of view, and one camera: the virtual centre.
     grid = replace(coarser(recipe.grid.camera_grid(), SIDE_PX), rows=1, cols=1)
@@ -64,5 +71,8 @@ def write_preview(
     if things.any() and box[0].stop - box[0].start < grid.height:
         frame_part(whole, box)
     draw_truth(depth, objects, hits.z_mm[box], hits.object_id[box], render_scene.names)
-    figure.suptitle(recipe.title or target.scene.title, parse_math=False)
-    save_figure(figure, out, dots_per_inch)
+    title = recipe.title or target.scene.title
+    figure.suptitle(title, parse_math=False)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # which would move the panels each time that the picture is written
+    return Preview(title, figure)

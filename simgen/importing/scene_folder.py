@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,6 +49,29 @@ class ImportedScene:
     camera_angle_deg: float | None
     """Its horizontal angle of view."""
     left_out: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """The same for people."""
+        x, y, z = self.size_mm
+        yield f"{self.folder / 'scene.toml'}"
+        yield (
+            f"{_number(self.objects, 'object')} of {_number(self.triangles, 'triangle')} in "
+            f"{_number(self.meshes, 'mesh', 'meshes')}, {_number(self.materials, 'material')}, "
+            f"{_number(self.lights, 'light')}; {x:.4g} x {y:.4g} x {z:.4g} mm (X, Y, Z)"
+        )
+        if self.camera is not None:
+            angle = (
+                ""
+                if self.camera_angle_deg is None
+                else f", which sees {self.camera_angle_deg:.3g} degrees across"
+            )
+            yield f"the virtual centre is the camera '{self.camera}'{angle}"
+        for what in self.left_out:
+            yield f"not represented: {what}"
+
+
+def _number(count: int, one: str, many: str | None = None) -> str:
+    return f"{count} {one if count == 1 else many or f'{one}s'}"
 
 
 def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> ImportedScene:

@@ -20,7 +20,7 @@ from simgen.photons.counting_plan import Capture, Plan
 from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
-from simgen.sensor.detector import detect, nested_subset, saturate
+from simgen.sensor.detector import detect, nested_subset, read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
@@ -108,9 +108,7 @@ def write_counts(
         kept = counts
         if budget is not None:
             kept = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
-        if sensor.counter_bits is not None:
-            kept = saturate(kept, grid, sensor.counter_bits, capture.seed)
-        kept = kept.by_pixel(grid)
+        kept = read_out(kept, grid, sensor, capture.seed)
         events = PhotonCounts.from_events(kept.k, kept.l, kept.i, kept.j, kept.n, grid, cfa=cfa)
         save_counts(out / nested_name(COUNTS, budget), events)
         if with_origins and kept.object_id is not None and kept.z_mm is not None:

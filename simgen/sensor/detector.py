@@ -76,6 +76,13 @@ def detect(
     return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
+def read_out(counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: int) -> PhotonTable:
+    """What is read of counts, ordered by view and pixel: no more than a counter of so many bits holds."""
+    if sensor.counter_bits is not None:
+        counts = saturate(counts, grid, sensor.counter_bits, seed)
+    return counts.by_pixel(grid)
+
+
 def saturate(counts: PhotonTable, grid: CameraGrid, bits: int, seed: int) -> PhotonTable:
     """Counts after a pixel's counter of so many bits has stopped; which came first is left to chance."""
     most = (1 << bits) - 1

@@ -143,7 +143,7 @@ class EnvironmentLight(Strict):
     """
 
     type: Literal["environment"] = "environment"
-    file: EnvironmentName
+    file: Annotated[str, EnvironmentName]
     """An OpenEXR image inside the scene's folder, twice as wide as high, linear sRGB."""
     luminance_cd_m2: Positive
     """Luminance of white, pixels of (1, 1, 1)."""

@@ -17,7 +17,7 @@ def _number_or_image(given: Any) -> str:
 
 
 ShareOrImage = Annotated[
-    Annotated[Share, Tag("number")] | Annotated[ImageName, Tag("image")], Discriminator(_number_or_image)
+    Annotated[Share, Tag("number")] | Annotated[str, ImageName, Tag("image")], Discriminator(_number_or_image)
 ]
 """A number from 0 to 1, or a grey image of such."""
 
@@ -157,7 +157,7 @@ def _file_or_pattern(given: Any) -> str | None:
 
 
 FileOrPattern = Annotated[
-    Annotated[ImageName, Tag("file")] | Annotated[Texture, Tag("pattern")],
+    Annotated[str, ImageName, Tag("file")] | Annotated[Texture, Tag("pattern")],
     Discriminator(
         _file_or_pattern,
         custom_error_type="texture",
@@ -177,7 +177,7 @@ class Material(Strict):
     laid out by the shape's texture coordinates."""
     finish: Finish = Field(default=Matt(), discriminator="type")
     """Matt by default; { type = "plastic", roughness = 0.1 } adds highlights."""
-    normal_map: ImageName | None = None
+    normal_map: Annotated[str, ImageName] | None = None
     """An image inside the scene's folder that tilts the surface: red to the right of the picture, green up,
     blue out of it, each stored as half of the component plus a half (as in OpenGL and glTF)."""
     tiled: bool = False

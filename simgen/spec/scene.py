@@ -1,21 +1,23 @@
-"""Scenes: the world in a TOML file, in millimetres; no camera in it.
+"""Scenes: the world as an object or in a TOML file, in millimetres; no camera in it.
 
 World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking along +Z.
 """
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
 from pcii.base.errors import InputError
+from pcii.store.folder_kind import entries
+from pcii.store.safe_files import add_files_safely
 from simgen.base.asset_names import AssetName, asset, named_files
-from simgen.base.locations import find, scene_roots
 from simgen.base.strict_models import (
     LARGEST_MM,
+    LARGEST_TOML_BYTES,
     LONGEST_PART,
     Length,
     Position,
@@ -27,14 +29,15 @@ from simgen.base.strict_models import (
     faults_of,
     read_toml,
     shorten,
+    shown_value,
     suggestion,
     validate,
 )
-from simgen.spec.distributions import draw, is_distribution
+from simgen.base.toml_layout import toml_text
+from simgen.spec.distributions import is_distribution
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
-from simgen.spec.recipe import SEED_LIMIT
-from simgen.spec.scene_generators import generated, generators
+from simgen.spec.scene_lookup import find_scene, named_values
 from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
@@ -79,8 +82,55 @@ class Backdrop(Strict):
     """How far it reaches to each side."""
 
 
+class _Move(Strict):
+    """Where an object goes, and how it is turned there."""
+
+    by_mm: Position | None
+    to_mm: Position | None
+    rotation_deg: Vector | None
+
+    @model_validator(mode="after")
+    def _says_where(self) -> Self:
+        if self.by_mm is not None and self.to_mm is not None:
+            raise ValueError("give by_mm or to_mm, not both")
+        if {self.by_mm, self.to_mm, self.rotation_deg} == {None}:
+            raise ValueError("give by_mm, to_mm or rotation_deg")
+        return self
+
+
 class Scene(Strict):
-    """A world to be looked at: objects, lights, and what stands behind."""
+    """A world to be looked at: objects, lights, and what stands behind.
+
+    It is frozen: what changes it gives a new scene. `folder` is that of the files that it names, and may be
+    None if it names none; scenes are equal whatever their folders. A fault raises `InputError`.
+
+    >>> from simgen import Material, SceneObject, Sphere, UniformLight
+    >>> ball = SceneObject(name="ball", position_mm=(0, 0, 540), shape=Sphere(radius_mm=30),
+    ...                    material=Material(reflectance=(0.8, 0.3, 0.2)))
+    >>> scene = Scene(title="A ball", lights=(UniformLight(luminance_cd_m2=100),)).add(ball)
+    >>> scene.move("ball", by_mm=(0, 0, 80)).object("ball").position_mm
+    (0.0, 0.0, 620.0)
+    """
+
+    _folder: Path | None = PrivateAttr(default=None)
+    # No field, since fields are what a scene.toml holds and what digests of scenes are made of; for type
+    # checkers it is one, so that they know it among the arguments.
+    if TYPE_CHECKING:
+        folder: Path | None = None
+    else:
+
+        def __init__(self, *, folder: str | Path | None = None, **values: Any) -> None:
+            super().__init__(**values)
+            if not isinstance(folder, str | Path | None):
+                raise InputError(f"Scene: 'folder': expected a path, got {shown_value(folder)}")
+            self._folder = None if folder is None else Path(folder)
+
+        __init__.__pydantic_base_init__ = True
+
+        @property
+        def folder(self) -> Path | None:
+            """Folder of the files that the scene names."""
+            return self._folder
 
     title: Title
     """One line."""
@@ -122,6 +172,80 @@ class Scene(Strict):
             )
         return self
 
+    def __eq__(self, other: Any) -> bool:
+        return isinstance(other, Scene) and dict(self) == dict(other)
+
+    def object(self, name: str) -> SceneObject:
+        """The object of that name; raises `InputError` if there is none."""
+        for thing in self.objects:
+            if thing.name == name:
+                return thing
+        shown = shorten(repr(name), LONGEST_PART)
+        known = suggestion(str(name), [thing.name for thing in self.objects])
+        raise InputError(f"scene: there is no object {shown}{known}")
+
+    def change(self, **fields: Any) -> Self:
+        """A scene with other values of these fields, such as `lights`, `title` or `folder`."""
+        return super().change(**{"folder": self.folder} | fields)
+
+    def add(self, *things: SceneObject | Light) -> Self:
+        """A scene with further objects and lights."""
+        objects = tuple(thing for thing in things if isinstance(thing, SceneObject))
+        lights = tuple(thing for thing in things if not isinstance(thing, SceneObject))
+        return self.change(objects=self.objects + objects, lights=self.lights + lights)
+
+    def remove(self, name: str) -> Self:
+        """A scene without the object of that name."""
+        gone = self.object(name)
+        return self.change(objects=tuple(thing for thing in self.objects if thing is not gone))
+
+    def replace(self, name: str, thing: SceneObject | None = None, /, **fields: Any) -> Self:
+        """A scene with another object in the place of one, or with the same but for these fields of it.
+
+        >>> scene = scene.replace("ball", shape=Sphere(radius_mm=20), name="marble")       # doctest: +SKIP
+        """
+        old = self.object(name)
+        if (thing is None) == (not fields):
+            raise InputError("replace: give either another object or fields of the one that is there")
+        new = thing or old.change(**fields)
+        return self.change(objects=tuple(new if each is old else each for each in self.objects))
+
+    def move(
+        self,
+        name: str,
+        *,
+        by_mm: Sequence[float] | None = None,
+        to_mm: Sequence[float] | None = None,
+        rotation_deg: Sequence[float] | None = None,
+    ) -> Self:
+        """A scene in which an object stands further along X, Y, Z or elsewhere, or is turned otherwise.
+
+        `rotation_deg` takes the place of the rotation that it has.
+        """
+        old = self.object(name)
+        move = validate(_Move, {"by_mm": by_mm, "to_mm": to_mm, "rotation_deg": rotation_deg}, "move")
+        place = move.to_mm or tuple(
+            a + b for a, b in zip(old.position_mm, move.by_mm or (0, 0, 0), strict=True)
+        )
+        return self.replace(name, position_mm=place, rotation_deg=move.rotation_deg or old.rotation_deg)
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
+        """Write `folder`/scene.toml, whose path is returned, and beside it the files that the scene names.
+
+        What else is in the folder stays. A file that is there with other content is refused with `InputError`
+        before anything is written, unless it may be overwritten.
+        """
+        out, text = Path(folder), toml_text(self).encode()
+        entries(out, "scene")  # refuses a file
+        if len(text) > LARGEST_TOML_BYTES:
+            raise InputError(
+                f"{out}: a scene.toml may have {LARGEST_TOML_BYTES} bytes, and this scene's has {len(text)}"
+            )
+        source = checked_folder(self)
+        files = {name: asset(source, name, where).read_bytes() for where, name in scene_files(self)}
+        add_files_safely(out, {**files, "scene.toml": text}, overwrite=overwrite)
+        return out / "scene.toml"
+
 
 def load_scene(
     name_or_path: str, recipe_folder: Path | None = None, number: int | None = None
@@ -132,17 +256,33 @@ def load_scene(
     then among generators. `number` selects a draw from a distribution of scenes. Raises `InputError` for a
     scene that is missing or wrong, for a number with a single scene, and for a distribution without one.
     """
-    values, folder, source = _plain_values(name_or_path, recipe_folder, number)
-    scene = validate(Scene, values, source)
+    values, folder, source = named_values(name_or_path, recipe_folder, number)
+    return scene_of(values, folder, source), folder
+
+
+def scene_of(values: Mapping[str, Any], folder: Path | None, source: str) -> Scene:
+    """The scene with these values and its files in this folder; raises `InputError` if anything is wrong."""
+    scene = validate(Scene, values, source).change(folder=folder)
+    checked_folder(scene, source)
+    return scene
+
+
+def checked_folder(scene: Scene, source: str = "scene") -> Path:
+    """The folder of a scene's files, all of which are there; the working directory if it has and needs none.
+
+    Raises `InputError`, beginning with `source`, that tells each file that is missing.
+    """
     faults: list[str] = []
     for where, name in scene_files(scene):
         try:
-            asset(folder, name, where)
+            if scene.folder is None:
+                raise InputError(f"{where}: {name!r} is looked for in the scene's folder; give folder=")
+            asset(scene.folder, name, where)
         except InputError as fault:
             faults.append(str(fault))
     if faults:
         raise faults_of(source, faults, len(faults))
-    return scene, folder
+    return scene.folder or Path()
 
 
 def is_scene_distribution(name_or_path: str, recipe_folder: Path | None = None) -> bool:
@@ -151,79 +291,9 @@ def is_scene_distribution(name_or_path: str, recipe_folder: Path | None = None) 
     return file is None or is_distribution(read_toml(file))
 
 
-def _plain_values(
-    name_or_path: str, recipe_folder: Path | None, number: int | None
-) -> tuple[dict[str, Any], Path, str]:
-    """The values of one scene as TOML holds them, its folder, and what errors call it."""
-    file = find_scene(name_or_path, recipe_folder)
-    source = name_or_path if file is None else str(file)
-    values = {} if file is None else read_toml(file)
-    if file is not None and not is_distribution(values):
-        if number is not None:
-            raise InputError(
-                f"scene_number: {source} is one scene, of which there are no draws; leave it out"
-            )
-        return values, file.parent, source
-    if number is None:
-        raise InputError(
-            f"scene_number: {source} is a distribution of scenes; say which draw, such as scene_number = 0 "
-            "in a recipe or --scene 0"
-        )
-    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < SEED_LIMIT:
-        raise InputError(f"scene_number: expected a whole number from 0 to 2^63 - 1, got {number!r}")
-    if file is None:
-        values, folder = generated(name_or_path, number)
-    else:
-        values, folder = draw(values, number, source), file.parent
-    return values, folder, f"{source}, draw {number}"
-
-
 def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
     """Every file that a scene names, and the field where: `object 'ball', material.texture`."""
     for thing in scene.objects:
         for where, name in named_files(thing):
             yield f"object '{thing.name}', {where}", name
     yield from named_files(scene.model_copy(update={"objects": ()}))
-
-
-def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | None:
-    """The scene.toml that a name or path means, None for the name of a generator.
-
-    Raises `InputError` with a suggestion if there is neither.
-    """
-    given = Path(name_or_path)
-    beside = [] if recipe_folder is None else [recipe_folder / given, recipe_folder / given / "scene.toml"]
-    try:
-        for candidate in (*beside, given, given / "scene.toml"):
-            if candidate.is_file():
-                return candidate
-        shipped = find(scene_roots, f"{name_or_path}/scene.toml")
-    except OSError:  # a name too long for a file
-        shipped = None
-    if shipped is not None:
-        return shipped
-    known = generators()
-    if name_or_path in known:
-        return None
-    shown = shorten(repr(name_or_path), LONGEST_PART)
-    raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, [*scene_names(), *known])}")
-
-
-def is_scene(name_or_path: str) -> bool:
-    """Whether a name or path means a scene: a folder, a file with lights or objects, or a known name."""
-    path = Path(name_or_path)
-    if path.is_file():
-        values = read_toml(path)
-        return "scene" not in values and bool({"lights", "objects"} & set(values))
-    if path.is_dir():
-        return True
-    try:
-        find_scene(name_or_path)
-    except InputError:
-        return False
-    return True
-
-
-def scene_names() -> list[str]:
-    """Names of the scenes that ship or stand in the working directory, generators left out."""
-    return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})

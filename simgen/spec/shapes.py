@@ -84,7 +84,7 @@ class Mesh(Strict):
     """
 
     type: Literal["mesh"] = "mesh"
-    file: MeshName
+    file: Annotated[str, MeshName]
     """Name of a .ply or .obj file inside the scene's folder."""
     scale: Scale = 1.0
     """Millimetres for one unit of the file; or three numbers along the mesh's own axes, negative ones of

@@ -22,7 +22,7 @@ from pcii.store.hashes import hash_json
 from simgen.base.overrides import override
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Recipe, read_recipe, recipe_file
-from simgen.spec.scene import find_scene, is_scene
+from simgen.spec.scene_lookup import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000
 SHORT_NAMES = {"scene_number": "draw"}

@@ -34,7 +34,7 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 def test_a_draw_as_a_scene_of_its_own_is_that_draw(name: str, tmp_path: Path) -> None:
     out = tmp_path / "new" / "mine"
     assert command_line.run(cli.app, ["draw", name, "--scene", "17", "-o", str(out)]) == 0
-    assert load_scene(str(out))[0] == load_scene(name, number=17)[0] == simgen.load_scene(name, 17).scene
+    assert load_scene(str(out))[0] == load_scene(name, number=17)[0] == simgen.load_scene(name, 17)
     assert [file.name for file in out.iterdir()] == ["scene.toml"]
 
 

@@ -62,7 +62,7 @@ def test_a_recipe_may_be_named_or_be_a_path(dataset: pcii.Dataset, tmp_path: Pat
     assert named["identity"] == dataset.manifest["identity"]
     with pytest.raises(pcii.InputError, match=r"recipe: there is no 'smal'; did you mean 'small'\?"):
         simgen.generate("smal", tmp_path / "out")
-    with pytest.raises(pcii.InputError, match=r"^recipe: expected the name .*, got a SceneFile$"):
+    with pytest.raises(pcii.InputError, match=r"^recipe: expected the name .*, got a Scene$"):
         simgen.generate(simgen.load_scene("two_objects"), tmp_path / "out")  # type: ignore[arg-type]
     path.write_text('scene = "two_objects"\nseed = [1, 2]')
     with pytest.raises(pcii.InputError, match=r"tiny.toml: several values of seed .*generate_collection$"):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from simgen.spec.distribution_schema import scene_schema
+from simgen.app.distribution_schema import scene_schema
 
 ROOT = Path(__file__).resolve().parents[3]
 
