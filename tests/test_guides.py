@@ -66,6 +66,11 @@ def given_scenes(request: pytest.FixtureRequest) -> None:
     Path("scenes/mine").mkdir(parents=True)
 
 
+def given_imported_scenes(request: pytest.FixtureRequest) -> None:
+    Path("scenes/set_table").mkdir(parents=True)
+    shutil.copy(ROOT / "scenes" / "set_table" / "set_table.glb", "scenes/set_table")
+
+
 def given_plugins(request: pytest.FixtureRequest) -> None:
     """The package of the page, as if `pip install -e .` had been run."""
     (table,) = (block.text for block in blocks(DOCS / "plugins.md") if block.language == "toml")
@@ -97,6 +102,7 @@ GIVEN: dict[str, Callable[[pytest.FixtureRequest], None]] = {
     "exchange.md": given_exchange,
     "cluster.md": given_cluster,
     "scenes.md": given_scenes,
+    "imported_scenes.md": given_imported_scenes,
     "plugins.md": given_plugins,
     "your_own_images.md": given_your_own_images,
 }

@@ -68,6 +68,8 @@ class ObjectFacts:
     """Where its bounding box falls."""
     encloses_camera: bool = False
     """Whether a camera stands in its bounding box and sees nothing else."""
+    shines: bool = False
+    """Whether it is a lamp, too."""
 
     @cached_property
     def middle_mm(self) -> float:

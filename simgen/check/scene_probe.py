@@ -147,6 +147,7 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
         stands_at_mm=target.scene.objects[number - 1].position_mm[2],
         hidden_by=unseen_behind,
         on_film=None if box is None else on_film(box, target.recipe.grid.camera_grid()),
+        shines=target.scene.objects[number - 1].material.emission is not None,
         encloses_camera=box is not None and any(_holds(box, look.grid, *camera) for camera in full),
     )
 

@@ -30,6 +30,8 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
         return [Finding("bad", "objects", text, _in_millimetres(thing.stands_at_mm))]
     if thing.encloses_camera:
         return [Finding("bad", "objects", f"a camera stands inside {name}", f"move {name} away from Z = 0")]
+    if not thing.z_mm.size and not thing.corners_seen and thing.shines:
+        return [Finding("note", "objects", f"no camera sees {name}, which shines: it is a lamp")]
     if not thing.z_mm.size and not thing.corners_seen:
         return [Finding("bad", "objects", f"no camera sees {name}", _why_unseen(facts, thing))]
     if not thing.z_mm.size:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_files import QUAD, QUAD_UV, GltfDraft
+from gltf_draft import QUAD, QUAD_UV, GltfDraft
 from PIL import Image
 
 from pcii.base.errors import InputError

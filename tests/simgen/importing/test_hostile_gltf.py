@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from gltf_files import QUAD_UV, GltfDraft, glb
+from gltf_draft import QUAD_UV, GltfDraft, glb
 from hostile_files import png
 
 from pcii.base.errors import InputError

@@ -1,4 +1,7 @@
-"""glTF files made by hand: a table of JSON, and numbers behind it."""
+"""glTF files made by hand: a table of JSON, and numbers behind it.
+
+Khronos Group, "glTF 2.0 Specification" (2021).
+"""
 
 import base64
 import json
@@ -55,12 +58,15 @@ class GltfDraft:
         faces: np.ndarray | None = QUAD_FACES,
         uv: np.ndarray | None = None,
         material: Json | None = None,
+        normals: np.ndarray | None = None,
         **more: Any,
     ) -> int:
         """A mesh of one primitive, by default a square of 2 x 2 that faces +Z."""
         attributes = {"POSITION": self.numbers(positions)}
         if uv is not None:
             attributes["TEXCOORD_0"] = self.numbers(uv)
+        if normals is not None:
+            attributes["NORMAL"] = self.numbers(normals)
         primitive: Json = {"attributes": attributes, **more}
         if faces is not None:
             primitive["indices"] = self.numbers(faces)
