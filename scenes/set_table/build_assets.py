@@ -25,7 +25,7 @@ TILT_DEG = 14.0
 TITLE = "A set table, imported from glTF"
 DESCRIPTION = """
 Tea for two in a room: plates, cups and a bowl at 530 to 870 mm, of which some are instances of one mesh and
-one is mirrored, on a mat of lace that an image cuts out. A panel out of view, a candle's flame and a spot
+one is mirrored, on a mat of lace that an image cuts out. A panel out of view, a paper lantern and a spot
 shine on them. Made as glTF by build_assets.py, which imports it as `simgen import-scene` does.
 """
 PLANES_MM = (560.0, 600.0, 710.0, 760.0, 815.0)
@@ -104,8 +104,8 @@ CUP = [(0, 0), (0.018, 0), (0.021, 0.003), (0.027, 0.02), (0.029, 0.05), (0.0275
 CUP += [(0.024, 0.02), (0.017, 0.006), (0, 0.005)]
 APPLE = [(0, 0.004), (0.01, 0.0), (0.022, 0.005), (0.03, 0.02), (0.03, 0.036), (0.022, 0.05), (0.008, 0.053)]
 APPLE += [(0, 0.046)]
-CANDLE = [(0, 0), (0.011, 0), (0.012, 0.001), (0.012, 0.089), (0.01, 0.09), (0, 0.088)]
-FLAME = [(0, 0), (0.0035, 0.004), (0.0045, 0.009), (0.003, 0.018), (0.001, 0.025), (0, 0.028)]
+FOOT = [(0, 0), (0.019, 0), (0.02, 0.003), (0.006, 0.007), (0.0045, 0.02), (0.009, 0.034), (0, 0.035)]
+LANTERN = [(0, 0), (0.012, 0.001), (0.022, 0.01), (0.026, 0.026), (0.022, 0.042), (0.012, 0.051), (0, 0.052)]
 SPOON = [(0, -0.02), (0.008, -0.017), (0.013, -0.007), (0.0125, 0.006), (0.007, 0.018), (0.003, 0.026)]
 SPOON += [(0.0025, 0.08), (0.004, 0.098), (0, 0.1)]
 NAPKIN = [(0.03, 0), (0.024, 0.02), (0.012, 0.045), (0.001, 0.07)]
@@ -190,17 +190,16 @@ def table() -> GltfDraft:
     def pictured(pixels: np.ndarray, **sampler: int) -> dict[str, Any]:
         return {"baseColorTexture": {"index": picture(draft, pixels, **sampler)}}
 
-    porcelain = surface("porcelain", 0.25, pbr={"baseColorFactor": [0.75, 0.78, 0.8, 1.0]})
-    glaze = surface("glaze", 0.2, pbr={"baseColorFactor": [0.1, 0.28, 0.4, 1.0]})
-    wax = surface("wax", 0.6, pbr={"baseColorFactor": [0.8, 0.7, 0.5, 1.0]})
-    steel = surface("steel", 0.3, pbr={"metallicFactor": 1.0, "baseColorFactor": [0.7, 0.69, 0.66, 1.0]})
-    glow = {"emissiveFactor": [1.0, 0.55, 0.2], "extensions": {"KHR_materials_emissive_strength": {}}}
-    glow["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": 6000.0}
+    porcelain = surface("porcelain", 0.5, pbr={"baseColorFactor": [0.75, 0.78, 0.8, 1.0]})
+    glaze = surface("glaze", 0.5, pbr={"baseColorFactor": [0.1, 0.28, 0.4, 1.0]})
+    pewter = surface("pewter", 0.5, pbr={"metallicFactor": 1.0, "baseColorFactor": [0.62, 0.6, 0.56, 1.0]})
+    glow: dict[str, Any] = {"emissiveFactor": [1.0, 0.6, 0.25]}
+    glow["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": 90.0}}
     black = {"baseColorFactor": [0.0, 0.0, 0.0, 1.0]}
-    panel = {"emissiveFactor": [1.0, 0.95, 0.85]}
-    panel["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": 900.0}}  # type: ignore[assignment]
+    panel: dict[str, Any] = {"emissiveFactor": [1.0, 0.95, 0.85]}
+    panel["extensions"] = {"KHR_materials_emissive_strength": {"emissiveStrength": 900.0}}
 
-    top = mesh(box(1.5, 0.03, 1.0), surface("oak", 0.45, pbr=pictured(wood())))
+    top = mesh(box(1.5, 0.03, 1.0), surface("oak", 0.6, pbr=pictured(wood())))
     draft.node(name="table", mesh=top, translation=[0, -0.015, -0.75])
     paper = surface("wallpaper", 0.9, pbr=pictured(wallpaper(), wrapS=10497, wrapT=10497))
     wall = draft.mesh(QUAD, QUAD_FACES, 9 * QUAD_UV, paper)
@@ -222,9 +221,9 @@ def table() -> GltfDraft:
     draft.node(
         name="far-cup", mesh=cup, translation=[-0.1, 0.0005, -0.8], rotation=turn(0, -15), scale=[-1, 1.1, 1]
     )
-    apple = mesh(lathe(APPLE), surface("apple", 0.3, pbr=pictured(skin())))
+    apple = mesh(lathe(APPLE), surface("apple", 0.5, pbr=pictured(skin())))
     draft.node(name="apple", mesh=apple, translation=[-0.06, 0.005, -0.575], rotation=turn(8, 40))
-    spoon = mesh(lathe(SPOON), steel)
+    spoon = mesh(lathe(SPOON), pewter)
     draft.node(
         name="spoon",
         mesh=spoon,
@@ -232,10 +231,10 @@ def table() -> GltfDraft:
         rotation=turn(-90, 0, 25),
         scale=[1, 1, 0.25],
     )
-    candle = mesh(lathe(CANDLE), wax)
-    flame = mesh(lathe(FLAME), surface("flame", 0.5, pbr=black, **glow))
-    light = draft.node(root=False, name="flame", mesh=flame, translation=[0, 0.092, 0])
-    draft.node(name="candle", mesh=candle, translation=[-0.005, 0.0005, -0.74], children=[light])
+    foot = mesh(lathe(FOOT), pewter)
+    lantern = mesh(lathe(LANTERN), surface("paper", 0.9, **glow))
+    light = draft.node(root=False, name="lantern", mesh=lantern, translation=[0, 0.034, 0])
+    draft.node(name="lantern-foot", mesh=foot, translation=[-0.005, 0.0005, -0.74], children=[light])
     napkin = mesh(lathe(NAPKIN), surface("linen", 0.95, pbr=pictured(stripes()), doubleSided=True))
     draft.node(
         name="napkin",
