@@ -15,7 +15,7 @@ from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
 from simgen.assets.ply_files import ply_bytes
 from simgen.assets.triangles import Triangles
-from simgen.base.strict_models import LARGEST_TOML_BYTES, validate
+from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, validate
 from simgen.base.toml_layout import toml_text
 from simgen.importing.foreign_scene import ForeignScene, Lamp, Part
 from simgen.importing.placement import Placement, bounds
@@ -29,7 +29,9 @@ FAR_MM = 100.0
 """How far before a spot its target is written."""
 EVEN_LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
 """For files without any light."""
-LONGEST_NAME = 64
+LONGEST_NAME, LONGEST_TITLE = 64, 200
+MOST_TRIANGLES = 1 << 24
+"""Of all objects; the renderer makes those of each instance anew, and needs 100 bytes for each."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,7 @@ def _number(count: int, one: str, many: str | None = None) -> str:
 def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> ImportedScene:
     """Write a scene's folder, which must not be there yet.
 
-    Raises `InputError` with a clause about the file for one without surfaces, and for more objects or lights
-    than a scene may have.
+    Raises `InputError` with a clause about the file for more objects, lights or triangles than may be.
     """
     if len(scene.parts) > MOST_OBJECTS:
         raise InputError(
@@ -87,6 +88,11 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
         )
     if len(scene.lamps) > MOST_LIGHTS:
         raise InputError(f"it has {len(scene.lamps)} lights, and a scene at most {MOST_LIGHTS}")
+    triangles = sum(len(part.shape.faces) for part in scene.parts if isinstance(part.shape, Triangles))
+    if triangles > MOST_TRIANGLES:
+        raise InputError(
+            f"its objects have {triangles} triangles in all; at most {MOST_TRIANGLES} are rendered"
+        )
     meshes = _Meshes()
     names = _unique([part.name for part in scene.parts])
     objects = [_object(part, name, placement, meshes) for part, name in zip(scene.parts, names, strict=True)]
@@ -101,7 +107,7 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
     if not lights and not lit:
         lights.append(EVEN_LIGHT)
         left_out.append("the file has no light: the scene is lit evenly from all around")
-    values = {"title": scene.title, "objects": objects, "lights": lights}
+    values = {"title": shorten(scene.title, LONGEST_TITLE), "objects": objects, "lights": lights}
     written = validate(Scene, values, "what is made of it")
     comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in left_out)]
     text = toml_text(written, comments).encode()
@@ -123,7 +129,7 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
         folder=out,
         objects=len(objects),
         meshes=len(meshes.files),
-        triangles=sum(len(part.shape.faces) for part in scene.parts if isinstance(part.shape, Triangles)),
+        triangles=triangles,
         materials=len(materials),
         lights=len(lights),
         size_mm=(float(box[0]), float(box[1]), float(box[2])),
