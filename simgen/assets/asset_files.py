@@ -106,6 +106,13 @@ def read_pictures(paths: Iterable[Path]) -> Iterator[np.ndarray]:
             yield worker.read("picture with alpha", path)["pixels"]
 
 
+def read_meshes(paths: Iterable[Path]) -> Iterator[Triangles]:
+    """PLY and OBJ meshes in the files' own units, each as it is asked for; `InputError` for a bad one."""
+    with _Worker() as worker:
+        for path in paths:
+            yield Triangles(**worker.read("mesh", path))
+
+
 class _Worker:
     """The process that decodes, and the clock that ends it."""
 

@@ -10,21 +10,18 @@ from typing import Any
 import numpy as np
 
 from pcii.base.srgb import LUMINANCE, linear_to_srgb
-from simgen.assets.cutouts import cut_out
-from simgen.assets.mesh_points import bears_pictures_once
 from simgen.assets.triangles import MOST_FACES, Triangles
 from simgen.gltf.gltf_arrays import triangles_of
 from simgen.gltf.gltf_file import GltfFile, read_gltf
 from simgen.gltf.gltf_models import Node, PunctualLight
+from simgen.importing.fitted_materials import fitted
 from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
-from simgen.importing.gltf_materials import GltfMaterials, SurfaceOfPrimitive
+from simgen.importing.gltf_materials import GltfMaterials
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
 DEEPEST = 500
 """Nodes that may lie within each other."""
-BORDER = 1e-4
-"""Texture coordinates may pass the borders of a picture by so much."""
 LARGEST_CONE_DEG = 89.0
 LEAST_EDGE_DEG = 0.1
 """A spot's light falls off within so many degrees at least."""
@@ -168,7 +165,7 @@ class _Reader:
         self._faces += len(triangles.faces)
         if self._faces > MOST_FACES:
             raise self.gltf.fault(f"has more than {MOST_FACES} triangles; simplify its meshes")
-        material = self._fitting(surface, triangles)
+        material = fitted(surface.material, triangles, self.scene, pictures_repeat=surface.pictures_repeat)
         return None if material is None else (triangles, material)
 
     def _add_camera(self, node: Node, where: str, matrix: np.ndarray) -> None:
@@ -185,27 +182,6 @@ class _Reader:
             half = np.tan(camera.perspective.yfov / 2) * camera.perspective.aspect_ratio
             angle = float(np.degrees(2 * np.arctan(half)))
         self.scene.viewpoints.append(Viewpoint(name, matrix @ FLIP, angle))
-
-    def _fitting(self, surface: SurfaceOfPrimitive, triangles: Triangles) -> dict[str, Any] | None:
-        """The material on this mesh: repeated where pictures are passed, shining where each part of them is
-        there once, with holes that leave something of it; None if they leave nothing."""
-        material = dict(surface.material)
-        uv = triangles.texcoords
-        if uv is not None and surface.pictures_repeat and (uv.min() < -BORDER or uv.max() > 1 + BORDER):
-            material["tiled"] = True
-        if "texture" in material.get("emission", {}) and not bears_pictures_once(triangles):
-            del material["emission"]
-            self.scene.lose("pictures that shine, where parts of them are several times on a mesh")
-        if "opacity" in material:
-            opacity = self.scene.images[material["opacity"]] / 255
-            try:
-                if cut_out(triangles, opacity, tiled="tiled" in material) is None:
-                    self.scene.lose("surfaces that are all clear")
-                    return None
-            except ValueError:
-                del material["opacity"]
-                self.scene.lose("holes by pictures that are too fine for their mesh: it is whole")
-        return material
 
 
 def _lamp(light: PunctualLight) -> dict[str, object]:

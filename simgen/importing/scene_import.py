@@ -6,12 +6,13 @@ from typing import Literal
 
 from pcii.base.errors import InputError
 from simgen.importing.gltf_scene import foreign_gltf
+from simgen.importing.mitsuba_objects import foreign_mitsuba
 from simgen.importing.placement import placement_of
 from simgen.importing.scene_folder import ImportedScene, write_scene_folder
 
 Unit = Literal["mm", "cm", "m", "in", "ft"]
 METRES: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
-READERS = {".glb": foreign_gltf, ".gltf": foreign_gltf}
+READERS = {".glb": foreign_gltf, ".gltf": foreign_gltf, ".xml": foreign_mitsuba}
 
 
 def import_scene(

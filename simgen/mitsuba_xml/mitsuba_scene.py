@@ -49,6 +49,30 @@ class Plugin:
     place: str
     """File and line where it stands, for messages."""
 
+    def number(self, name: str) -> float:
+        """A parameter that is a number."""
+        value = self.parameters[name]
+        assert isinstance(value, int | float)
+        return float(value)
+
+    def vector(self, name: str) -> np.ndarray:
+        """A parameter that is a vector or point, (3,)."""
+        value = self.parameters[name]
+        assert isinstance(value, tuple)
+        return np.array(value)
+
+    def matrix(self, name: str) -> np.ndarray:
+        """A parameter that is a transform, (4, 4)."""
+        value = self.parameters[name]
+        assert isinstance(value, np.ndarray)
+        return value
+
+    def text(self, name: str) -> str:
+        """A parameter that is a text or the name of a file."""
+        value = self.parameters[name]
+        assert isinstance(value, str)
+        return value
+
 
 @dataclass(frozen=True, eq=False)
 class MitsubaScene:

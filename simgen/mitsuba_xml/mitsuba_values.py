@@ -202,14 +202,14 @@ def _look_at(step: Element) -> np.ndarray:
     ahead = _unit(target - origin, "'target' must not be at 'origin'")
     up = np.array(_three(step.attributes.get("up") or "0 0 0"))
     if not up.any():
-        up = _any_across(*ahead)
+        up = any_across(*ahead)
     left = _unit(np.cross(up, ahead), "'up' must not be along the line from 'origin' to 'target'")
     matrix = np.eye(4)
     matrix[:3] = np.stack([left, np.cross(ahead, left), ahead, origin], axis=-1)
     return matrix
 
 
-def _any_across(x: float, y: float, z: float) -> np.ndarray:
+def any_across(x: float, y: float, z: float) -> np.ndarray:
     """A unit vector at right angles to one.
 
     Duff et al., "Building an orthonormal basis, revisited" (2017), as in Mitsuba.
