@@ -36,13 +36,13 @@ class Finished:
     """Whether the outside of the shape must be its inside."""
 
 
-def finished(bsdf: Plugin | None, pictures: SurfacePictures) -> Finished:
-    """Of a bsdf that is not around another one; None is what shapes without any have.
+def finished(bsdf: Plugin | None, pictures: SurfacePictures, *, shines: bool) -> Finished:
+    """Of a bsdf that is not around another one; shapes without any are grey, or black if they shine.
 
     Raises `InputError` for a substance that is not known.
     """
     if bsdf is None:
-        return Finished(pictures.colour(0.5, "colour"))
+        return Finished(pictures.colour(0.0 if shines else 0.5, "colour"))
     making = _Finishing(bsdf, pictures)
     match bsdf.type:
         case "diffuse":
@@ -65,6 +65,7 @@ class _Finishing:
         self.rough = bsdf.type.startswith("rough")
 
     def plastic(self) -> Finished:
+        self._say_if_smooth()
         self._lose("nonlinear", "specular_reflectance")
         if abs(self._index() - PLASTIC_INDEX) > NEARLY:
             self.scene.lose(f"refractive indices of plastic other than {PLASTIC_INDEX}")
@@ -72,6 +73,7 @@ class _Finishing:
         return Finished(self._colour("diffuse_reflectance") | {"finish": finish})
 
     def metal(self) -> Finished:
+        self._say_if_smooth()
         name, tint = (
             self.bsdf.parameters.get("material", "none"),
             self.bsdf.parameters["specular_reflectance"],
@@ -144,6 +146,12 @@ class _Finishing:
             assert default is not None
             if isinstance(value, Plugin) or (reflected(value) != reflected(default)).any():
                 self.scene.lose(f"{name} of {self.bsdf.type} surfaces")
+
+    def _say_if_smooth(self) -> None:
+        if not self.rough:
+            self.scene.lose(
+                f"perfectly smooth plastic and metal: its highlights have a width of {LEAST_ALPHA}"
+            )
 
     def _has_picture_of_alpha(self) -> bool:
         return any(

@@ -16,7 +16,7 @@ from simgen.importing.mitsuba_pictures import SurfacePictures, stem_of
 from simgen.mitsuba_xml.mitsuba_scene import MitsubaScene, Plugin
 from simgen.mitsuba_xml.mitsuba_textures import MitsubaTextures, light_of, reflected
 
-HALF = 0.5
+HALF, NEARLY = 0.5, 1e-3
 AROUND = {"twosided", "mask", "normalmap", "bumpmap"}
 """Bsdfs that are around another one."""
 
@@ -70,7 +70,7 @@ class _Making:
             if len(inner) > 1:
                 self.scene.lose("backs of surfaces that differ from their fronts")
             bsdf = inner[0]
-        made = finished(bsdf, self.pictures)
+        made = finished(bsdf, self.pictures, shines=emitter is not None)
         self.material |= made.material
         finish = made.material.get("finish", {})
         is_clear = finish.get("type") == "glass" or bool(finish.get("transmission"))
@@ -84,11 +84,12 @@ class _Making:
                 self.scene.lose("bumps (bumpmap): these surfaces are smooth")
         if emitter is not None:
             self._emission(emitter)
-        two_sided = any(plugin.type == "twosided" for plugin in around)
-        pictures = self.pictures
-        return Surface(
-            made, self.material, pictures.any, pictures.to_uv, pictures.repeat, not (two_sided or is_clear)
+        # Lamps without any bsdf are black on both sides.
+        two_sided = (
+            is_clear or (bsdf is None and emitter is not None) or "twosided" in {one.type for one in around}
         )
+        pictures = self.pictures
+        return Surface(made, self.material, pictures.any, pictures.to_uv, pictures.repeat, not two_sided)
 
     def _mask(self, mask: Plugin, *, is_clear: bool) -> bool:
         """Sets holes; returns whether there is any surface."""
@@ -102,7 +103,7 @@ class _Making:
             return True
         else:
             opacity, stem = self.pictures.textures.numbers(value), stem_of(value)
-        if ((opacity > 0) & (opacity < 1)).any():
+        if ((opacity > NEARLY) & (opacity < 1 - NEARLY)).any():
             self.scene.lose("surfaces that are partly clear: they are there from an opacity of a half")
         if opacity.max() < HALF:
             return False

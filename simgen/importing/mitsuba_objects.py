@@ -5,6 +5,7 @@ Mitsuba's world has Y up as a rule; its cameras look along their +Z with X to th
 """
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ class _Reader:
         )
         self._materials = MitsubaMaterials(source, scene)
         self._meshes: dict[tuple[object, ...], Triangles] = {}
-        self._fitted: dict[tuple[Triangles, Surface], dict | None] = {}
+        self._fitted: dict[tuple[int, Surface], dict[str, Any] | None] = {}
         self._faces = 0
 
     def add_camera(self, sensor: Plugin) -> None:
@@ -119,10 +120,11 @@ class _Reader:
         if surface.finished.body == "pane":
             self.scene.lose("thin panes that are no rectangles: they are solid glass")
         mesh = self._mesh(plugin, surface, is_mirrored=bool(np.linalg.det(matrix[:3, :3]) < 0))
-        if (mesh, surface) not in self._fitted:
+        key = id(mesh), surface
+        if key not in self._fitted:
             repeat = surface.pictures_repeat
-            self._fitted[mesh, surface] = fitted(surface.material, mesh, self.scene, pictures_repeat=repeat)
-        material = self._fitted[mesh, surface]
+            self._fitted[key] = fitted(surface.material, mesh, self.scene, pictures_repeat=repeat)
+        material = self._fitted[key]
         if material is not None:
             self.scene.parts.append(Part(name, matrix, mesh, file, material))
 
