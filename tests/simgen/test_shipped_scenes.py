@@ -33,6 +33,7 @@ SCRIPTS = sorted(
 )  # the bird takes its time
 GRID = coarser(Grid().camera_grid(), 128)
 BEYOND_THE_FILM = {
+    "cornell_box": {"floor", "ceiling", "left-wall", "right-wall"},
     "desk": {"desk", "wall"},
     "drawn_solids": {"desk", "wall"},
     "outdoors": {"ground"},
