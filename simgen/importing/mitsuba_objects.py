@@ -56,12 +56,12 @@ def foreign_mitsuba(path: Path, metres_per_unit: float) -> ForeignScene:
         match plugin.category:
             case "shape":
                 reader.add_shape(plugin, np.eye(4), "")
-            case "emitter":
+            case "emitter" if plugin.type != "area":
                 add_light(plugin, scene, path.parent)
             case "sensor":
                 reader.add_camera(plugin)
             case _:
-                pass  # bsdfs and textures that shapes refer to
+                pass  # bsdfs, textures and area emitters that shapes refer to
     return scene
 
 
