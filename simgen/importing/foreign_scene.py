@@ -20,7 +20,7 @@ class Part:
     matrix: np.ndarray
     """(4, 4) float64, from the axes of the shape to those of the file; positions are columns."""
     shape: Triangles | Shape
-    """Triangles in the file's unit, or a sphere or card whose millimetres are the file's unit."""
+    """Triangles in the file's unit, or a sphere, card or box whose millimetres are the file's unit."""
     file: str
     """Stem of the mesh's file; parts with one stem have one mesh."""
     material: dict[str, Any]

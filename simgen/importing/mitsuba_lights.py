@@ -27,7 +27,7 @@ BEAM = 0.75
 
 def shining(field: str, rgb: np.ndarray) -> dict[str, Any]:
     """The values of a light or emission: its luminance, as `field`, and its colour, of linear sRGB (3,)."""
-    values: dict[str, Any] = {field: float(rgb @ LUMINANCE)}
+    values: dict[str, Any] = {field: float(f"{rgb @ LUMINANCE:.9g}")}
     if np.ptp(rgb):
         values["illuminant"] = srgb_of(rgb / rgb.max())
     return values

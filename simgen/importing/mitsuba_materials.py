@@ -32,6 +32,8 @@ class Surface:
     to_uv: np.ndarray
     """(3, 3), which moves Mitsuba's texture coordinates."""
     pictures_repeat: bool
+    is_clear: bool
+    """Whether light passes through it."""
     dark_behind: bool
     """Whether in the file it is black from behind."""
 
@@ -85,11 +87,17 @@ class _Making:
         if emitter is not None:
             self._emission(emitter)
         # Lamps without any bsdf are black on both sides.
-        two_sided = (
-            is_clear or (bsdf is None and emitter is not None) or "twosided" in {one.type for one in around}
+        dark_lamp = bsdf is None and emitter is not None
+        pictures, two_sided = self.pictures, any(plugin.type == "twosided" for plugin in around)
+        return Surface(
+            finished=made,
+            material=self.material,
+            has_pictures=pictures.any,
+            to_uv=pictures.to_uv,
+            pictures_repeat=pictures.repeat,
+            is_clear=is_clear,
+            dark_behind=not (is_clear or two_sided or dark_lamp),
         )
-        pictures = self.pictures
-        return Surface(made, self.material, pictures.any, pictures.to_uv, pictures.repeat, not two_sided)
 
     def _mask(self, mask: Plugin, *, is_clear: bool) -> bool:
         """Sets holes; returns whether there is any surface."""

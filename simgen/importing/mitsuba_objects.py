@@ -31,6 +31,7 @@ from simgen.mitsuba_xml.mitsuba_triangles import (
     turned_over,
 )
 from simgen.mitsuba_xml.mitsuba_values import any_across
+from simgen.spec.scene import MOST_OBJECTS
 from simgen.spec.shapes import Box, Card, Shape, Sphere
 
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
@@ -77,14 +78,14 @@ class _Reader:
         self._materials = MitsubaMaterials(source, scene)
         self._meshes: dict[tuple[object, ...], Triangles] = {}
         self._fitted: dict[tuple[int, Surface], dict[str, Any] | None] = {}
-        self._faces = 0
+        self._faces = self._shapes = 0
 
     def add_camera(self, sensor: Plugin) -> None:
         given, number = sensor.parameters, len(self.scene.viewpoints) + 1
         to_world, known = sensor.matrix("to_world"), "fov" in given and given["fov_axis"] == "x"
         if np.linalg.det(to_world[:3, :3]) < 0:
             self.scene.lose("cameras that mirror what they see")
-        if given["principal_point_offset_x"] or given["principal_point_offset_y"]:
+        if given.get("principal_point_offset_x") or given.get("principal_point_offset_y"):
             self.scene.lose("principal points of cameras beside the middle of their films")
         if sensor.type == "thinlens":
             self.scene.lose("apertures of cameras, which recipes set")
@@ -100,6 +101,11 @@ class _Reader:
             for part in plugin.parts[0].parts:
                 self.add_shape(part, matrix, plugin.id)
             return
+        self._shapes += 1
+        if self._shapes > MOST_OBJECTS:
+            raise InputError(
+                f"{self._path}: has more than {MOST_OBJECTS} shapes, instances of a group included"
+            )
         file = Path(plugin.text("filename")).stem if plugin.type in FILES else plugin.type
         name = name or plugin.id or file
         if not np.linalg.det(matrix[:3, :3]):
@@ -194,12 +200,13 @@ def _plain(plugin: Plugin, surface: Surface, matrix: np.ndarray) -> tuple[Shape,
     if np.abs(axes.T @ axes - np.eye(3)).max() > SQUARE:
         return None
     turned = _is_turned(plugin, surface, is_mirrored=bool(np.linalg.det(axes) < 0))
-    # Else both sides look the same.
-    has_inside = "emission" in surface.material or not surface.dark_behind
+    # What neither shines nor lets light through looks the same from both sides.
+    has_inside = "emission" in surface.material or surface.is_clear
+    may_be_solid = surface.finished.body != "pane" and not (turned and has_inside)
     match plugin.type:
-        case "sphere" if np.ptp(lengths) <= SQUARE * lengths.max() and not (turned and has_inside):
+        case "sphere" if may_be_solid and np.ptp(lengths) <= SQUARE * lengths.max():
             return Sphere(radius_mm=1.0), np.eye(4)
-        case "cube" if not (turned and has_inside):
+        case "cube" if may_be_solid:
             return Box(width_mm=2.0, height_mm=2.0, depth_mm=2.0), np.eye(4)
         case "rectangle" if surface.finished.body != "solid":
             # A card shows its front towards -Z.

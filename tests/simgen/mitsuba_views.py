@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+from mitsuba_elements import look, number, text, to_world
 from scipy import stats
 
 from pcii.core.camera_grid import CameraGrid
@@ -17,22 +18,13 @@ REPEATS = 24
 """Renderings of each kind, from which the noise is known."""
 FALSE_ALARM = 1e-4
 """Probability of calling two scenes different that are the same."""
-EYE = "1,2,-5"
-FRAME = """<scene version="3.0.0">
-<integrator type="path"><integer name="max_depth" value="{depth}"/></integrator>
-<sensor type="perspective"><float name="fov" value="{fov}"/>
-<transform name="to_world"><lookat origin="{eye}" target="{target}" up="0,1,0"/></transform>
-<film type="hdrfilm"><integer name="width" value="{width}"/><integer name="height" value="{height}"/>
-<string name="component_format" value="float32"/><rfilter type="box"/></film></sensor>
-{content}
-</scene>"""
 
 
 def views_of(
     content: str,
     folder: Path,
     *,
-    eye: str = EYE,
+    eye: str = "1,2,-5",
     target: str = "0,0,0",
     fov: float = 40.0,
     depth: int = 4,
@@ -40,14 +32,21 @@ def views_of(
 ) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:
     """Means over tiles of renderings (K, H, W, 3), ours and Mitsuba's, and what we say is left out."""
     file = folder / "scene.xml"
-    size = {"height": HEIGHT, "width": WIDTH}
-    file.write_text(FRAME.format(content=content, eye=eye, target=target, fov=fov, depth=depth, **size))
+    frame = [
+        f'<integrator type="path"><integer name="max_depth" value="{depth}"/></integrator>',
+        f'<sensor type="perspective">{number("fov", fov)}{to_world(look(eye, target))}<film type="hdrfilm">',
+        f'<integer name="height" value="{HEIGHT}"/><integer name="width" value="{WIDTH}"/>',
+        f'{text("component_format", "float32")}<rfilter type="box"/></film></sensor>',
+    ]
+    file.write_text(f'<scene version="3.0.0">{"".join(frame)}{content}</scene>')
     said = import_scene(file, folder / "scene", unit="mm")
     scene, own_folder = load_scene(str(folder / "scene"))
     mi = backend.load()
     built, original = build(mi, scene, own_folder, depth), mi.load_file(str(file))
     focal_mm = WIDTH / 2 / np.tan(np.radians(fov / 2))
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=focal_mm, pixel_mm=1.0, **size)
+    grid = CameraGrid(
+        rows=1, cols=1, pitch_mm=(1, 1), focal_mm=focal_mm, pixel_mm=1.0, height=HEIGHT, width=WIDTH
+    )
     ours = [
         render_view(built, grid, 0, 0, samples_per_pixel=samples, seed=seed, independent=True)
         for seed in range(REPEATS)

@@ -31,7 +31,7 @@ def rays(inwards: bool) -> tuple[np.ndarray, np.ndarray]:
     """Origins and directions (N, 3) from around to the middle of a shape, or out of it."""
     away = RNG.normal(size=(200, 3))
     away *= 4 / np.linalg.norm(away, axis=1, keepdims=True)
-    through = RNG.uniform(-0.4, 0.4, (200, 3)) + [0, 0, 0.5]
+    through = RNG.uniform((-0.4, -0.4, 0.1), (0.4, 0.4, 0.9), (200, 3))
     return (away + through, -away) if inwards else (through, away)
 
 
