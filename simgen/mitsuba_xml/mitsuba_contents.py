@@ -27,6 +27,8 @@ def read_named(
         str(plugin.parameters["filename"]) for plugin in _used_plugins(scene) if plugin.type in types
     )
     paths = {name: asset(scene.path.parent, name, str(scene.path)) for name in names}
+    if not paths:
+        return {}  # without a process that would read nothing
     contents, total = {}, 0
     for (name, path), content in zip(paths.items(), read(paths.values()), strict=True):
         contents[name] = content
