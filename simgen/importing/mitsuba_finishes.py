@@ -81,6 +81,8 @@ class _Finishing:
         is_ours = name in OUR_METALS and not isinstance(tint, Plugin) and (reflected(tint) == 1).all()
         if is_ours and not self._has_picture_of_alpha():
             return Finished({"finish": {"type": "metal", "name": name, "roughness": self._alpha()}})
+        if name != "none" or {"eta", "k"} & self.bsdf.parameters.keys():
+            self.scene.lose("metals but for six: how they reflect at an angle is Schlick's estimate")
         finish = {"type": "principled", "metallic": 1.0, "roughness": self._roughness()}
         return Finished(self.pictures.colour(tint, "colour", self._straight(str(name))) | {"finish": finish})
 
