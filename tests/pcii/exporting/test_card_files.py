@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 from stored_datasets import make_dataset, one_sentence
 
 import pcii
+from pcii.base.errors import InputError
 from pcii.exporting.card_files import write_card
 from pcii.exporting.publication_terms import CITATION, CREATOR, LICENCE, Terms
 from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
@@ -39,6 +40,20 @@ def make_collection(root: Path) -> Path:
     COLLECTION_FOLDER.write(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
     write_index(root, rows)
     return root
+
+
+@pytest.mark.parametrize("kind", ["dataset", "collection"])
+def test_what_a_kill_left_of_a_card_is_swept(tmp_path: Path, kind: str) -> None:
+    root = make_collection(tmp_path / "all") if kind == "collection" else make_dataset(tmp_path / "data")
+    write_card(root, TERMS)
+    before = (root / CARD).read_bytes()
+    for name in (CARD, CROISSANT):
+        (root / f".{name}.abcd1234.tmp").write_bytes(before[:9])
+    with pytest.raises(InputError, match=r"not listed in .*, and read by nothing"):
+        verify(root)
+    write_card(root, TERMS)
+    assert verify(root)
+    assert (root / CARD).read_bytes() == before
 
 
 def read_croissant(root: Path) -> tuple[mlcroissant.Dataset, dict]:
