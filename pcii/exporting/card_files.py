@@ -32,7 +32,7 @@ from pcii.io.dataset_layout import (
 )
 from pcii.store.file_list import list_files
 from pcii.store.hashes import hash_bytes
-from pcii.store.safe_files import locked, write_bytes_safely
+from pcii.store.safe_files import locked, temporaries_of, write_bytes_safely
 from pcii.store.sealed_json import read_sealed, write_sealed
 
 JSON, JSON_LINES, ZARR, EXR = (
@@ -61,20 +61,15 @@ def write_card(root: Path, terms: Terms) -> None:
     content = card.encode(errors="backslashreplace")
     entry = {"bytes": len(content), "sha256": hash_bytes(content)}
     document = croissant(replace(said, files={CARD: entry, **said.files}), terms)
-    if _is_written(root, content, document) and not _temporaries(root):
+    if _is_written(root, content, document) and not temporaries_of(root, CARD, CROISSANT):
         return
     if (root / CARD).exists() and not (root / CROISSANT).exists():
         raise InputError(f"{root / CARD}: is not a card of this dataset's; move it away")
     with locked(root / (COLLECTION if is_collection(root) else MANIFEST), wait=True):
-        for left in _temporaries(root):
+        for left in temporaries_of(root, CARD, CROISSANT):
             left.unlink()
         write_sealed(root / CROISSANT, document)
         write_bytes_safely(root / CARD, content)
-
-
-def _temporaries(root: Path) -> list[Path]:
-    """Cards that a process left half written which was killed."""
-    return [*root.glob(f".{CARD}.*.tmp"), *root.glob(f".{CROISSANT}.*.tmp")]
 
 
 def _is_written(root: Path, card: bytes, document: Mapping[str, Any]) -> bool:

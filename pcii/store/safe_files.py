@@ -114,6 +114,11 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
+def temporaries_of(folder: Path, *names: str) -> list[Path]:
+    """Temporary files of these files that killed processes left in the folder."""
+    return [left for name in names for left in folder.glob(f".{name}.*.tmp")]
+
+
 def sweep_temporaries(root: Path) -> None:
     """Remove temporary files and folders that an interrupted run left in `root` and its folders."""
     for path in [*root.glob(".*.tmp"), *root.glob("*/.*.tmp")]:

@@ -1,7 +1,7 @@
 """The `simgen` command.
 
-authoring_commands   Commands that write files to start from: a scene, a recipe, one draw of a distribution of
-                     scenes.
+authoring_commands   Commands that write scenes and recipes: to start from, one draw of many, from another
+                     program's file.
 commands             The `simgen` command.
 distribution_schema  The JSON Schema of scene files: that of one scene, and a distribution wherever a
                      value may be drawn.

@@ -85,8 +85,8 @@ def import_scene(
 ) -> None:
     """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
 
-    Objects keep their names. The scene stands before a camera of the file, or where you say. What has no
-    counterpart here is told.
+    Objects keep their names. The scene stands before a camera of the file, or where you say. What cannot
+    be represented is listed.
 
     Examples of use:
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from simgen.assets.triangles import Triangles, check_counts, fan_all
+from simgen.assets.triangles import Triangles, barycentric, check_counts, cross_2d, fan_all
 
 FULL = 0.5
 """From this opacity on there is a surface."""
@@ -62,7 +62,7 @@ def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles |
     sums = full[:-1, :-1] + 2 * full[:-1, 1:] + 4 * full[1:, 1:] + 8 * full[1:, :-1]
     whole, cut = _all_in(sums == 15, corners), ~_all_in(sums == 0, corners)
     # A triangle that is a line on the picture is there if its first corner is.
-    line = np.abs(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) < OVERLAP**2
+    line = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) < OVERLAP**2
     col, row = np.round(corners[:, 0]).astype(np.int64).T
     whole = np.where(line, full[row, col] > 0, whole)
     parts = [
@@ -78,10 +78,6 @@ def _spread(opacity: np.ndarray, first: np.ndarray, last: np.ndarray, tiled: boo
     if tiled:
         return opacity[np.ix_(row % len(opacity), col % opacity.shape[1])]
     return opacity[np.ix_(np.clip(row, 0, len(opacity) - 1), np.clip(col, 0, opacity.shape[1] - 1))]
-
-
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
 
 
 def _all_in(flag: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -151,11 +147,11 @@ def _clipped(
         owner, piece = np.nonzero(((low < most + OVERLAP) & (high > least - OVERLAP)).all(axis=2))
         polygons, number = shapes[piece], counts[piece]
         triangle = corners[some[owner]]
-        across = _cross(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
+        across = cross_2d(triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0])
         turn, doubled = np.sign(across), np.abs(across)
         for side in range(3):
             begin, along = triangle[:, side], triangle[:, (side + 1) % 3] - triangle[:, side]
-            inside = turn[:, None] * _cross(along[:, None], polygons - begin[:, None])
+            inside = turn[:, None] * cross_2d(along[:, None], polygons - begin[:, None])
             inside += OVERLAP * np.minimum(np.linalg.norm(along, axis=1), doubled)[:, None]
             polygons, number = _on_one_side(polygons, number, inside)
         left = number >= 3
@@ -188,11 +184,7 @@ def _lifted(
     """Polygons on the picture as triangles, the mesh's face under each corner, and shares of it."""
     real = np.arange(polygons.shape[1]) < counts[:, None]
     points, of = polygons[real], np.repeat(owner, counts)
-    a, b, c = np.moveaxis(corners[of], 1, 0)
-    area = _cross(b - a, c - a)
-    second, third = _cross(points - a, c - a) / area, _cross(b - a, points - a) / area
-    shares = np.stack([1 - second - third, second, third], axis=-1)
-    return fan_all(np.arange(len(points)), counts), of, shares
+    return fan_all(np.arange(len(points)), counts), of, barycentric(points, corners[of])
 
 
 def _joined(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from simgen.assets.triangles import Triangles
+from simgen.assets.triangles import Triangles, barycentric
 
 PAIRS_AT_ONCE = 1 << 22
 INSIDE = 1e-4
@@ -68,18 +68,9 @@ def bears_pictures_once(mesh: Triangles) -> bool:
         some, of = uv[start : start + chunk], corner[start : start + chunk]
         near = (at[None] > some.min(axis=1)[:, None]) & (at[None] < some.max(axis=1)[:, None])
         triangle, point = np.nonzero(near.all(axis=2))
-        a, b, c = np.moveaxis(some[triangle], 1, 0)
-        doubled = _cross(b - a, c - a)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            second = _cross(at[point] - a, c - a) / doubled
-            third = _cross(b - a, at[point] - a) / doubled
-        shares = np.stack([1 - second - third, second, third], axis=-1)
+        shares = barycentric(at[point], some[triangle])
         inside = (shares > INSIDE).all(axis=1)
         found = np.einsum("nc,ncd->nd", shares[inside], of[triangle[inside]])
         if (np.linalg.norm(found - place[point[inside]], axis=1) > reach).any():
             return False
     return True
-
-
-def _cross(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]

@@ -56,6 +56,8 @@ def _scaled(shape: Mesh, mesh: Triangles) -> Triangles:
             f"shape.scale: with this the mesh {shape.file!r} is {extent:g} mm large and reaches "
             f"{reach:g} mm from its origin; {SMALLEST_MM:g} to {LARGEST_MM:g} mm are allowed"
         )
+    if (scales == 1).all():
+        return mesh
     # A mirror turns the order of corners, which says where outside is.
     faces = mesh.faces if scales.prod() > 0 else mesh.faces[:, ::-1]
     return Triangles.checked(

@@ -94,6 +94,20 @@ def fan_all(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)[np.argsort(np.concatenate(order), kind="stable")]
 
 
+def cross_2d(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Cross product of vectors (..., 2) in a plane: twice the area of the triangle between them, signed."""
+    return one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]
+
+
+def barycentric(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Barycentric coordinates (N, 3) of points (N, 2) in triangles (N, 3, 2); not finite in flat ones."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        second = cross_2d(points - a, c - a) / cross_2d(b - a, c - a)
+        third = cross_2d(b - a, points - a) / cross_2d(b - a, c - a)
+    return np.stack([1 - second - third, second, third], axis=-1)
+
+
 def _check(what: str, array: np.ndarray, shape: tuple[int, ...], dtype: type) -> None:
     if array.shape != shape or array.dtype != dtype:
         raise ValueError(f"{what}: expected {shape} {dtype.__name__}, got {array.shape} {array.dtype}")

@@ -43,14 +43,14 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
     def __init__(self, /, **values: Any) -> None:
-        with _told(type(self), type(self).__name__):
+        with _as_input_errors(type(self), type(self).__name__):
             super().__init__(**values)
 
     # So pydantic validates a table within another without a call of it, and faults keep their place.
     __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        with _told(type(self), type(self).__name__):
+        with _as_input_errors(type(self), type(self).__name__):
             super().__setattr__(name, value)
 
     def change(self, **fields: Any) -> Self:
@@ -129,13 +129,13 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
     """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy."""
-    with _told(model, source):
+    with _as_input_errors(model, source):
         return model.model_validate(values)
 
 
 @contextmanager
-def _told(model: type[BaseModel], source: str) -> Iterator[None]:
-    """Tells what pydantic finds wrong with values of a model as `InputError`."""
+def _as_input_errors(model: type[BaseModel], source: str) -> Iterator[None]:
+    """Raises what pydantic finds wrong with values of a model as `InputError`."""
     try:
         yield
     except ValidationError as fault:

@@ -19,7 +19,7 @@ from pcii.io.collection_layout import (
     write_index,
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
-from pcii.store.safe_files import locked
+from pcii.store.safe_files import locked, temporaries_of
 from simgen.dataset.software import decisive_versions, other_versions
 from simgen.spec.sweeps import Sweep
 
@@ -78,16 +78,11 @@ def write_whole_index(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> None:
     Others are those that the index listed before, and those that other processes have finished. Nothing is
     written where that is there already, so that a folder that is read-only will do.
     """
-    if _temporaries(out) or not _is_listed(out, _finished_rows(sweep, out, rows)):
+    if temporaries_of(out, INDEX, COLLECTION) or not _is_listed(out, _finished_rows(sweep, out, rows)):
         with locked(out / COLLECTION, wait=True):
-            for left in _temporaries(out):
+            for left in temporaries_of(out, INDEX, COLLECTION):
                 left.unlink()
             write_index(out, _finished_rows(sweep, out, rows))
-
-
-def _temporaries(out: Path) -> list[Path]:
-    """Files that a process left which was killed."""
-    return [*out.glob(f".{INDEX}.*.tmp"), *out.glob(f".{COLLECTION}.*.tmp")]
 
 
 def _is_listed(out: Path, rows: Sequence[Row]) -> bool:

@@ -6,10 +6,15 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.srgb import LUMINANCE
 from simgen.assets.triangles import Triangles
+from simgen.base.srgb import srgb_of
 from simgen.spec.shapes import Shape
 
 LONGEST_STEM = 100
+LARGEST_CONE_DEG = 89.0
+LEAST_EDGE_DEG = 0.1
+"""A spot's light falls off within so many degrees at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,3 +96,18 @@ class ForeignScene:
         """Say once what could not be represented."""
         if what not in self.left_out:
             self.left_out.append(what)
+
+
+def light_values(field: str, rgb: np.ndarray) -> dict[str, Any]:
+    """The values of a light or emission: its luminance, as `field`, and its colour, of linear sRGB (3,)."""
+    values: dict[str, Any] = {field: float(f"{rgb @ LUMINANCE:.9g}")}
+    if np.ptp(rgb):
+        values["illuminant"] = srgb_of(rgb / rgb.max())
+    return values
+
+
+def cone_values(beam_deg: float, cutoff_deg: float) -> dict[str, float]:
+    """The angles of a spot, within what a scene allows."""
+    cutoff_deg = min(max(cutoff_deg, LEAST_EDGE_DEG), LARGEST_CONE_DEG)
+    beam_deg = min(max(beam_deg, 0.0), cutoff_deg - LEAST_EDGE_DEG)
+    return {"beam_deg": round(beam_deg, 6), "cutoff_deg": round(cutoff_deg, 6)}

@@ -9,17 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
+from pcii.base.srgb import linear_to_srgb, srgb_to_linear
+from simgen.base.srgb import srgb_of
 from simgen.gltf.gltf_file import GltfFile
 from simgen.gltf.gltf_surfaces import Material, MaterialExtensions, Texture, TextureInfo
-from simgen.importing.foreign_scene import ForeignScene
+from simgen.importing.foreign_scene import ForeignScene, light_values
 from simgen.importing.gltf_pictures import pictures_of
+from simgen.spec.materials import LEAST_INDEX, MOST_INDEX
 
 HALF = 0.5
 REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
 """How pictures go on beyond their borders, as OpenGL numbers it."""
 OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
-LEAST_IOR, MOST_IOR = 1.01, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class _Making:
             return None
         factor = np.array(pbr.base_color_factor[:3])
         if base is None:
-            made["reflectance"] = _colour(factor)
+            made["reflectance"] = srgb_of(factor)
         else:
             made["texture"] = self.scene.keep(f"{self.name}-colour", _tinted(base[..., :3], factor))
         finish: dict[str, Any] = {"type": "principled"}
@@ -169,7 +170,7 @@ class _Making:
         """With `specular` that index whose highlights are as strong as the file says."""
         index = 1.5 if more.ior is None else more.ior.ior
         if index == 0:  # by KHR_materials_ior the largest of all
-            index = MOST_IOR
+            index = MOST_INDEX
         if more.specular is not None:
             spec = more.specular
             if spec.specular_texture is not None or spec.specular_color_texture is not None:
@@ -178,7 +179,7 @@ class _Making:
                 self.scene.lose(f"the specular colour of material '{self.name}'")
             straight = abs((index - 1) / (index + 1)) * np.sqrt(spec.specular_factor)
             index = (1 + straight) / (1 - straight)
-        return round(float(np.clip(index, LEAST_IOR, MOST_IOR)), 6)
+        return round(float(np.clip(index, LEAST_INDEX, MOST_INDEX)), 6)
 
     def _normals(self, made: dict[str, Any], *, is_clear: bool) -> None:
         info = self.material.normal_texture
@@ -207,8 +208,7 @@ class _Making:
         if self.material.emissive_texture is not None and pixels is None:
             return
         if pixels is None:
-            luminance = float(factor @ LUMINANCE)
-            made["emission"] = {"luminance_cd_m2": luminance, "illuminant": _colour(factor / factor.max())}
+            made["emission"] = light_values("luminance_cd_m2", factor)
         elif pixels[..., :3].any():
             # White of the new picture has the luminance of the strongest factor.
             file = self.scene.keep(f"{self.name}-emission", _tinted(pixels[..., :3], factor / factor.max()))
@@ -237,10 +237,6 @@ def _uv_matrix(transform: tuple[float, ...]) -> np.ndarray:
     x, y, angle, width, height = transform
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c * width, s * height, x], [-s * width, c * height, y], [0, 0, 1]])
-
-
-def _colour(linear: np.ndarray) -> list[float]:
-    return [round(float(part), 6) for part in linear_to_srgb(np.clip(linear, 0, 1))]
 
 
 def _tinted(pixels: np.ndarray, factor: np.ndarray) -> np.ndarray:

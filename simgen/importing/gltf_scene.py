@@ -9,22 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE, linear_to_srgb
 from simgen.assets.triangles import MOST_FACES, Triangles
 from simgen.gltf.gltf_arrays import triangles_of
 from simgen.gltf.gltf_file import GltfFile, read_gltf
 from simgen.gltf.gltf_models import Node, PunctualLight
 from simgen.importing.fitted_materials import fitted
-from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
+from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint, cone_values, light_values
 from simgen.importing.gltf_materials import GltfMaterials
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
 DEEPEST = 500
 """Nodes that may lie within each other."""
-LARGEST_CONE_DEG = 89.0
-LEAST_EDGE_DEG = 0.1
-"""A spot's light falls off within so many degrees at least."""
 
 
 def foreign_gltf(path: Path, metres_per_unit: float) -> ForeignScene:
@@ -184,17 +180,11 @@ class _Reader:
         self.scene.viewpoints.append(Viewpoint(name, matrix @ FLIP, angle))
 
 
-def _lamp(light: PunctualLight) -> dict[str, object]:
+def _lamp(light: PunctualLight) -> dict[str, Any]:
     """KHR_lights_punctual: intensity times colour, in candela or, directional, in lux."""
-    rgb = np.array(light.color)
-    of_white = float(rgb @ LUMINANCE)
-    values: dict[str, object] = {"type": light.type}
-    values["illuminance_lux" if light.type == "directional" else "intensity_cd"] = light.intensity * of_white
+    field = "illuminance_lux" if light.type == "directional" else "intensity_cd"
+    values = {"type": light.type, **light_values(field, light.intensity * np.array(light.color))}
     if light.type == "spot":
-        cutoff = float(np.clip(np.degrees(light.spot.outer_cone_angle), LEAST_EDGE_DEG, LARGEST_CONE_DEG))
-        beam = float(np.degrees(light.spot.inner_cone_angle))
-        values["beam_deg"] = round(min(beam, cutoff - LEAST_EDGE_DEG), 6)
-        values["cutoff_deg"] = round(cutoff, 6)
-    if np.ptp(rgb):
-        values["illuminant"] = [round(float(part), 6) for part in linear_to_srgb(rgb / rgb.max())]
+        beam, cutoff = light.spot.inner_cone_angle, light.spot.outer_cone_angle
+        values |= cone_values(float(np.degrees(beam)), float(np.degrees(cutoff)))
     return values

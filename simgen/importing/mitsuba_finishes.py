@@ -15,12 +15,11 @@ from simgen.mitsuba_xml.mitsuba_plugins import ALLOWED
 from simgen.mitsuba_xml.mitsuba_scene import Plugin
 from simgen.mitsuba_xml.mitsuba_substances import METALS, REFRACTIVE_INDEX
 from simgen.mitsuba_xml.mitsuba_textures import Given, light_of, reflected
-from simgen.spec.materials import Metal
+from simgen.spec.materials import LEAST_INDEX, MOST_INDEX, Metal
 
 LEAST_ALPHA = 0.001
 PLASTIC_INDEX = 1.49
 NEARLY = 0.005
-LEAST_INDEX, MOST_INDEX = 1.01, 3.0
 OUR_METALS = get_args(Metal.model_fields["name"].annotation)
 NOT_IN_PRINCIPLED = "anisotropic", "spec_tint", "sheen", "sheen_tint", "flatness"
 

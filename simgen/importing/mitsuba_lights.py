@@ -5,32 +5,26 @@ Radiance is linear sRGB whose luminance is in cd/m^2, so that pictures of both h
 """
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import read_environment
 from simgen.base.asset_names import asset
-from simgen.importing.foreign_scene import ForeignScene, Lamp, Surroundings
+from simgen.importing.foreign_scene import (
+    LARGEST_CONE_DEG,
+    ForeignScene,
+    Lamp,
+    Surroundings,
+    cone_values,
+    light_values,
+)
 from simgen.mitsuba_xml.mitsuba_scene import Plugin
-from simgen.mitsuba_xml.mitsuba_textures import light_of, srgb_of
+from simgen.mitsuba_xml.mitsuba_textures import light_of
 from simgen.mitsuba_xml.mitsuba_values import any_across
 
-LARGEST_CONE_DEG = 89.0
-LEAST_EDGE_DEG = 0.1
-"""A spot's light falls off within so many degrees at least."""
 BEAM = 0.75
 """Of the cutoff angle, without a beam width."""
-
-
-def shining(field: str, rgb: np.ndarray) -> dict[str, Any]:
-    """The values of a light or emission: its luminance, as `field`, and its colour, of linear sRGB (3,)."""
-    values: dict[str, Any] = {field: float(f"{rgb @ LUMINANCE:.9g}")}
-    if np.ptp(rgb):
-        values["illuminant"] = srgb_of(rgb / rgb.max())
-    return values
 
 
 def add_light(emitter: Plugin, scene: ForeignScene, folder: Path) -> None:
@@ -57,7 +51,7 @@ def add_light(emitter: Plugin, scene: ForeignScene, folder: Path) -> None:
         return
     values = {"type": "uniform" if emitter.type == "constant" else emitter.type}
     # An intensity per square unit of the file, in cd.
-    values |= shining(field, rgb * (scene.mm / 1000) ** 2 if field == "intensity_cd" else rgb)
+    values |= light_values(field, rgb * (scene.mm / 1000) ** 2 if field == "intensity_cd" else rgb)
     match emitter.type:
         case "constant":
             _check_alone(emitter, scene)
@@ -97,11 +91,10 @@ def _cone(spot: Plugin, scene: ForeignScene) -> dict[str, float]:
         scene.lose("pictures that spots throw")
     given = spot.number("cutoff_angle")
     beam = spot.number("beam_width") if "beam_width" in spot.parameters else BEAM * given
-    cutoff = min(max(given, LEAST_EDGE_DEG), LARGEST_CONE_DEG)
-    beam = min(max(beam, 0.0), cutoff - LEAST_EDGE_DEG)
-    if cutoff != given:
+    cone = cone_values(beam, given)
+    if abs(cone["cutoff_deg"] - given) > 1e-6:
         scene.lose(f"spots wider than {LARGEST_CONE_DEG:g} degrees from their axis")
-    return {"beam_deg": round(beam, 6), "cutoff_deg": round(cutoff, 6)}
+    return cone
 
 
 def _check_alone(emitter: Plugin, scene: ForeignScene) -> None:

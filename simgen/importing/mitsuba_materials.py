@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from pcii.base.srgb import LUMINANCE
-from simgen.importing.foreign_scene import ForeignScene
+from simgen.importing.foreign_scene import ForeignScene, light_values
 from simgen.importing.mitsuba_finishes import Finished, finished
-from simgen.importing.mitsuba_lights import shining
 from simgen.importing.mitsuba_pictures import SurfacePictures, stem_of
 from simgen.mitsuba_xml.mitsuba_scene import MitsubaScene, Plugin
 from simgen.mitsuba_xml.mitsuba_textures import MitsubaTextures, light_of, reflected
@@ -150,4 +149,4 @@ class _Making:
             return
         rgb = self.pictures.flat(radiance, "light", light_of)
         if rgb.any():
-            self.material["emission"] = shining("luminance_cd_m2", rgb)
+            self.material["emission"] = light_values("luminance_cd_m2", rgb)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.srgb import LUMINANCE
+from simgen.base.srgb import srgb_of
 from simgen.importing.foreign_scene import ForeignScene
 from simgen.mitsuba_xml.mitsuba_scene import Plugin
 from simgen.mitsuba_xml.mitsuba_textures import (
@@ -14,7 +15,6 @@ from simgen.mitsuba_xml.mitsuba_textures import (
     MitsubaTextures,
     reflectance_of,
     reflected,
-    srgb_of,
 )
 
 WHITE = np.ones(3)

@@ -16,11 +16,11 @@ def turned(surroundings: Surroundings, rotation: np.ndarray) -> tuple[np.ndarray
     turn = rotation @ surroundings.matrix[:3, :3]
     if turn[1, 1] > 1 - UPRIGHT:
         return surroundings.pixels, round(float(np.degrees(np.arctan2(turn[0, 2], turn[2, 2]))), 9) + 0.0
-    return _seen_from(surroundings.pixels, turn), 0.0
+    return _rotated(surroundings.pixels, turn), 0.0
 
 
-def _seen_from(pixels: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """The image that shows in each direction what `pixels` shows in that direction turned back.
+def _rotated(pixels: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """The image after the rotation `turn` (3, 3) of its directions.
 
     Rows lie at polar angles from 0 to pi, columns in the middle of equal parts of the circle.
     """

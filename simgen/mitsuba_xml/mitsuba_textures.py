@@ -11,7 +11,7 @@ import numpy as np
 
 from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
 from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_pictures
-from simgen.base.srgb import FROM_XYZ
+from simgen.base.srgb import FROM_XYZ, srgb_of
 from simgen.mitsuba_xml.mitsuba_contents import read_named
 from simgen.mitsuba_xml.mitsuba_scene import MitsubaScene, Plugin, Rgb, SpectrumValues, Value
 from simgen.spectral.spectra import DAYLIGHT, WAVELENGTH_NM, illuminant, integral, observer, resampled
@@ -68,11 +68,6 @@ def reflectance_of(value: Given) -> list[float] | dict[str, list[float]]:
     if last < WAVELENGTH_NM[-1]:
         table[last + BESIDE] = 0.0
     return {"wavelength_nm": [*table], "value": [*table.values()]}
-
-
-def srgb_of(linear: np.ndarray) -> list[float]:
-    """Linear values (3,), cut to 0 to 1, as sRGB of six digits."""
-    return [round(float(part), 6) for part in linear_to_srgb(linear)]
 
 
 class MitsubaTextures:

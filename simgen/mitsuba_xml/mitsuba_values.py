@@ -196,7 +196,7 @@ def _rotate(step: Element) -> np.ndarray:
     return matrix
 
 
-def _look_at(step: Element) -> np.ndarray:
+def _lookat_matrix(step: Element) -> np.ndarray:
     """To the origin, +Z turned to the target, +Y as near to `up` as can be and +X to the left."""
     origin, target = (np.array(_three(step.attributes[key])) for key in ("origin", "target"))
     ahead = _unit(target - origin, "'target' must not be at 'origin'")
@@ -243,6 +243,6 @@ STEPS = {
     "translate": _translate,
     "scale": _scale,
     "rotate": _rotate,
-    "lookat": _look_at,
+    "lookat": _lookat_matrix,
     "matrix": _matrix,
 }

@@ -14,7 +14,7 @@ from simgen.renderer.emission import emission_plugin, object_lux
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape
-from simgen.renderer.mitsuba_surfaces import look_of, matt, painted_patterns, surface_plugin, two_sided
+from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_key, surface_plugin, two_sided
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spectral.filters import Filters, filters_for
@@ -135,10 +135,10 @@ def _object(
 ) -> Any:
     """The shape of an object; `surfaces` are those made so far, which objects that look alike share."""
     try:
-        look = look_of(thing.material, thing.shape, assets)
-        if look not in surfaces:
-            surfaces[look] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
-        return placed_shape(mi, thing, assets, surfaces[look], emission_plugin(mi, thing, assets, gain))
+        key = surface_key(thing.material, thing.shape, assets)
+        if key not in surfaces:
+            surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
+        return placed_shape(mi, thing, assets, surfaces[key], emission_plugin(mi, thing, assets, gain))
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None
 

@@ -46,8 +46,8 @@ def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | Non
         yield from pool.map(pixels, things)
 
 
-def look_of(material: Material, shape: Shape, assets: Assets) -> Hashable:
-    """What is the same for objects that can share a surface: how pictures lie on the shape counts, too."""
+def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
+    """A key that is equal for objects that can share a surface, on which pictures lie alike."""
     laid_out = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
     return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), laid_out
 

@@ -28,7 +28,7 @@ NamedIlluminant = Annotated[
 ]
 
 
-def _is_lit(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+def _not_black(colour: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(colour):
         raise ValueError("light is not black; (1, 1, 1) is that of daylight")
     return colour
@@ -39,7 +39,7 @@ def _named_or_colour(given: Any) -> str:
 
 
 Illuminant = Annotated[
-    Annotated[NamedIlluminant, Tag("name")] | Annotated[Colour, AfterValidator(_is_lit), Tag("colour")],
+    Annotated[NamedIlluminant, Tag("name")] | Annotated[Colour, AfterValidator(_not_black), Tag("colour")],
     Discriminator(_named_or_colour),
 ]
 """Colour of the light: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""

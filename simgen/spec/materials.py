@@ -11,6 +11,9 @@ from simgen.spec.lights import Illuminant
 from simgen.spec.textures import Texture
 from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
 
+LEAST_INDEX, MOST_INDEX = 1.01, 3.0
+"""Refractive indices that the renderer takes."""
+
 
 def _number_or_image(given: Any) -> str:
     return "image" if isinstance(given, str) else "number"
@@ -55,7 +58,7 @@ class Glass(Strict):
     so recipes with glass need a larger `render.max_depth`: 6 for a ball in front of a surface."""
 
     type: Literal["glass"] = "glass"
-    refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+    refractive_index: Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)] = 1.5
     """Of the glass against air: 1.5 of windows, 1.33 of water, 1.9 of heavy flint."""
 
 
@@ -71,7 +74,7 @@ class Principled(Strict):
     """0 is plastic or the like, whose highlights are white; 1 is metal, whose highlights are coloured."""
     roughness: ShareOrImage = 0.5
     """Width of the highlights: its square is the GGX alpha that other finishes take as their roughness."""
-    refractive_index: Annotated[Real, Field(ge=1.01, le=3)] = 1.5
+    refractive_index: Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)] = 1.5
     """Of what is no metal: how strong its highlights are, and how much it bends light that passes."""
     transmission: ShareOrImage = 0.0
     """How much of the light that does not go back at once passes through, as in glass; for closed shapes."""
@@ -109,8 +112,8 @@ class Spectrum(Strict):
 
 
 class Emission(Strict):
-    """Light that a surface sends out by itself, evenly in all directions on the side that its normals point
-    to: outwards from closed shapes, towards the cameras from a card."""
+    """Emission of a surface, of the same radiance in all directions, on the side of its normals: outside a
+    closed shape, and on the side of an unturned card that faces the cameras."""
 
     luminance_cd_m2: Positive
     """How bright it is; a screen has some 300, a lit lampshade 3000."""
