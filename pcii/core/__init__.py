@@ -10,11 +10,10 @@ focal_planes   Focal planes: the depths of sections, and by how much the views s
 geometry       Geometry of parallel cameras: the image of a point, disparity and depth.
 images         Elemental images: the radiance of every view.
 photon_counts  Photon counts of the elemental images, as sparse events or as a dense stack.
+photon_events  Photons as events, and the frames of an exposure in which a pixel counts them.
 photon_limit   Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
 view_figures   Pictures of elemental images: which view, its colours, its exposure.
-xarray_form    The types as datasets of xarray: named axes, coordinates with units, the camera grid as
-               attributes.
 """

@@ -125,6 +125,12 @@ class CameraGrid(ShortForm):
         return panels
 
 
+def check_is_grid(value: object) -> None:
+    """Raise `InputError` for anything but a `CameraGrid`."""
+    if not isinstance(value, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
+
+
 def check_camera(grid: CameraGrid, k: int, l: int) -> None:
     """Raise `InputError` for a camera outside the grid."""
     if not (0 <= k < grid.rows and 0 <= l < grid.cols):

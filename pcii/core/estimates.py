@@ -8,11 +8,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, table, times
-from pcii.core.array_labels import DEPTH_LABELS
+from pcii.core.array_labels import DEPTH_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.section_stack import Sections
-from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
@@ -73,7 +72,7 @@ class Segmented(ShortForm):
     @property
     def cleaned(self) -> np.ndarray:
         """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
-        return self.sections.estimate * self.in_focus[..., None]
+        return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
 
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
         """Draw each section after removal with the outline of its mask, and return the Matplotlib axes (N,).

@@ -21,7 +21,8 @@ from pcii.core.geometry import (
     total_disparity_px,
 )
 from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts, PhotonEvents
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_events import PhotonEvents
 from pcii.core.truth import PhotonTruth
 
 

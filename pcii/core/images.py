@@ -7,12 +7,11 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.core.array_labels import VIEWS_LABELS
+from pcii.core.array_labels import VIEWS_LABELS, labelled_dataset
 from pcii.core.arrays import check_unmasked, read_only
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.view_figures import chosen_camera, draw_view, light_picture, middle_camera, view_thumbnail
-from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray

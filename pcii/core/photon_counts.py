@@ -9,10 +9,20 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.core.array_labels import COUNTS_LABELS
+from pcii.core.array_labels import COUNTS_LABELS, labelled_dataset
 from pcii.core.arrays import check_total, read_only, whole_counts
 from pcii.core.bayer import channel_count, check_cfa, colour_cells
-from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of
+from pcii.core.camera_grid import CameraGrid, check_camera, check_is_grid, chosen_cameras, grid_of
+from pcii.core.photon_events import (
+    PLAIN,
+    FrameEvents,
+    PhotonEvents,
+    Readout,
+    checked_pixels,
+    events_of,
+    sorted_events,
+    sorted_frames,
+)
 from pcii.core.view_figures import (
     chosen_camera,
     draw_view,
@@ -21,32 +31,19 @@ from pcii.core.view_figures import (
     photon_picture,
     view_thumbnail,
 )
-from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, repr=False)
-class PhotonEvents(ShortForm):
-    """Pixels with photons: camera (k, l), pixel (i, j), `n` photons; five arrays (N,) of integers."""
-
-    k: np.ndarray
-    l: np.ndarray
-    i: np.ndarray
-    j: np.ndarray
-    n: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"events": self.n.size, "photons": int(self.n.sum())}
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotonCounts(ShortForm):
     """Photon counts of every elemental image, as sparse events or as a dense stack.
 
-    Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome.
+    Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the
+    frames in which a single-photon camera counted, of whose counts these are the sums; `frame` (photons,), if
+    it is known, is the frame of each single count, in the order of the events.
     It holds what a camera would deliver, and no ground truth.
     """
 
@@ -54,14 +51,23 @@ class PhotonCounts(ShortForm):
     cfa: str | None
     _events: PhotonEvents | None = field(default=None, repr=False)
     _dense: np.ndarray | None = field(default=None, repr=False)
+    readout: Readout = PLAIN
+    frame: np.ndarray | None = None
 
     @classmethod
     def from_dense(
-        cls, counts_KLHW: np.ndarray, grid: CameraGrid, *, cfa: str | None = None
+        cls,
+        counts_KLHW: np.ndarray,
+        grid: CameraGrid,
+        *,
+        cfa: str | None = None,
+        frames: int = 1,
+        bits: int | None = None,
     ) -> "PhotonCounts":
         """Counts from a copy of a dense stack (K, L, H, W) of whole numbers >= 0.
 
-        Raises `InputError` for another shape, and for negative, fractional or too large counts.
+        They are the sums of `frames`, each of which counts to 2^`bits` - 1, or without limit. Raises
+        `InputError` for another shape, and for negative, fractional or too large counts.
 
         >>> grid = CameraGrid(
         ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
@@ -70,14 +76,16 @@ class PhotonCounts(ShortForm):
         PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, kept=dense)
         """
         check_cfa(cfa)
-        _check_grid(grid)
+        check_is_grid(grid)
         counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         check_total("counts", counts)
+        readout = Readout(frames, bits)
+        readout.check(counts)
         # Who gave the array may write to it later.
         kept = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
-        return cls(grid, cfa, _dense=read_only(kept))
+        return cls(grid, cfa, _dense=read_only(kept), readout=readout)
 
     @classmethod
     def from_events(
@@ -90,11 +98,16 @@ class PhotonCounts(ShortForm):
         grid: CameraGrid,
         *,
         cfa: str | None = None,
+        frames: int = 1,
+        bits: int | None = None,
+        frame: np.ndarray | None = None,
     ) -> "PhotonCounts":
         """Counts from five equal-length lists: camera (k, l), pixel (i, j), photons n.
 
-        A pixel may appear more than once; its photons add up. Raises `InputError` for an index
-        outside the grid, a negative, fractional or too large count, or lists of different lengths.
+        A pixel may appear more than once; its photons add up, over `frames` of `bits` as in `from_dense`.
+        `frame`, if known, is that of each single count, from 0: of the first `n`, then of the next. Raises
+        `InputError` for an index outside the grid, a negative, fractional or too large count, or lists of
+        different lengths.
 
         >>> grid = CameraGrid(
         ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
@@ -104,28 +117,29 @@ class PhotonCounts(ShortForm):
         (3, [0, 0, 0, 0, 2, 0])
         """
         check_cfa(cfa)
-        _check_grid(grid)
-        indices: dict[str, np.ndarray] = {}
-        for (name, values), limit in zip(
-            {"k": k, "l": l, "i": i, "j": j}.items(), grid.shape_KLHW, strict=True
-        ):
-            column = whole_counts(name, np.atleast_1d(values))
-            if column.ndim != 1:
-                raise InputError(f"{name}: expected a one-dimensional list")
-            if column.size and column.max() >= limit:
-                raise InputError(f"{name}: index {column.max()} is outside 0 .. {limit - 1}")
-            indices[name] = column.astype(np.int32)
+        check_is_grid(grid)
+        pixels = checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
-        if len({column.shape for column in (*indices.values(), photons)}) != 1:
+        if len({column.shape for column in (*pixels, photons)}) != 1:
             raise InputError("k, l, i, j, n: the five lists must have the same length")
         check_total("n", photons)
-        events = _canonical_events(tuple(indices.values()), photons, grid)
+        readout = Readout(frames, bits)
+        events = sorted_events(pixels, photons, grid)
         whole_counts("n", events.n)  # after those of one pixel are added up
-        return cls(grid, cfa, _events=events)
+        readout.check(events.n)
+        if frame is not None:
+            frame = sorted_frames(pixels, photons, whole_counts("frame", frame), grid, readout)
+        return cls(grid, cfa, _events=events, readout=readout, frame=frame)
 
     def _facts(self) -> dict[str, object]:
-        kept = "events" if self.is_sparse else "dense"
-        return {"shape": times(self.grid.shape_KLHW), "cfa": self.cfa, "photons": self.total, "kept": kept}
+        return {
+            "shape": times(self.grid.shape_KLHW),
+            "cfa": self.cfa,
+            "photons": self.total,
+            "frames": None if self.readout.is_plain else self.readout.frames,
+            "bits": self.readout.bits,
+            "kept": "events" if self.is_sparse else "dense",
+        }
 
     def _thumbnails(self) -> dict[str, str]:
         k, l = middle_camera(self.grid)
@@ -166,7 +180,17 @@ class PhotonCounts(ShortForm):
             return self._events
         assert self._dense is not None
         pixels = np.nonzero(self._dense)
-        return _events(pixels, self._dense[pixels].astype(np.int64))
+        return events_of(pixels, self._dense[pixels].astype(np.int64))
+
+    @cached_property
+    def frame_events(self) -> FrameEvents | None:
+        """Each single count with its frame, in the order of `events`; None if the frames were not kept."""
+        if self.frame is None and self.readout.frames > 1:
+            return None
+        e = self.events
+        frame = np.zeros(self.total, np.int32) if self.frame is None else self.frame
+        k, l, i, j = (read_only(index.repeat(e.n)) for index in (e.k, e.l, e.i, e.j))
+        return FrameEvents(k, l, i, j, read_only(frame))
 
     @cached_property
     def event_colours(self) -> np.ndarray:
@@ -209,11 +233,13 @@ class PhotonCounts(ShortForm):
         grid = grid_of(self.grid, rows, cols)
         if self._dense is not None:
             dense = self._dense[rows.start : rows.stop : rows.step, cols.start : cols.stop : cols.step]
-            return PhotonCounts(grid, self.cfa, _dense=dense)
+            return PhotonCounts(grid, self.cfa, _dense=dense, readout=self.readout)
         e = self.events
         kept = np.isin(e.k, rows) & np.isin(e.l, cols)
         k, l = (e.k[kept] - rows.start) // rows.step, (e.l[kept] - cols.start) // cols.step
-        return PhotonCounts(grid, self.cfa, _events=_events((k, l, e.i[kept], e.j[kept]), e.n[kept]))
+        events = events_of((k, l, e.i[kept], e.j[kept]), e.n[kept])
+        frame = None if self.frame is None else read_only(self.frame[kept.repeat(e.n)])
+        return PhotonCounts(grid, self.cfa, _events=events, readout=self.readout, frame=frame)
 
     @cached_property
     def total(self) -> int:
@@ -261,30 +287,14 @@ class PhotonCounts(ShortForm):
             raise InputError(f"most: expected a number of photons of at least 0, got {most!r}")
         if self.total <= most:
             return self
-        events = self.events
-        n = rng.binomial(events.n, most / self.total)
+        events, frame = self.events, None
+        if self.frame is None:
+            n = rng.binomial(events.n, most / self.total)
+        else:
+            chosen = rng.random(self.total) < most / self.total
+            n = np.bincount(np.arange(events.n.size).repeat(events.n)[chosen], minlength=events.n.size)
+            frame = read_only(self.frame[chosen])
         kept = n > 0
         pixels = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
-        return PhotonCounts(self.grid, self.cfa, _events=_events(pixels, n[kept]))
-
-
-def _check_grid(value: object) -> None:
-    if not isinstance(value, CameraGrid):
-        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
-
-
-def _canonical_events(pixels: tuple[np.ndarray, ...], n: np.ndarray, grid: CameraGrid) -> PhotonEvents:
-    """Events sorted by (k, l, i, j), one per pixel, without zeros: equal counts have equal events."""
-    flat = np.ravel_multi_index(pixels, grid.shape_KLHW)
-    if n.all() and (np.diff(flat) > 0).all():  # as files and parts of other counts have them
-        return _events(pixels, n)
-    occupied, inverse = np.unique(flat, return_inverse=True)
-    photons = np.zeros(occupied.size, dtype=np.int64)
-    np.add.at(photons, inverse, n)
-    occupied, photons = occupied[photons > 0], photons[photons > 0]
-    return _events(np.unravel_index(occupied, grid.shape_KLHW), photons)
-
-
-def _events(pixels: tuple[np.ndarray, ...], n: np.ndarray) -> PhotonEvents:
-    k, l, i, j = (read_only(index.astype(np.int32)) for index in pixels)
-    return PhotonEvents(k, l, i, j, read_only(n))
+        events = events_of(pixels, n[kept])
+        return PhotonCounts(self.grid, self.cfa, _events=events, readout=self.readout, frame=frame)

@@ -9,12 +9,12 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, times
-from pcii.core.array_labels import SECTIONS_LABELS
+from pcii.core.array_labels import SECTIONS_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
 from pcii.core.bayer import by_colour, check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.xarray_form import labelled_dataset
+from pcii.core.photon_events import PLAIN, Readout
 from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Sections(ShortForm):
     numbers for radiance. `samples` is their `coverage`, or a function that makes it when it is first asked
     for: on one plane that takes as long as adding 100 000 photons. With `subpixel` = M the voxel grid is M
     times finer in both axes. `variance` (Z, H, W, C) is that of the samples of each voxel, or None. `cfa` is
-    the Bayer pattern of sections that are mosaics themselves (of even shifts).
+    the Bayer pattern of sections that are mosaics themselves (of even shifts), `readout` that of the counts.
     Raises `InputError` if the shapes differ. `pcii.reconstruct` makes them.
     """
 
@@ -42,6 +42,7 @@ class Sections(ShortForm):
     subpixel: int = 1
     variance: np.ndarray | None = None
     cfa: str | None = None
+    readout: Readout = PLAIN
 
     def __post_init__(self) -> None:
         Z, H, W = len(self.planes), self.grid.height * self.subpixel, self.grid.width * self.subpixel
@@ -89,15 +90,19 @@ class Sections(ShortForm):
 
     @cached_property
     def estimate(self) -> np.ndarray:
-        """Mean per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
+        """Photons (or radiance) per sample, (Z, H, W, C) float64: Eqs. 2 and 3 of Muniraj et al. 2017.
 
         For photon counts it is the maximum-likelihood estimate of the photons per pixel and view;
         Eq. 3 divides it further by the photon budget n, and the sum by R S, the number of cameras, which
-        darkens borders; here it is divided by the coverage. A voxel that no sample reaches is 0.
+        darkens borders; here it is divided by the coverage. A voxel that no sample reaches is 0. What frames
+        of few bits miss is made up for: see `Readout.photons`.
         """
-        mean = np.zeros(self.counts.shape, dtype=np.float64)
-        np.divide(self.counts, self.coverage, out=mean, where=self.coverage > 0)
-        return read_only(mean)
+        return read_only(self.readout.photons(self.counts, self.coverage))
+
+    @property
+    def saturated(self) -> np.ndarray:
+        """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
+        return np.isinf(self.estimate)
 
     def to_xarray(self) -> "xarray.Dataset":
         """`counts`, `coverage`, `estimate` and, if known, `variance` over planes, voxels and channels."""

@@ -8,9 +8,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS
+from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
-from pcii.core.xarray_form import labelled_dataset
 
 if TYPE_CHECKING:
     import xarray

@@ -98,6 +98,7 @@ def _comments(dataset: Dataset) -> str:
         "title": dataset.manifest.get("title") or dataset.name,
         "grid": asdict(dataset.grid),
         "cfa": dataset.cfa,
+        **(asdict(dataset.counts.readout) if dataset.has_counts else {}),
         "radiance_unit": dataset.manifest.get("radiance_unit"),
         "analysis": {name: dataset.analysis.get(name) for name in ("z_mm", "z_range_mm")},
         "photon_budget": dataset.photon_budget,

@@ -45,7 +45,14 @@ def _write_counts(counts: PhotonCounts, path: Path, folder: Path) -> None:
         raise InputError(
             f"{path}: a pixel has {most} photons, and PNG holds at most {MOST[16]}; export events or exr"
         )
-    meaning = {"quantity": "photons", "unit": "photons", "full_scale": MOST[bits], "bits": bits}
+    meaning = {
+        "quantity": "photons",
+        "unit": "photons",
+        "full_scale": MOST[bits],
+        "bits": bits,
+        "frames": counts.readout.frames,
+        "bits_per_frame": counts.readout.bits,
+    }
     dtype = np.uint8 if bits == 8 else np.uint16
     folder.mkdir()
     for k, l in np.ndindex(counts.grid.rows, counts.grid.cols):

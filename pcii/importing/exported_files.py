@@ -86,8 +86,15 @@ def _events(path: Path) -> Exported:
     with zipfile.ZipFile(path) as archive:
         check_archive(path, archive, [name for name in archive.namelist() if name.endswith(".npy")], one_view)
     try:
-        pixels = {name: read(name) for name in "klijn"}
-        counts = PhotonCounts.from_events(**pixels, grid=grid, cfa=str(read("cfa")) or None)
+        cfa, frames, bits = str(read("cfa")) or None, optional("frames"), optional("bits")
+        counts = PhotonCounts.from_events(
+            *map(read, "klijn"),
+            grid=grid,
+            cfa=cfa,
+            frames=1 if frames is None else frames.item(),
+            bits=None if bits is None else bits.item(),
+            frame=optional("frame"),
+        )
         truth = None
         if "truth_z_mm" in names:
             keys, titles = read("object_keys").tolist(), read("object_names").tolist()
@@ -128,7 +135,8 @@ def _parts(path: Path) -> Exported:
                 images.append(Views(radiance, grid, cfa if names == ("Y",) else None))
         if views and all("photons" in channels for channels in views.values()):
             dense = _stacked(views, ("photons",), grid)[..., 0]
-            images.append(PhotonCounts.from_dense(dense, grid, cfa=cfa))
+            counted = {name: told[name] for name in ("frames", "bits") if name in told}
+            images.append(PhotonCounts.from_dense(dense, grid, cfa=cfa, **counted))
         truth = None
         if CENTRE in parts:
             z_mm, object_id = (parts[CENTRE][name] for name in ("Z", "objectId"))

@@ -17,6 +17,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
 from pcii.io.dataset_layout import (
     COUNTS,
+    FRAME,
     MANIFEST,
     PHOTON_TRUTH,
     RADIANCE,
@@ -139,11 +140,16 @@ class Dataset(ShortForm):
                 "or generate it with products.counts = true"
             )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
+        if self.has(f"{part}/{FRAME}"):
+            names += (FRAME,)
         arrays = self._arrays(part, COUNTS_LABELS, names)
+        told, frame = self.manifest, arrays.get(FRAME)
+        counted: dict[str, Any] = {"frames": told.get("frames", 1), "bits": told.get("bits")}
         try:
             if "dense" in arrays:
-                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa)
-            return PhotonCounts.from_events(**arrays, grid=self.grid, cfa=self.cfa)
+                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **counted)
+            k, l, i, j, n = (arrays[name] for name in "klijn")
+            return PhotonCounts.from_events(k, l, i, j, n, self.grid, cfa=self.cfa, frame=frame, **counted)
         except InputError as fault:
             raise InputError(f"{self.path / part}: {fault}") from None
 

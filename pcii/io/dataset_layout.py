@@ -3,6 +3,7 @@
     manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
                              its own checksum (see `pcii.store.sealed_json`)
     counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts.zarr/frame        (photon,) the frame of each count, on request
     counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
     photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
     truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
@@ -30,6 +31,8 @@ written again, with other terms of use; the second ends in a checksum of itself 
 MARKER = ".unfinished.json"
 """Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"
+FRAME = "frame"
+"""Array of the counts that has the frame of each."""
 TRUTH = "truth.zarr"
 PHOTON_TRUTH = "photon_truth.zarr"
 RADIANCE = "radiance"

@@ -17,6 +17,7 @@ from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import (
     COUNTS,
     DATASET_FOLDER,
+    FRAME,
     PHOTON_TRUTH,
     RADIANCE,
     REMEDY,
@@ -112,7 +113,7 @@ def _write_parts(folder: Path, counts: PhotonCounts | None, views: Views | None,
 
 def write_counts(folder: Path, counts: PhotonCounts) -> None:
     """Write photon counts as a group of arrays: as events, or dense where many pixels have photons."""
-    if not counts.is_sparse and counts.occupied_share > DENSE_SHARE:
+    if counts.frame is None and not counts.is_sparse and counts.occupied_share > DENSE_SHARE:
         dense = counts.dense
         dtype = np.min_scalar_type(dense.max(initial=0))
         small = dense.astype(dtype if dtype.name in DTYPES else np.int64)
@@ -120,6 +121,9 @@ def write_counts(folder: Path, counts: PhotonCounts) -> None:
         return
     index = np.uint16 if max(counts.grid.shape_KLHW) <= 1 << 16 else np.uint32
     pixels = {name: getattr(counts.events, name).astype(index) for name in "klij"}
+    if counts.frame is not None:
+        number = np.uint16 if counts.readout.frames <= 1 << 16 else np.uint32
+        pixels[FRAME] = counts.frame.astype(number)
     write_arrays_safely(folder, {**pixels, "n": counts.events.n}, COUNTS_LABELS)
 
 
@@ -276,4 +280,6 @@ def _content(
         "objects": {} if truth is None else {str(key): name for key, name in truth.names.items()},
         "files": list_files(root, [COUNTS, TRUTH, PHOTON_TRUTH, RADIANCE]),
     }
+    if counts is not None and not counts.readout.is_plain:
+        content |= asdict(counts.readout)
     return {"identity": hash_json(content), **content}

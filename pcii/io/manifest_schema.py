@@ -15,6 +15,7 @@ from pcii.base.plain_text import visible
 from pcii.core.arrays import MOST_DEPTHS
 from pcii.core.bayer import check_cfa
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_events import MOST_BITS, MOST_FRAMES
 
 MOST_FILE_BYTES = 1 << 50
 MOST_PHOTONS = 1 << 62
@@ -137,6 +138,8 @@ class DatasetManifest(_Model):
     identity: str | None = None
     grid: Grid
     cfa: str | None
+    frames: Annotated[int, Field(ge=1, le=MOST_FRAMES)] = 1
+    bits: Annotated[int, Field(ge=1, le=MOST_BITS)] | None = None
     radiance_channels: Literal[1, 3] | None = None
     objects: dict[ObjectKey, Text] = {}
     analysis: Analysis | None = None

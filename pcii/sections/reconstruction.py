@@ -18,6 +18,7 @@ from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_events import PLAIN
 from pcii.core.section_stack import Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
 from pcii.sections.image_moves import step_px
@@ -85,7 +86,8 @@ def reconstruct(
     else:
         sums, sample_variance = sum_views(data, planes, shifts, variance=variance)
     mosaic = data.cfa if shifts == "even" else None
-    return Sections(planes, sums, coverage_of, subpixel, sample_variance, mosaic)
+    readout = data.readout if isinstance(data, PhotonCounts) else PLAIN
+    return Sections(planes, sums, coverage_of, subpixel, sample_variance, mosaic, readout)
 
 
 def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -> Iterator[Sections]:
@@ -120,6 +122,7 @@ def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sec
         planes,
         np.concatenate([sections.counts, added.counts]),
         partial(_joined_coverage, sections, added.samples),
+        readout=counts.readout,
     )
 
 

@@ -149,7 +149,7 @@ def test_the_part_of_interest_keeps_the_films_aspect() -> None:
 
 def test_a_photon_lights_its_own_block_and_colour_in_its_view() -> None:
     where = {"k": [1], "l": [1], "i": [10], "j": [21], "n": [4]}
-    counts = PhotonCounts.from_events(**{k: np.array(v) for k, v in where.items()}, grid=grid(), cfa="GRBG")
+    counts = PhotonCounts.from_events(*map(np.array, where.values()), grid=grid(), cfa="GRBG")
     tiles = photon_tiles(counts, (slice(1, 60), slice(0, 40)), 2)
     tiles[30:32], tiles[:, 20:22], tiles[:, 42:44] = 0, 0, 0  # the gaps
     assert np.argwhere(tiles).tolist() == [[32 + 5, 22 + 10, 0]]

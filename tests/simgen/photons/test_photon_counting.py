@@ -218,7 +218,7 @@ def stored(out: Path, made: Recipe, budget: float | None = None) -> np.ndarray:
     """The counts in a folder, (V, H, W)."""
     group = zarr.open_group(out / nested_name(COUNTS, budget), mode="r")
     columns = {name: np.asarray(group[name]) for name in "klijn"}
-    counts = PhotonCounts.from_events(**columns, grid=made.grid.camera_grid(), cfa=made.cfa)
+    counts = PhotonCounts.from_events(*columns.values(), grid=made.grid.camera_grid(), cfa=made.cfa)
     return np.stack([counts.view(k, l) for k, l in np.ndindex(made.grid.rows, made.grid.cols)])
 
 
