@@ -37,7 +37,7 @@ def refusal(app: object, arguments: list[str], capsys: pytest.CaptureFixture[str
 
 def test_score_json_is_as_in_the_contract(results: Path) -> None:
     score = json.loads((results / "score.json").read_text())
-    assert list(score) == ["dataset", "planes", "objects", "depth", "bounds"]
+    assert list(score) == ["dataset", "planes", "objects", "depth", "bounds", "readout"]
     keys = "z_mm method object truth iou precision recall f1 boundary_f photon_precision photon_recall"
     for row in score["planes"]:
         assert list(row) == [*keys.split(), "entropy_before", "entropy_after", "claimed_share"]

@@ -10,6 +10,7 @@ from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.summary import object_planes
 from pcii.evaluation.tables import METHOD, Column, Table, tabulated
+from pcii.sections.saturation import saturation_loss
 
 Row = Mapping[str, Any]
 NUMBERS = (
@@ -32,7 +33,13 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
     dataset, score = outcome.dataset, outcome.score
     facts: list[tuple[str, str]] = []
     if dataset.has_counts:
-        facts.append(("photons per view", f"{dataset.counts.total / dataset.grid.view_count:,.0f}"))
+        counts, readout = dataset.counts, dataset.counts.readout
+        facts.append(("photons per view", f"{counts.total / dataset.grid.view_count:,.0f}"))
+        if not readout.is_plain:
+            bits = "" if readout.bits is None else f" of {readout.bits} bit{'s' * (readout.bits > 1)}"
+            facts.append(("frames", f"{readout.frames:,}{bits}"))
+        if readout.bits is not None:
+            facts.append(("photons lost to saturation", _percent(saturation_loss(counts))))
     for focus in outcome.focus:
         ious = [
             row["iou"] for row in _rows_of(score.planes, focus.method, "object") if row["object"] is not None

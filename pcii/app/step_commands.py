@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from cyclopts import Parameter
 
 from pcii.app.command_options import Budget, Depths, Out, budget_words, opened
@@ -52,7 +53,11 @@ def reconstruct(
     sections = make(data.counts_or_views, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
     with Results(out, data).writing() as results:
         say(f"{results.save_sections(sections)}")
+        full = int(np.count_nonzero(sections.saturated))
+        if full:
+            say(f"{full} of {sections.counts.size} voxels are saturated: their estimate is infinite")
         for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
+            estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
             if sections.cfa is not None:
                 estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
             picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))

@@ -7,6 +7,7 @@ With PCII_TRACEBACK=1 in the environment tracebacks are shown.
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from importlib.metadata import version
@@ -58,7 +59,7 @@ def run(app: "App", arguments: Sequence[str] | None = None, *, resuming: Collect
 
     _add_common_options(app)
     tokens = list(sys.argv[1:] if arguments is None else arguments)
-    with _stops() as stops, shown_by(Stages()):
+    with _stops() as stops, shown_by(Stages()), _plain_warnings():
         try:
             code = _call(app.meta, tokens)
         except (Exception, KeyboardInterrupt) as fault:
@@ -105,6 +106,24 @@ def _add_common_options(app: "App") -> None:
         """
         with quiet() if quiet_ else nullcontext():
             return _call(app, tokens)
+
+
+@contextmanager
+def _plain_warnings() -> Iterator[None]:
+    """Within the block warnings for users are one sentence on standard error, without lines of code."""
+    shown = warnings.showwarning
+
+    def show(message: Warning | str, category: type[Warning], *place: Any) -> None:
+        if category is UserWarning:
+            complain(f"warning: {message}")
+        else:
+            shown(message, category, *place)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = shown
 
 
 @contextmanager

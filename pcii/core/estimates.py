@@ -233,13 +233,14 @@ class DepthPosterior(ShortForm):
 
 @dataclass(frozen=True, repr=False)
 class Score(ShortForm):
-    """Content of `score.json`: rows per plane, entropies per object, errors of the depth map, bounds."""
+    """Content of `score.json`: rows per plane, entropies per object, errors of depth, bounds, frames."""
 
     planes: tuple[Mapping[str, Any], ...]
     objects: tuple[Mapping[str, Any], ...]
     depth: Mapping[str, Any]
     dataset: str | None = None
     bounds: Mapping[str, Any] = field(default_factory=dict)
+    readout: Mapping[str, Any] | None = None
 
     def _facts(self) -> dict[str, object]:
         return {
@@ -253,9 +254,8 @@ class Score(ShortForm):
     def _repr_html_(self) -> str:
         names = ("z_mm", "method", "truth", "object", "iou", "precision", "recall", "boundary_f")
         rows = [[row.get(name) for name in names] for row in self.planes]
-        shown = table(repr(self), rows, names)
         errors = [(name, self.depth[name]) for name in DEPTH_SHOWN if self.depth.get(name) is not None]
-        return shown + (table("depth", errors) if errors else "")
+        return table(repr(self), rows, names) + table("depth", errors) * bool(errors)
 
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
         """Draw what is scored, a panel each, and return the Matplotlib axes (N,).
@@ -277,6 +277,7 @@ class Score(ShortForm):
             "objects": [dict(row) for row in self.objects],
             "depth": dict(self.depth),
             "bounds": dict(self.bounds),
+            "readout": self.readout,
         }
 
 
@@ -293,7 +294,7 @@ def _checked_pixel(pixel: tuple[int, int], shape_HW: tuple[int, int]) -> tuple[i
     is_pair = isinstance(pixel, tuple | list) and len(pixel) == 2
     if not is_pair or not all(isinstance(n, int | np.integer) for n in pixel):
         raise InputError(f"pixel: expected (row, column), got {pixel!r}")
-    i, j = int(pixel[0]), int(pixel[1])
-    if not (0 <= i < shape_HW[0] and 0 <= j < shape_HW[1]):
-        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {shape_HW[0]} x {shape_HW[1]}")
+    (i, j), (height, width) = map(int, pixel), shape_HW
+    if not (0 <= i < height and 0 <= j < width):
+        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {height} x {width}")
     return i, j

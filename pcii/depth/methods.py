@@ -22,6 +22,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
 from pcii.depth.focus_labels import focus_depth
 from pcii.depth.posterior_depth import PosteriorDepth
+from pcii.sections.saturation import warn_of_saturation
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]
@@ -55,8 +56,9 @@ def estimate_depth(
     "likelihood-sweep", of photon counts, "variance-sweep" and, of radiance, "structure-tensor" are textbook
     methods to compare with, which answer wherever there are samples.
 
-    Raises `InputError` for a range that is not 0 < near < far, a single view, a method that is not known or
-    cannot take the data, or one of others that fails, writes into the data, or returns no such `DepthMap`.
+    Warns of frames whose saturation removed more than 2 % of the photons. Raises `InputError` for a range
+    that is not 0 < near < far, a single view, a method that is not known or cannot take the data, or one of
+    others that fails, writes into the data, or returns no such `DepthMap`.
 
     >>> import numpy as np
     >>> import pcii
@@ -70,6 +72,7 @@ def estimate_depth(
     """
     z_range_mm = _checked_range_mm(data, z_range_mm)
     estimate = find_depth_method(DEFAULT_METHOD if method is None else method, data)
+    warn_of_saturation(data)
     return estimate(data, z_range_mm)
 
 

@@ -1,7 +1,7 @@
 """Scores of masks, depth and entropies against the truth."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ def score(
     the share of the section that the mask keeps. `objects` is Table 1: the entropy at each plane of each
     object's region, which includes its blur at the other planes. `depth` is `depth_errors`. `bounds` holds
     limits of accuracy: `iou_oracle` for each row of `planes`, and `depth_sigma_px` for each object, from its
-    texture in `full_light`, the sections of the radiance (Eq. 2).
+    texture in `full_light`, the sections of the radiance (Eq. 2). `readout` has the frames of the counts.
 
     A depth map without masks needs `grid`, the cameras. Scores without their truth are None. Raises
     `InputError` if shapes differ or the grid is missing.
@@ -84,7 +84,8 @@ def score(
             objects = _object_rows(methods[0], seen[id(methods[0].sections)].pooled, truth)
         bounds["planes"] = [row for each in methods for row in _oracle_rows(each, seen[id(each.sections)])]
         bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
-    return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds)
+    readout = asdict(methods[0].sections.readout) if methods else None
+    return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
 
 @dataclass(frozen=True, eq=False)

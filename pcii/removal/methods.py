@@ -9,6 +9,7 @@ from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import PosteriorMasks
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.reconstruction import reconstruct
+from pcii.sections.saturation import warn_of_saturation
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:
@@ -19,9 +20,9 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     "shape-from-focus"), or one that an installed package registers; or a function that returns a `Segmented`
     for counts and their sections, such as `ThreeStep(entropy=False)`. No method is given the number of
     objects, their colours or their depths.
-    Without photons nothing is in focus. Raises `InputError` for a depth not above 0, an unknown method, a
-    single view, or a method of others that fails, writes into what it is given, or whose result is not a
-    `Segmented` of these sections.
+    Without photons nothing is in focus. Warns of frames whose saturation removed more than 2 % of the
+    photons. Raises `InputError` for a depth not above 0, an unknown method, a single view, or a method of
+    others that fails, writes into what it is given, or whose result is not a `Segmented` of these sections.
 
     A bright square at 500 mm, where views shift by 4 px from camera to camera:
 
@@ -40,6 +41,7 @@ def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method 
     """
     check_depth_counts(counts)
     remove = find_method(method)
+    warn_of_saturation(counts)
     return remove(counts, reconstruct(counts, z_mm))
 
 

@@ -16,4 +16,6 @@ recycled_memory    Memory of sections that nobody holds any more, for the next o
 reconstruction     Computational reconstruction of sections: Muniraj et al. 2017, Eqs. 2 and 3.
 row_kernels        Compiled functions for one row of a section: sums of shifted images, and of their
                    squared deviations.
+saturation         What frames of few bits miss: the share of the photons that saturation removed,
+                   estimated from the counts.
 """

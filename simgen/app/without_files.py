@@ -25,7 +25,8 @@ from simgen.photons.counting_plan import plan, render_instead
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.detector import detect, read_out
+from simgen.sensor.detector import detect
+from simgen.sensor.frame_readout import counts_of, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import CalibrationErrors, Lens
 from simgen.spec.recipe import Recipe, Sensor
@@ -57,7 +58,8 @@ def draw_photons(
     longest light path in segments. A `sensor` may name the pattern instead of `cfa`; a file that it names is
     looked for in the working directory. The counts are those of a dataset with the same scene, cameras,
     sensor, budget and seed. The truth has depth in mm and object of every pixel of the virtual centre (H, W),
-    and where each photon came from if there are few enough to be drawn one by one. Raises `pcii.InputError`
+    and where each photon came from if there are few enough to be drawn one by one; then the counts know their
+    frames too. Raises `pcii.InputError`
     for a value that is out of its range.
 
     >>> grid = pcii.CameraGrid(rows=10, cols=10, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.0352,
@@ -88,10 +90,9 @@ def draw_photons(
 
     arrivals, _ = drawn or draw_from_views(capture, mosaic_of, made, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
-    counted = read_out(detected, grid, recipe.sensor, capture.seed)
-    counts = PhotonCounts.from_events(
-        counted.k, counted.l, counted.i, counted.j, counted.n, grid, cfa=recipe.cfa
-    )
+    is_single = detected.object_id is not None
+    counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
+    counts = counts_of(counted, grid, recipe.cfa, recipe.sensor, keeps_frames=is_single)
     return counts, _truth(render_scene, grid, counted)
 
 

@@ -28,6 +28,7 @@ Stage = Literal[
     "candidate paths",
     "plan probe",
     "check probe",
+    "frames",
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")

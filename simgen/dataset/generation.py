@@ -126,7 +126,8 @@ def _work(
     recipe, products, photons = prepared.recipe, prepared.recipe.products, None
 
     def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
-        return log | write_counts(capture, recipe.sensor, arrivals, out, with_origins=products.truth)
+        kept = {"with_origins": products.truth, "keeps_frames": products.frames}
+        return log | write_counts(capture, recipe.sensor, arrivals, out, **kept)
 
     if products.truth or products.view_truth:
         request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)

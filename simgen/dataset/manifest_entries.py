@@ -19,6 +19,8 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
         "title": recipe.title or scene.title,
         "grid": asdict(recipe.grid.camera_grid()),
         "cfa": recipe.cfa,
+        "frames": recipe.sensor.frames,
+        "bits": recipe.sensor.bits,
         "radiance_channels": {"none": None, "mosaic": 1, "rgb": channels}[recipe.products.radiance],
         "radiance_unit": SPECTRAL_UNIT if recipe.is_spectral else RGB_UNIT,
         "objects": {str(number): name for number, name in render_scene.names.items()},

@@ -53,11 +53,14 @@ class Prepared:
         """The seed of this draw: no two scenes, cameras, sensors or amounts of light have one in common.
 
         So one seed in a recipe gives unrelated photons in each dataset of a sweep. Products, smaller budgets
-        of the same photons and words about the scene make no other draw.
+        of the same photons, how they are read out (in frames of so many bits) and words about the scene make
+        no other draw.
         """
         said = {"title", "description", "planes_mm"}
         decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
         del decisive["photons"]["nested"]
+        del decisive["sensor"]["frames"], decisive["sensor"]["bits"]
+        decisive["sensor"]["counter_bits"] = None  # as it was hashed before, for the same photons as then
         drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=said)}
         return seeds.seed_of_draw(self.recipe.seed, [drawn, decisive, self.recipe.render.max_depth])
 

@@ -39,8 +39,8 @@ ORIGIN_BYTES = 30.0
 """Of each of several counts of one pixel while their origins are written."""
 TILE_BYTES = 110.0
 """Of a tile of the majorant."""
-EVENT_BYTES = 16
-"""Of a pixel that caught photons, on disk before compression: four indices and a count."""
+EVENT_BYTES, FRAME_BYTES = 16, 2
+"""Of a pixel that caught photons, on disk before compression: four indices and a count; and of its frame."""
 TRUTH_BYTES = 6
 """Depth (float32) and object (int16) of a pixel."""
 EXR_SHARE = 0.5
@@ -92,7 +92,7 @@ def steps(needs: Needs, plan: Plan | None, room: float) -> Iterator[Step]:
         yield _linear(hot, room, "sensor.hot_pixel_share", sensor.hot_pixel_share)
         if plan is None or plan.thins:
             many = hot * sensor.hot_pixel_counts
-            if sensor.counter_bits is None:
+            if sensor.bits is None and not products.frames:
                 many *= ORIGIN_BYTES / PHOTON_BYTES
             yield _linear(many, room, "sensor.hot_pixel_counts", sensor.hot_pixel_counts)
     if plan is not None:
@@ -139,7 +139,9 @@ def product_bytes(needs: Needs, plan: Plan | None) -> dict[str, float]:
     pixels, views = grid.height * grid.width, grid.rows * grid.cols
     sizes: dict[str, float] = {}
     if plan is not None:
-        sizes["counts"] = EVENT_BYTES * min(plan.photons_per_view * views, float(pixels * views))
+        photons = plan.photons_per_view * views
+        each = FRAME_BYTES * photons if products.frames and needs.sensor.frames > 1 else 0.0
+        sizes["counts"] = EVENT_BYTES * min(photons, float(pixels * views)) + each
     if products.radiance != "none":
         sizes["radiance"] = _rendered_bytes(needs, None)
     truth = pixels * products.truth + pixels * views * bool(products.view_truth)

@@ -9,7 +9,6 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import photon_rates, scope_energies
 from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.dataset_writer import write_counts as save_counts
@@ -20,7 +19,8 @@ from simgen.photons.counting_plan import Capture, Plan
 from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
-from simgen.sensor.detector import detect, nested_subset, read_out
+from simgen.sensor.detector import detect, nested_subset
+from simgen.sensor.frame_readout import counts_of, in_frames, read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
@@ -95,21 +95,30 @@ def draw_from_views(
 
 
 def write_counts(
-    capture: Capture, sensor: Sensor, arrivals: PhotonTable, out: Path, *, with_origins: bool
+    capture: Capture,
+    sensor: Sensor,
+    arrivals: PhotonTable,
+    out: Path,
+    *,
+    with_origins: bool,
+    keeps_frames: bool = False,
 ) -> dict[str, Any]:
     """What the sensor counts of the arrivals, written; for the budget and for each that is nested in it.
 
-    With where each photon came from, if that is asked for and known. What the manifest says of them.
+    With where each photon came from, if that is asked for and known, and its frame, if that is asked for.
+    What the manifest says of them.
     """
     grid, cfa, photons = capture.grid, capture.cfa, capture.photons
     counts = detect(arrivals, grid, cfa, sensor, capture.seed)
-    found: dict[str, Any] = {"arrived": int(arrivals.n.sum())}
+    found: dict[str, Any] = {"arrived": int(arrivals.n.sum()), "detected": int(counts.n.sum())}
+    if photons.nested and (sensor.bits is not None or keeps_frames):
+        counts = in_frames(counts, sensor, capture.seed)  # the same ones in each budget
     for budget in (None, *photons.nested):
         kept = counts
         if budget is not None:
             kept = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
-        kept = read_out(kept, grid, sensor, capture.seed)
-        events = PhotonCounts.from_events(kept.k, kept.l, kept.i, kept.j, kept.n, grid, cfa=cfa)
+        kept = read_out(kept, grid, sensor, capture.seed, keeps_frames=keeps_frames)
+        events = counts_of(kept, grid, cfa, sensor, keeps_frames=keeps_frames)
         save_counts(out / nested_name(COUNTS, budget), events)
         if with_origins and kept.object_id is not None and kept.z_mm is not None:
             origins = kept.object_id.repeat(kept.n), kept.z_mm.repeat(kept.n)

@@ -1,8 +1,8 @@
-"""What a real sensor makes of the photons that arrive: losses, false counts, limits. All off by default.
+"""What a real sensor makes of the photons that arrive: losses, false counts. All off by default.
 
 Photon by photon: each is detected with the quantum efficiency of its pixel's colour, dark counts and hot
-pixels add counts of their own, dead pixels count nothing, and a counter of k bits stops at 2^k - 1; of one
-bit it says only whether there was a photon (Bernoulli counts, as of a single-photon camera's frame).
+pixels add counts of their own, dead pixels count nothing. In which frames they are counted, and where a
+counter stops, is the matter of `frame_readout`.
 
 Full-light images: electrons up to the full well, the noise of reading them, and a converter's steps.
 """
@@ -49,7 +49,7 @@ def nested_subset(
 def detect(
     arrivals: PhotonTable, grid: CameraGrid, cfa: str | None, sensor: Sensor, seed: int
 ) -> PhotonTable:
-    """Counts that come of arriving photons, before a counter stops."""
+    """Counts of the whole exposure that come of arriving photons, before a counter stops."""
     rng = seeds.generator(seed, stage="detection")
     efficiency = np.array(sensor.quantum_efficiency)[arrivals.colours(cfa)]
     if (efficiency < 1).any():
@@ -74,30 +74,6 @@ def detect(
         dead[shuffled[pixels - round(sensor.dead_pixel_share * pixels) :]] = True
         counts = counts.take(~dead.reshape(grid.height, grid.width)[counts.i, counts.j])
     return counts if counts.n.all() else counts.take(counts.n > 0)
-
-
-def read_out(counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: int) -> PhotonTable:
-    """What is read of counts, ordered by view and pixel: no more than a counter of so many bits holds."""
-    if sensor.counter_bits is not None:
-        counts = saturate(counts, grid, sensor.counter_bits, seed)
-    return counts.by_pixel(grid)
-
-
-def saturate(counts: PhotonTable, grid: CameraGrid, bits: int, seed: int) -> PhotonTable:
-    """Counts after a pixel's counter of so many bits has stopped; which came first is left to chance."""
-    most = (1 << bits) - 1
-    if counts.object_id is not None:  # else nobody can tell which of a pixel's counts were kept
-        counts = counts.one_by_one()
-    pixel = counts.flat_pixels(grid)
-    chance = seeds.generator(seed, stage="saturation").random(pixel.size)
-    order = np.lexsort((chance, pixel))
-    counts, pixel = counts.take(order), pixel[order]
-    running = np.cumsum(counts.n)
-    first = np.flatnonzero(np.diff(pixel, prepend=-1))
-    before_pixel = (running - counts.n)[first].repeat(np.diff(first, append=pixel.size))
-    before = running - counts.n - before_pixel
-    counts = replace(counts, n=np.clip(most - before, 0, counts.n))
-    return counts.take(counts.n > 0)
 
 
 def full_light_image(

@@ -11,7 +11,7 @@ from pcii.core.camera_grid import CameraGrid
 
 NO_OBJECT = -1
 """Object id of a count that no photon made."""
-DTYPES = dict.fromkeys(("k", "l", "i", "j", "scope", "rank"), np.int32) | {
+DTYPES = dict.fromkeys(("k", "l", "i", "j", "scope", "rank", "frame"), np.int32) | {
     "n": np.int64,
     "object_id": np.int16,
     "z_mm": np.float32,
@@ -26,7 +26,8 @@ class PhotonTable:
     are counted over a budget have the number of its `scope` and their `rank` within that, from 0: the first
     r of a scope are themselves an exact draw of r photons. Both are -1 for counts of no budget. `object_id`
     and planar depth `z_mm` are those of the first hit; `NO_OBJECT` and +inf for counts that no photon made.
-    What is not known of any row is None. Raises `ValueError` for columns of different lengths.
+    `frame` is that of the exposure, from 0, in which a single one is counted. What is not known of any row is
+    None. Raises `ValueError` for columns of different lengths.
     """
 
     k: np.ndarray
@@ -38,6 +39,7 @@ class PhotonTable:
     rank: np.ndarray | None = None
     object_id: np.ndarray | None = None
     z_mm: np.ndarray | None = None
+    frame: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name, column in self.columns().items():

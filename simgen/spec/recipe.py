@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS
+from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from simgen.base.locations import find, recipe_roots
 from simgen.base.overrides import override
 from simgen.base.strict_models import (
@@ -82,8 +83,10 @@ class Sensor(Strict):
     """Mean number of counts that a hot pixel has in each view without any light."""
     dead_pixel_share: Share = 0.0
     """Share of the pixels that never count; the same ones in every view."""
-    counter_bits: Annotated[Whole, Field(ge=1, le=32)] | None = None
-    """A pixel stops at 2^bits - 1 counts; 1 makes it tell only whether there was a photon."""
+    frames: Annotated[Whole, Field(ge=1, le=MOST_FRAMES)] = 1
+    """The exposure is divided into so many equal frames, each with its part of photons and false counts."""
+    bits: Annotated[Whole, Field(ge=1, le=MOST_BITS)] | None = None
+    """A pixel stops at 2^bits - 1 counts in each frame; 1 makes it tell only whether there was a photon."""
     full_light: FullLight | None = None
     """Makes the full-light images those of a camera instead of exact radiance."""
 
@@ -91,6 +94,11 @@ class Sensor(Strict):
     def bayer(self) -> str | None:
         """Bayer pattern, None for a monochrome sensor."""
         return None if self.cfa == "none" else self.cfa
+
+    @property
+    def readout(self) -> Readout:
+        """Frames, and where a pixel stops in each."""
+        return Readout(self.frames, self.bits)
 
     @property
     def is_spectral(self) -> bool:
@@ -149,7 +157,9 @@ class Products(Strict):
     """What the dataset holds beside its manifest."""
 
     counts: bool = True
-    """Photon counts of every view."""
+    """Photon counts of every view: the sums over all frames."""
+    frames: bool = False
+    """The frame of each single count, where the sensor has several."""
     truth: bool = True
     """What every pixel of the virtual centre sees: depth, object, normal, the share of the pixel that the
     object covers, and whether it is in focus at each plane of `analysis.z_mm`."""
@@ -161,9 +171,11 @@ class Products(Strict):
     """Full-light images as float32 EXR: behind the Bayer pattern, or all three colours."""
 
     @model_validator(mode="after")
-    def _visibility_is_of_the_truth(self) -> Self:
+    def _parts_have_their_whole(self) -> Self:
         if self.visibility and not self.truth:
             raise ValueError("visibility: it is counted for the points of the truth; set truth = true too")
+        if self.frames and not self.counts:
+            raise ValueError("frames: they are those of the counts; set counts = true too")
         return self
 
 

@@ -80,7 +80,7 @@ def test_a_sensor_has_no_faults_and_a_recipe_no_exposure_unless_told() -> None:
     sensor = recipe.sensor
     assert sensor.quantum_efficiency == (1, 1, 1)
     assert sensor.dark_counts == sensor.hot_pixel_share == sensor.dead_pixel_share == 0
-    assert (sensor.counter_bits, sensor.full_light, recipe.exposure) == (None, None, None)
+    assert (sensor.bits, sensor.full_light, recipe.exposure) == (None, None, None)
     assert (recipe.photons.nested, recipe.photons.statistics) == ((), "poisson")
 
 
@@ -96,10 +96,10 @@ def test_another_scene_does_not_keep_title_and_depths_of_the_recipes_own() -> No
 
 
 def test_overrides_reach_the_sensor_the_exposure_and_nested_budgets() -> None:
-    told = ["photons.nested=[100, 300]", "sensor.counter_bits=1", "exposure.time_s=0.5"]
+    told = ["photons.nested=[100, 300]", "sensor.bits=1", "exposure.time_s=0.5"]
     recipe, _ = load_recipe("paper", [*told, "sensor.full_light.adc_bits=10"])
     assert recipe.photons.nested == (100, 300)
-    assert recipe.sensor.counter_bits == 1
+    assert recipe.sensor.bits == 1
     assert recipe.exposure is not None
     assert (recipe.exposure.f_number, recipe.exposure.time_s) == (8, 0.5)
     assert recipe.sensor.full_light is not None
@@ -149,9 +149,9 @@ EXPOSED = {"f_number": 8.0, "time_s": 0.01}
         ({"sensor": {"hot_pixel_share": 1.1}}, "'sensor.hot_pixel_share'"),
         ({"sensor": {"hot_pixel_counts": -1}}, "'sensor.hot_pixel_counts'"),
         ({"sensor": {"dead_pixel_share": -0.1}}, "'sensor.dead_pixel_share'"),
-        ({"sensor": {"counter_bits": 0}}, "'sensor.counter_bits'"),
-        ({"sensor": {"counter_bits": 33}}, "'sensor.counter_bits'"),
-        ({"sensor": {"counter_bits": 1.5}}, "'sensor.counter_bits'"),
+        ({"sensor": {"bits": 0}}, "'sensor.bits'"),
+        ({"sensor": {"bits": 33}}, "'sensor.bits'"),
+        ({"sensor": {"bits": 1.5}}, "'sensor.bits'"),
         ({"sensor": {"dark_count": 1}}, "unknown key 'sensor.dark_count'; did you mean 'dark_counts'?"),
         ({"sensor": {"full_light": {"adc_bits": 25}}, "exposure": EXPOSED}, "'sensor.full_light.adc_bits'"),
         ({"sensor": {"full_light": {"full_well_e": 0}}, "exposure": EXPOSED}, "full_light.full_well_e'"),
@@ -169,7 +169,7 @@ def test_a_wrong_sensor_or_light_is_told_in_one_sentence(values: dict, message: 
         ({"photons": {"statistics": "multinomial", "nested": [1, 999]}}, "whole numbers"),
         ({"photons": {"scope": "exposure"}, "exposure": {}}, "the exposure's defaults"),
         ({"photons": {"budget": 1e15}}, "most photons"),
-        ({"sensor": {"counter_bits": 32, "hot_pixel_share": 1, "dead_pixel_share": 1}}, "all there is"),
+        ({"sensor": {"bits": 32, "hot_pixel_share": 1, "dead_pixel_share": 1}}, "all there is"),
         ({"sensor": {"full_light": {"adc_bits": 1, "read_noise_e": 0}}, "exposure": EXPOSED}, "least"),
     ],
 )

@@ -21,8 +21,9 @@ from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, places
-from simgen.sensor.detector import detect, full_light_image, nested_subset, saturate
+from simgen.sensor.detector import detect, full_light_image, nested_subset
 from simgen.sensor.exposure import photons_per_radiance
+from simgen.sensor.frame_readout import read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import Grid, Lens
@@ -75,7 +76,7 @@ def test_false_counts_need_no_light_and_are_the_same_again(seed, dark, hot, hot_
 @given(SEEDS, st.integers(0, 60), st.integers(1, 32), st.sampled_from([1, 50, 2**40]))
 def test_a_counter_stops_at_its_largest_number(seed: int, number: int, bits: int, most: int) -> None:
     arrivals = photons_of(seed, number, most)
-    stopped = saturate(arrivals, GRID, bits, seed)
+    stopped = read_out(arrivals, GRID, Sensor(bits=bits), seed)
     np.testing.assert_array_equal(film_of(stopped), np.minimum(film_of(arrivals), 2**bits - 1))
 
 

@@ -214,6 +214,7 @@ def test_a_score_keeps_the_spelling_of_its_file():
         "objects": [],
         "depth": {"mae_mm": None},
         "bounds": {},
+        "readout": None,
     }
 
 

@@ -34,7 +34,7 @@ SCENE = simgen.Scene(
 )
 LENS = simgen.Lens(aperture_mm=6, focus_mm=560)
 ERRORS = {"position_sd_mm": [0.5, 0.5, 0.1], "rotation_sd_deg": [0.1, 0.1, 0.2], "pitch_error": 0.01}
-SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "counter_bits": 2}
+SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "bits": 2}
 
 
 def dataset_of(out: Path, scene: simgen.Scene, **tables: Any) -> pcii.Dataset:

@@ -78,7 +78,7 @@ PLAIN = {"title": "even light", "lights": [{"type": "uniform", "luminance_cd_m2"
 RECIPE = {
     "scene": "here",
     "grid": {"rows": 2, "cols": 3, "errors": {}},
-    "sensor": {"camera": "a.csv", "counter_bits": 8},
+    "sensor": {"camera": "a.csv", "bits": 8},
     "photons": {"budget": 500.0, "nested": [100.0, 200.0]},
     "analysis": {"z_mm": [500.0], "z_range_mm": [400.0, 700.0]},
     "products": {"view_truth": ["z_mm"]},

@@ -231,7 +231,7 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize("sensor", [{}, {"counter_bits": 1}, FAULTY, FAULTY | {"counter_bits": 2}])
+@pytest.mark.parametrize("sensor", [{}, {"bits": 1}, FAULTY, FAULTY | {"bits": 2}])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
     told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
@@ -274,7 +274,7 @@ def from_known_places(made: Recipe) -> PhotonTable:
     return PhotonTable(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
 
 
-@pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"counter_bits": 2}])
+@pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"bits": 2}])
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))

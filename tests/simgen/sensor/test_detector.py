@@ -8,7 +8,8 @@ from scipy import stats
 
 from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
-from simgen.sensor.detector import detect, full_light_image, saturate
+from simgen.sensor.detector import detect, full_light_image
+from simgen.sensor.frame_readout import read_out
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable
 from simgen.spec.recipe import FullLight, Sensor
 
@@ -208,20 +209,20 @@ LOW = films(2, 3, 400, 400)
         (Sensor(), 1e-3),
         (Sensor(quantum_efficiency=(0.5, 0.5, 0.5)), 5e-4),
         (Sensor(dark_counts=1e-3), 2e-3),
-        (Sensor(counter_bits=1), 1e-3),
+        (Sensor(bits=1), 1e-3),
     ],
 )
 def test_the_mean_is_kept_at_low_light(sensor: Sensor, expected: float) -> None:
     counts = detect(poisson(1e-3, 1, LOW), LOW, "GRBG", sensor, seed=2)
-    if sensor.counter_bits is not None:  # two in a pixel are too rare to be missed here
-        counts = saturate(counts, LOW, sensor.counter_bits, seed=2)
+    if sensor.bits is not None:  # two in a pixel are too rare to be missed here
+        counts = read_out(counts, LOW, sensor, seed=2)
     assert has_mean(counted(counts, LOW), expected)
     assert not has_mean(2 * counted(counts, LOW), expected)  # the fault of a well-known simulator
 
 
 def test_one_bit_tells_whether_there_was_a_photon() -> None:
     rates = np.array([0.02, 0.1, 0.3, 0.5, 1.0, 3.0]).reshape(2, 3, 1, 1)
-    bits = counted(saturate(poisson(rates, seed=1), GRID, 1, seed=2))
+    bits = counted(read_out(poisson(rates, seed=1), GRID, Sensor(bits=1), seed=2))
     assert bits.max() == 1
     share, p = bits.mean(axis=(2, 3)), 1 - np.exp(-rates[:, :, 0, 0])
     spread = np.sqrt(p * (1 - p) / (50 * 60))
@@ -239,11 +240,12 @@ def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
     most = 2**bits - 1
     expected = np.minimum(UP_TO_NINE, most)
     photons = arriving(UP_TO_NINE)
-    np.testing.assert_array_equal(counted(saturate(photons, TEN, bits, seed=1), TEN), expected)
+    np.testing.assert_array_equal(counted(read_out(photons, TEN, Sensor(bits=bits), seed=1), TEN), expected)
     k, l, i, j = (np.tile(index, 2) for index in np.nonzero(UP_TO_NINE))
     n = UP_TO_NINE[UP_TO_NINE > 0]
     in_two_lumps = PhotonTable(k, l, i, j, np.concatenate([n // 2, n - n // 2]))
-    np.testing.assert_array_equal(counted(saturate(in_two_lumps, TEN, bits, seed=1), TEN), expected)
+    stopped = read_out(in_two_lumps, TEN, Sensor(bits=bits), seed=1)
+    np.testing.assert_array_equal(counted(stopped, TEN), expected)
     one_after_the_other = np.minimum(in_two_lumps.n, most)  # the fault: each lump stops by itself
     wrong = counted(replace(in_two_lumps, n=one_after_the_other), TEN)
     assert bits == 32 or (wrong != expected).any()
@@ -252,11 +254,11 @@ def test_a_counter_stops_at_its_largest_number(bits: int) -> None:
 def test_a_counter_of_32_bits_stops_at_four_thousand_million() -> None:
     zero = np.zeros(1, dtype=np.int64)
     many = PhotonTable(zero, zero, zero, zero, np.array([1 << 33]))
-    assert saturate(many, TEN, 32, seed=1).n.tolist() == [2**32 - 1]
+    assert read_out(many, TEN, Sensor(bits=32), seed=1).n.tolist() == [2**32 - 1]
 
 
 def test_no_counts_stay_none() -> None:
-    nothing = saturate(detect(DARKNESS, GRID, "GRBG", Sensor(), seed=1), GRID, 1, seed=1)
+    nothing = read_out(detect(DARKNESS, GRID, "GRBG", Sensor(), seed=1), GRID, Sensor(bits=1), seed=1)
     assert nothing.k.size == 0
 
 
@@ -272,7 +274,7 @@ def companions(n: list[int]) -> PhotonTable:
 @pytest.mark.parametrize(("n", "bits"), [([1, 1, 1], 1), ([1, 1, 1, 1, 1], 2), ([1, 9], 1), ([2, 8], 2)])
 def test_which_counts_a_counter_keeps_is_left_to_chance(n: list[int], bits: int) -> None:
     arrivals, pixels = companions(n), films(1, 1, 64, 64)
-    kept = saturate(arrivals, pixels, bits, seed=1)
+    kept = read_out(arrivals, pixels, Sensor(bits=bits), seed=1)
     most, total = 2**bits - 1, sum(n)
     assert (counted(kept, pixels) == most).all()
     assert kept.object_id is not None
@@ -283,7 +285,7 @@ def test_which_counts_a_counter_keeps_is_left_to_chance(n: list[int], bits: int)
         assert abs(kept.n[kept.object_id == number].sum() - mean) < 4 * spread
         first_in_the_list = 4096 * min(most, own)  # the fault: first come, first served
         assert number > 1 or abs(first_in_the_list - mean) > 4 * spread
-    other = saturate(arrivals, pixels, bits, seed=2)
+    other = read_out(arrivals, pixels, Sensor(bits=bits), seed=2)
     assert other.object_id is not None
     assert kept.object_id.tolist() != other.object_id.tolist()
 
