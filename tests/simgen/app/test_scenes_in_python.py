@@ -11,6 +11,7 @@ from tiny import TINY_RECIPE
 
 import pcii
 import simgen
+from pcii.core.photon_events import Readout
 from simgen.spec.recipe import Recipe
 
 GRID = Recipe.model_validate(TINY_RECIPE).grid.camera_grid()
@@ -34,7 +35,7 @@ SCENE = simgen.Scene(
 )
 LENS = simgen.Lens(aperture_mm=6, focus_mm=560)
 ERRORS = {"position_sd_mm": [0.5, 0.5, 0.1], "rotation_sd_deg": [0.1, 0.1, 0.2], "pitch_error": 0.01}
-SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "bits": 2}
+SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "frames": 3, "bits": 1}
 
 
 def dataset_of(out: Path, scene: simgen.Scene, **tables: Any) -> pcii.Dataset:
@@ -103,6 +104,7 @@ def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Pa
         sensor=SENSOR,
         photons={"budget": 300},
         render={"max_depth": 6},
+        products={"frames": True},
     )
     options: dict[str, Any] = {"budget": 300, "seed": 3, "lens": LENS.model_dump(), "max_depth": 6}
     for errors, sensor in (
@@ -113,6 +115,10 @@ def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Pa
         assert (counts.grid, counts.cfa) == (dataset.grid, "RGGB")
         for name in "klijn":
             np.testing.assert_array_equal(getattr(counts.events, name), getattr(dataset.counts.events, name))
+        assert counts.readout == dataset.counts.readout == Readout(3, 1)
+        assert counts.frame is not None
+        assert dataset.counts.frame is not None
+        np.testing.assert_array_equal(counts.frame, dataset.counts.frame)
         assert dataset.truth is not None
         np.testing.assert_array_equal(truth.z_mm, dataset.truth.z_mm)
         assert truth.photons is not None
@@ -122,6 +128,10 @@ def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Pa
             np.testing.assert_array_equal(getattr(truth.photons, name), known)
     others, _ = simgen.draw_photons(SCENE, GRID, errors=ERRORS, sensor=SENSOR | {"dark_counts": 0}, **options)
     assert others.total < counts.total
+    without = {name: value for name, value in SENSOR.items() if name not in ("frames", "bits")}
+    photons, _ = simgen.draw_photons(SCENE, GRID, errors=ERRORS, sensor=without, **options)
+    assert (counts.dense <= photons.dense).all()  # the same photons, read out in another way
+    assert counts.total < photons.total
 
 
 @pytest.mark.renders

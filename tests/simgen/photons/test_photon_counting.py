@@ -231,7 +231,10 @@ FAULTY = {
 }
 
 
-@pytest.mark.parametrize("sensor", [{}, {"bits": 1}, FAULTY, FAULTY | {"bits": 2}])
+IN_FRAMES = FAULTY | {"bits": 1, "frames": 3}
+
+
+@pytest.mark.parametrize("sensor", [{}, {"bits": 1}, FAULTY, FAULTY | {"bits": 2}, IN_FRAMES])
 def test_what_is_written_is_nested_whatever_the_sensor(sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor)
     told = write_counts(capture_of(made, made.seed), made.sensor, dense(made), tmp_path, with_origins=True)
@@ -274,7 +277,9 @@ def from_known_places(made: Recipe) -> PhotonTable:
     return PhotonTable(k, l, i, j, ones, 0 * ones, np.arange(flat.size), flat + 1, flat + 0.5)
 
 
-@pytest.mark.parametrize("sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"bits": 2}])
+@pytest.mark.parametrize(
+    "sensor", [{}, FAULTY | {"hot_pixel_counts": 20.0}, FAULTY | {"bits": 2}, IN_FRAMES | {"frames": 40}]
+)
 @pytest.mark.parametrize("budget", [None, 40])
 def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: dict, tmp_path: Path) -> None:
     made = recipe(sensor=sensor, photons=nested(scope="scene"))
@@ -292,6 +297,25 @@ def test_each_written_photon_has_its_own_origin(budget: float | None, sensor: di
     assert np.isinf(z_mm[~real]).all()
     assert (~real).any() == bool(sensor)
     assert (np.roll(object_id, 1)[real] != pixel[real] + 1).any()  # the fault: one's neighbour's origin
+
+
+def test_frames_are_written_on_request_and_nested_like_the_photons(tmp_path: Path) -> None:
+    made = recipe(sensor=IN_FRAMES | {"frames": 40}, photons=nested(scope="scene"))
+    capture, arrivals = capture_of(made, made.seed), from_known_places(made)
+    write_counts(capture, made.sensor, arrivals, tmp_path, with_origins=True, keeps_frames=True)
+    bits: dict[float | None, set[tuple[int, ...]]] = {}
+    for budget in (None, 40, 8):
+        group = zarr.open_group(tmp_path / nested_name(COUNTS, budget), mode="r")
+        n, frame = np.asarray(group["n"]), np.asarray(group["frame"])
+        assert frame.dtype == np.uint16
+        pixels = (np.asarray(group[name]).repeat(n).tolist() for name in "klij")
+        bits[budget] = set(zip(*pixels, frame.tolist(), strict=True))
+        assert len(bits[budget]) == frame.size == n.sum()  # each pixel and frame once
+    assert bits[8] < bits[40] < bits[None]
+    without = tmp_path / "without"
+    without.mkdir()
+    write_counts(capture, made.sensor, arrivals, without, with_origins=True)
+    assert "frame" not in zarr.open_group(without / COUNTS, mode="r")
 
 
 def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
