@@ -124,20 +124,26 @@ def _rate_of_bits(number: np.ndarray, trials: np.ndarray) -> np.ndarray:
         return np.where(few, -np.log1p(-number / trials), np.log(trials) - np.log(trials - number))
 
 
+def clipped_mean(rate: np.ndarray, most: int) -> np.ndarray:
+    """Mean of Poisson numbers of these rates, clipped at `most`: mu P(X < most) + most P(X > most)."""
+    from scipy.special import pdtr, pdtrc
+
+    return rate * pdtr(most - 1, rate) + most * pdtrc(most, rate)
+
+
 def _rate(mean: np.ndarray, most: int) -> np.ndarray:
     """The mean mu of Poisson numbers that have this `mean` when they are clipped at `most`.
 
-    That is g(mu) = mu P(X < most) + most P(X > most). It is concave and has the slope P(X < most), so
-    Newton's steps from the mean, which is never above mu, approach it from one side.
+    `clipped_mean` is concave and has the slope P(X < most), so Newton's steps from the mean, which is never
+    above mu, approach it from one side.
     """
-    from scipy.special import pdtr, pdtrc
+    from scipy.special import pdtr
 
     rate = np.where(mean < most, mean, np.inf)
     open_ = np.isfinite(rate)
     for _ in range(NEWTON_STEPS):
         mu = rate[open_]
-        slope = pdtr(most - 1, mu)
-        step = np.maximum(mean[open_] - mu * slope - most * pdtrc(most, mu), 0) / slope
+        step = np.maximum(mean[open_] - clipped_mean(mu, most), 0) / pdtr(most - 1, mu)
         rate[open_] = mu + step
         open_[open_] = step > 1e-15 * mu
         if not open_.any():

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from pcii.core.bayer import channel_count
+from pcii.core.photon_events import clipped_mean
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts
 
 LEAST_PHOTONS = 100
@@ -12,6 +13,8 @@ LEAST_PHOTONS = 100
 LEAST_VOXEL_COUNTS = 0.1
 MOST_LOST_SHARE = 0.5
 MOST_FALSE_SHARE = 0.5
+MOST_SATURATED_SHARE = 0.02
+"""Up to so much depth and removal are meant for, which take counts for Poisson numbers."""
 
 
 def photon_findings(facts: Facts) -> list[Finding]:
@@ -28,7 +31,7 @@ def photon_findings(facts: Facts) -> list[Finding]:
             remedy = f"darken it, or {more} for the objects" if much else ""
             text = f"{place}: {lost:.1%} of the photons"
             found.append(Finding("warn" if remedy else "ok", "photons", text, remedy))
-    return found + _false_findings(facts, total)
+    return found + _saturation_findings(facts) + _false_findings(facts, total)
 
 
 def photons_per_view(facts: Facts, light_share: np.ndarray) -> float:
@@ -59,7 +62,7 @@ def _object_finding(facts: Facts, thing: ObjectFacts) -> Finding:
     total = photons_per_view(facts, np.ones(channel_count(facts.sensor.bayer)))
     expected = photons_per_view(facts, thing.light_share)
     everywhere = expected * grid.view_count
-    voxel = everywhere / max(thing.film_share * grid.height * grid.width, 1e-9)
+    voxel = _per_pixel(facts, thing, grid.height * grid.width) * grid.view_count
     error = f", a relative error of {1 / math.sqrt(voxel):.0%}" if voxel > 0 else ""
     text = (
         f"{thing.name}: {expected / total:.1%}, {_number(expected)} per view, {_number(everywhere)} in all; "
@@ -73,6 +76,29 @@ def _object_finding(facts: Facts, thing: ObjectFacts) -> Finding:
     if voxel < 1:
         return Finding("note", "photons", text, f"{math.ceil(1 / voxel)} voxels share a photon: pool them")
     return Finding("ok", "photons", text)
+
+
+def _saturation_findings(facts: Facts) -> list[Finding]:
+    """What frames of few bits lose of the object that is brightest on the film."""
+    sensor, grid = facts.sensor, facts.grid
+    most = sensor.readout.most_per_frame
+    if most is None or not facts.seen:
+        return []
+    pixels = grid.height * grid.width
+    brightest, thing = max(
+        ((_per_pixel(facts, thing, pixels), thing) for thing in facts.seen), key=lambda pair: pair[0]
+    )
+    per_frame = brightest / sensor.frames
+    lost = 1 - float(clipped_mean(np.array(per_frame), most)) / per_frame if per_frame > 0 else 0.0
+    text = f"{thing.name}: {per_frame:.2g} photons per pixel and frame, of which {lost:.1%} saturate"
+    if lost <= MOST_SATURATED_SHARE:
+        return [Finding("ok", "photons", text)]
+    return [Finding("warn", "photons", text, "raise sensor.frames, or take less light")]
+
+
+def _per_pixel(facts: Facts, thing: ObjectFacts, pixels: int) -> float:
+    """Counts of one view's pixel, over the whole exposure, where it sees the object."""
+    return photons_per_view(facts, thing.light_share) / max(thing.film_share * pixels, 1e-9)
 
 
 def _more(facts: Facts, factor: float, purpose: str) -> str:

@@ -322,6 +322,18 @@ def test_light_beside_the_objects_and_dark_counts_are_told() -> None:
     assert "51% of all counts" in dark.text
 
 
+def test_what_saturates_is_told_of_the_brightest() -> None:
+    small, large = thing("small", 540, share=0.001), thing("large", 620, share=0.1)
+    found = photon_findings(facts(small, large, recipe={"sensor": {"frames": 100, "bits": 1}}))[-1]
+    assert found.verdict == "ok"  # a quarter of 1000 photons on a thousandth of the pixels
+    assert found.text == "small: 0.0024 photons per pixel and frame, of which 0.1% saturate"
+    alone = photon_findings(facts(small, large, recipe={"sensor": {"bits": 1}}))[-1]
+    assert alone.verdict == "warn"
+    assert "0.24 photons per pixel and frame, of which 11.0% saturate" in alone.text
+    assert "sensor.frames" in alone.remedy
+    assert len(photon_findings(facts(small, large, recipe={"sensor": {"frames": 100}}))) == 2
+
+
 def test_without_counts_or_light_there_is_nothing_to_say_of_photons() -> None:
     assert photon_findings(facts(thing("a", 540), plan=None)) == []
     assert photon_findings(facts(thing("a", 540), luminance=0.0)) == []
