@@ -39,7 +39,7 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
             bits = "" if readout.bits is None else f" of {readout.bits} bit{'s' * (readout.bits > 1)}"
             facts.append(("frames", f"{readout.frames:,}{bits}"))
         if readout.bits is not None:
-            facts.append(("photons lost to saturation", _percent(saturation_loss(counts))))
+            facts.append(("photons lost to saturation", f"{100 * saturation_loss(counts):.2g} %"))
     for focus in outcome.focus:
         ious = [
             row["iou"] for row in _rows_of(score.planes, focus.method, "object") if row["object"] is not None
