@@ -172,7 +172,7 @@ def _depths(file: TransformsFile, found: PoseGrid) -> tuple[np.ndarray | None, l
         if not (z_mm >= 0).all():
             raise InputError(f"{path}: holds NaN or depths below 0")
         depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
-    return depths, [f"with the true depth of every view, in steps of {unit_mm:g} mm, 0 where nothing is hit"]
+    return depths, [f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit"]
 
 
 _UNIT = "depth_unit_scale_factor"
