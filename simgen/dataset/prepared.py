@@ -60,7 +60,6 @@ class Prepared:
         decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
         del decisive["photons"]["nested"]
         del decisive["sensor"]["frames"], decisive["sensor"]["bits"]
-        decisive["sensor"]["counter_bits"] = None  # as it was hashed before, for the same photons as then
         drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=said)}
         return seeds.seed_of_draw(self.recipe.seed, [drawn, decisive, self.recipe.render.max_depth])
 
