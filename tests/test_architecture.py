@@ -21,6 +21,7 @@ ROOMS = {
         "figures",
         "core",
         "io",
+        "transforms",
         "sections",
         "exporting",
         "evidence",
