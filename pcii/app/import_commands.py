@@ -36,9 +36,9 @@ def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_S
     ----------
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
-        benchmark, a picture of a lens array, an array in a .npy or .npz file: (K, L, H, W), (K, L, H, W, C),
-        or with --counts (K, L, N, H, W); or events.npz or views.exr of `simgen export`, which need no
-        options.
+        benchmark, pictures with a transforms.json of nerfstudio, a picture of a lens array, an array in a
+        .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W); or events.npz or
+        views.exr of `simgen export`, which need no options.
     out
         Folder for the dataset: new or empty.
     """
@@ -60,9 +60,11 @@ def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_S
             out,
             given,
             imported.truth,
+            view_z_mm=imported.view_z_mm,
             z_mm=depths or imported.z_mm or [float(f"{z:.3g}") for z in sharp] or None,
             z_range_mm=z_range,
             photon_budget=photons or imported.photon_budget,
+            radiance_unit=imported.radiance_unit,
             title=said.title or source.resolve().name,
             licence=said.licence,
             citation=said.citation,

@@ -1,6 +1,6 @@
 """Options of `pcii import`: of views and their order, cameras, lens arrays, light, and the dataset."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +12,8 @@ from pcii.importing.camera_order import Optics
 from pcii.importing.import_requests import Request, ViewOptions, WholePair
 from pcii.importing.lens_arrays import LensArray
 from pcii.importing.light_encoding import Encoding, check_encoding
+from pcii.transforms.film_sizes import FilmSize
+from pcii.transforms.transforms_file import TRANSFORMS
 
 Pair = tuple[float, float] | None
 
@@ -63,6 +65,17 @@ class CameraOptions:
     """Side of a pixel, instead of --sensor-mm."""
     shear_px: Pair = None
     """Disparity, x and y, that was taken out of the pictures of a converging grid."""
+
+    def film(self) -> FilmSize | None:
+        """The one length that is said beside a transforms.json; `InputError` for what that tells itself."""
+        if self.pitch_mm is not None or self.shear_px is not None:
+            raise InputError(
+                f"--pitch-mm, --shear-px: {TRANSFORMS} tells where cameras are; leave them out, or give "
+                "--pattern"
+            )
+        if self.focal_mm is None and self.sensor_mm is None and self.pixel_mm is None:
+            return None
+        return FilmSize(focal_mm=self.focal_mm, sensor_mm=self.sensor_mm, pixel_mm=self.pixel_mm)
 
     def optics(self, lenses: LensArray | None) -> Optics | None:
         """The cameras' optics; None if nothing is said of them. `InputError` if only a part is."""
@@ -146,7 +159,10 @@ class ImportOptions:
     def request(self, source: Path) -> Request:
         """What is asked of a source; raises `InputError` for what is said by half."""
         lenses, light = self.lenses.lenses(), self.light
-        return Request(source, self.views, self.cameras.optics(lenses), lenses, light.encoding(), light.cfa)
+        asked = Request(source, self.views, None, lenses, light.encoding(), light.cfa)
+        if asked.transforms is not None:
+            return replace(asked, film=self.cameras.film())
+        return replace(asked, optics=self.cameras.optics(lenses))
 
 
 NOTHING_SAID = ImportOptions()

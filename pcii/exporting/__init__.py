@@ -10,10 +10,12 @@ exr_parts            One OpenEXR file: a part for each view with its radiance an
                      the truth.
 hci_layout           The layout of the 4D Light Field Benchmark of Konstanz and Heidelberg (Honauer et
                      al., ACCV 2016).
+nerfstudio_folder    Pictures with the poses of their cameras, as nerfstudio and its kin read them.
 publication_terms    Under what terms a dataset is published, and who made it: what its card says and its
                      data do not.
 sub_aperture_images  Sub-aperture images: a PNG for each view, named by row and column of its camera, and
                      the cameras as JSON.
 view_names           Names of views in files: camera (k, l) with as many digits as the grid needs, so that
                      they sort.
+view_pictures        Pictures of 8 bits of a dataset's views, of one white for all.
 """

@@ -24,18 +24,15 @@ from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.core.camera_grid import CameraGrid
 from pcii.exporting.view_names import number_width
-from pcii.figures.pictures import to_srgb8
+from pcii.exporting.view_pictures import pictures_of
 from pcii.io.dataset import Dataset
 from pcii.pictures.written_pixels import write_pfm, write_png
-from pcii.sections.demosaicing import demosaic
 
 PARAMETERS = "parameters.cfg"
 README = "README.txt"
 INFINITY_M = 1e9
 """Focus distance of a grid without shear. The benchmark's own tools divide by the focus distance and multiply
 with it: infinity or 0 would make NaN of all disparities; this changes none by more than 1e-8 of itself."""
-WHITE_SHARE = 0.999
-"""Share of the values in the middle view that are not brighter than white."""
 
 
 def write_hci(dataset: Dataset, folder: Path) -> None:
@@ -49,10 +46,10 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
             f"{shear_px:g} px have none; export saii, events or exr"
         )
     focus_m = grid.focal_mm * baseline_mm / (shear_px * grid.pixel_mm) / 1000 if shear_px else INFINITY_M
-    picture, pixels_are = _pictures(dataset)
+    pictures = pictures_of(dataset)
     names = _camera_names(grid)
     for (k, l), name in names.items():
-        write_png(folder / f"input_{name}.png", picture(k, l))
+        write_png(folder / f"input_{name}.png", pictures.view(k, l))
 
     def disparity_px(z_mm: np.ndarray | float) -> np.ndarray:
         return baseline_mm * grid.focal_mm / (np.asarray(z_mm, np.float64) * grid.pixel_mm) - shear_px
@@ -63,7 +60,7 @@ def write_hci(dataset: Dataset, folder: Path) -> None:
         write_pfm(folder / f"gt_disp_lowres{suffix}.pfm", disparity_px(z_mm))
     parameters = _parameters(dataset, baseline_mm, shear_px, focus_m, disparity_px)
     (folder / PARAMETERS).write_text(parameters)
-    (folder / README).write_text(_readme(dataset, pixels_are, maps_are))
+    (folder / README).write_text(_readme(dataset, pictures.meaning, maps_are))
 
 
 def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> float:
@@ -81,37 +78,6 @@ def _of_both_axes(dataset: Dataset, name: str, pair: tuple[float, float]) -> flo
 def _camera_names(grid: CameraGrid) -> dict[tuple[int, int], str]:
     width = number_width(grid.view_count, 3)
     return {(k, l): f"Cam{k * grid.cols + l:0{width}d}" for k, l in np.ndindex(grid.rows, grid.cols)}
-
-
-def _pictures(dataset: Dataset) -> tuple[Callable[[int, int], np.ndarray], str]:
-    """The picture of a camera, uint8 (H, W, 3), and what its numbers are."""
-    grid, views = dataset.grid, dataset.views
-    if views is not None:
-        cfa, unit = views.cfa, visible(str(dataset.manifest.get("radiance_unit", "radiance")))
-
-        def colours(k: int, l: int) -> np.ndarray:
-            image = views.view(k, l)
-            return image if cfa is None else demosaic(image[..., 0], cfa=cfa)
-
-        white = float(np.quantile(colours(grid.rows // 2, grid.cols // 2), WHITE_SHARE))
-        how = "" if cfa is None else f", the {cfa} mosaic demosaiced by the method of Laroche and Prescott"
-        return (
-            lambda k, l: to_srgb8(colours(k, l), white if white > 0 else 1.0),
-            f"radiance, encoded as sRGB: 255 is {white:.6g} ({unit}) or more{how}",
-        )
-    if not dataset.has_counts:
-        raise InputError(f"{dataset.path}: has neither radiance nor counts, so there are no images to export")
-    counts = dataset.counts
-    most = max(int(counts.events.n.max(initial=0)), 1)
-    mosaic = (
-        "" if counts.cfa is None else f"; in grey, since each pixel of the {counts.cfa} mosaic has one colour"
-    )
-
-    def photons(k: int, l: int) -> np.ndarray:
-        image = np.round(255 / most * counts.view(k, l)).astype(np.uint8)
-        return np.repeat(image[..., None], 3, axis=2)
-
-    return photons, f"photon counts, not gamma-encoded: 255 is {most} photons in the pixel, 0 none{mosaic}"
 
 
 def _depth_maps(dataset: Dataset, names: dict[tuple[int, int], str]) -> tuple[dict[str, np.ndarray], str]:

@@ -18,7 +18,7 @@ from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.exporting.view_names import number_width
+from pcii.exporting.view_names import row_and_column
 from pcii.io.dataset import Dataset
 from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import json_bytes
@@ -56,7 +56,7 @@ def _write_counts(counts: PhotonCounts, path: Path, folder: Path) -> None:
     dtype = np.uint8 if bits == 8 else np.uint16
     folder.mkdir()
     for k, l in np.ndindex(counts.grid.rows, counts.grid.cols):
-        write_png(folder / _name(counts.grid, k, l), counts.view(k, l).astype(dtype))
+        write_png(folder / f"{row_and_column(counts.grid, k, l)}.png", counts.view(k, l).astype(dtype))
     _write_camera(counts.grid, counts.cfa, meaning, folder)
 
 
@@ -73,14 +73,12 @@ def _write_radiance(views: Views, unit: str, path: Path, folder: Path) -> None:
     for k, l in cameras:
         share = views.view(k, l).astype(np.float64) / full_scale
         image = np.round(MOST[16] * share).astype(np.uint16)
-        write_png(folder / _name(views.grid, k, l), image[..., 0] if image.shape[2] == 1 else image)
+        write_png(
+            folder / f"{row_and_column(views.grid, k, l)}.png",
+            image[..., 0] if image.shape[2] == 1 else image,
+        )
     meaning = {"quantity": "radiance", "unit": unit, "full_scale": full_scale, "bits": 16}
     _write_camera(views.grid, views.cfa, meaning, folder)
-
-
-def _name(grid: CameraGrid, k: int, l: int) -> str:
-    width = number_width(max(grid.rows, grid.cols), 2)
-    return f"{k:0{width}d}_{l:0{width}d}.png"
 
 
 def _write_camera(grid: CameraGrid, cfa: str | None, meaning: Mapping[str, Any], folder: Path) -> None:

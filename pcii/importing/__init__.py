@@ -20,5 +20,6 @@ import_requests What an import is asked for, and what is read of it: which kind 
 lens_arrays     Pictures of a lens array: one picture that holds the elemental images of all lenses side
                 by side.
 light_encoding  Linear radiance from the numbers of picture files: sRGB, a gamma, or linear already.
+posed_pictures  Pictures with the poses of their cameras: transforms.json as nerfstudio and its kin write it.
 plane_sweep     How well views agree at each of many depths: a plane sweep at reduced resolution.
 """

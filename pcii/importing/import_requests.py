@@ -21,6 +21,8 @@ from pcii.importing.hci_scenes import PARAMETERS, import_hci
 from pcii.importing.image_folders import import_images, is_picture
 from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.importing.light_encoding import Encoding
+from pcii.importing.posed_pictures import import_posed_pictures, transforms_in
+from pcii.transforms.film_sizes import FilmSize
 
 WholePair = tuple[int, int] | None
 
@@ -74,6 +76,13 @@ class Request:
     lenses: LensArray | None = None
     encoding: Encoding | None = None
     cfa: str | None = None
+    film: FilmSize | None = None
+    """One length of the cameras of a transforms.json, which tells all others."""
+
+    @property
+    def transforms(self) -> Path | None:
+        """The transforms.json to read; None if the source is another, or options say how to read it."""
+        return transforms_in(self.source) if self.views.pattern is None and self.lenses is None else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,6 +97,8 @@ class Imported:
     beside: tuple[Views | PhotonCounts, ...] = ()
     z_mm: tuple[float, ...] = ()
     photon_budget: float | None = None
+    view_z_mm: np.ndarray | None = None
+    radiance_unit: str | None = None
 
     def view_of(self) -> Callable[[int, int], np.ndarray]:
         """A function that returns the light (H, W) of a view, all colours together."""
@@ -104,6 +115,8 @@ def read(asked: Request, report: Report) -> Imported:
         raise InputError(f"{source}: there is no such file or folder")
     if views.counts and asked.encoding is not None:
         raise InputError("--counts: photon counts are linear; leave out --linear, --srgb and --gamma")
+    if asked.transforms is not None:
+        return _with_pattern(_posed(asked, asked.transforms, report), asked.cfa)
     if views.pattern is None and asked.lenses is None and (source / PARAMETERS).is_file():
         return _with_pattern(_hci(asked, report), asked.cfa)
     if asked == Request(source) and (file := exported_file(source)) is not None:
@@ -134,6 +147,24 @@ def _hci(asked: Request, report: Report) -> Imported:
     if scene.truth is not None:
         notes.append("with the true depth of the virtual centre")
     return Imported(scene.views, origin, scene.truth, scene.z_range_mm, notes)
+
+
+def _posed(asked: Request, file: Path, report: Report) -> Imported:
+    if asked.optics is not None or asked.views != ViewOptions():
+        raise InputError(f"{file}: tells the cameras; leave out options of grid and order, or give --pattern")
+    found = import_posed_pictures(file, film=asked.film, encoding=asked.encoding, report=report)
+    if isinstance(found.images, PhotonCounts) and asked.cfa is not None:
+        raise InputError(f"{file}: tells photon counts and their Bayer pattern; leave out --cfa")
+    what = "photons" if isinstance(found.images, PhotonCounts) else "pictures"
+    origin = f"{found.images.grid.view_count} {what} of {file.resolve().parent.name}, placed by {file.name}"
+    return Imported(
+        found.images,
+        origin,
+        found.truth,
+        notes=found.notes,
+        view_z_mm=found.view_z_mm,
+        radiance_unit=found.radiance_unit,
+    )
 
 
 def _exported(file: Path) -> Imported:

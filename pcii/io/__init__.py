@@ -9,6 +9,8 @@ dataset_writer     Datasets written from images and truth in memory: whole folde
                    opens.
 evaluation_layout  The folder of an evaluation: rows that grow while several processes measure, and what
                    sums them up.
+given_truth        What a dataset that is written is given of truth and words: checked, and as it is
+                   stored.
 manifest_schema    Pydantic models of the manifests; members that they do not name are allowed and
                    ignored.
 results_list       The file results.json: the dataset of the results in a folder, and their files with

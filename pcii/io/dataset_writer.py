@@ -12,7 +12,7 @@ from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LAB
 from pcii.core.arrays import MOST_DEPTHS, check_z_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+from pcii.core.truth import Truth
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_layout import (
     COUNTS,
@@ -27,6 +27,14 @@ from pcii.io.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
+from pcii.io.given_truth import (
+    as_stored,
+    check_origins,
+    check_texts,
+    check_truth,
+    checked_depths,
+    stored_maps,
+)
 from pcii.io.zarr_groups import DTYPES, write_arrays_safely
 from pcii.store.file_list import check_files, list_files
 from pcii.store.hashes import hash_json
@@ -35,7 +43,6 @@ from pcii.store.software import PACKAGE, versions
 
 DENSE_SHARE = 1 / 16
 """Dense counts of a larger share of occupied pixels are written dense: events would take more bytes."""
-LARGEST_ID = 10**9 - 1
 LARGEST_BUDGET = 1 << 53
 """Of larger whole numbers doubles, and so JSON, no longer hold every one."""
 
@@ -45,9 +52,11 @@ def save_dataset(
     images: PhotonCounts | Views | Sequence[PhotonCounts | Views],
     truth: Truth | None = None,
     *,
+    view_z_mm: np.ndarray | None = None,
     z_mm: object = None,
     z_range_mm: tuple[float, float] | None = None,
     photon_budget: float | None = None,
+    radiance_unit: str | None = None,
     title: str | None = None,
     licence: str | None = None,
     citation: str | None = None,
@@ -57,9 +66,11 @@ def save_dataset(
 
     `images` is `PhotonCounts`, `Views`, or a pair of them of the same cameras and Bayer pattern; full-colour
     views go with mosaic counts. `truth` is of the virtual centre; its `photons`, if known, are in the order
-    of the counts' events. `z_mm` and `z_range_mm` (near, far) are depths to look at, suggested to `pcii run`
-    and others. `photon_budget`, if it is known, is how many photons were expected in each view. `title`,
-    `licence`, `citation` and `origin` (where the images come from) are shown in reports.
+    of the counts' events; `view_z_mm` (K, L, H, W) is the true planar depth of every view, +inf where nothing
+    is hit, stored as float32. `z_mm` and `z_range_mm` (near, far) are depths to look at, suggested to
+    `pcii run` and others. `photon_budget`, if it is known, is how many photons were expected in each view,
+    and `radiance_unit` what numbers of radiance are. `title`, `licence`, `citation` and `origin` (where the
+    images come from) are shown in reports.
 
     The folder is complete or is not there. Its identity is a hash of the content of its files, the grid and
     the objects' names; a folder that holds this very dataset keeps its files, and takes over a new budget,
@@ -81,15 +92,19 @@ def save_dataset(
         if counts is None:
             raise InputError("photon_budget: is of photon counts, and these images are radiance alone")
     texts = {"title": title, "licence": licence, "citation": citation, "origin": origin}
-    _check_texts(texts)
+    if radiance_unit is not None:
+        texts["radiance_unit"] = radiance_unit
+    check_texts(texts)
     if truth is not None:
-        _check_truth(truth, counts or views)
+        check_truth(truth, counts or views)
+    if view_z_mm is not None:
+        view_z_mm = checked_depths(view_z_mm, counts or views)
     out = Path(path).absolute()
     with named_in_errors(out):
         held_dataset(out, None, content=False)
         out.parent.mkdir(parents=True, exist_ok=True)
         with temporary_folder(out) as new:
-            _write_parts(new, counts, views, truth)
+            _write_parts(new, counts, views, truth, view_z_mm)
             manifest = _content(new, counts, views, truth)
             software = versions(PACKAGE, "numpy", "zarr")
             told = {"analysis": analysis, "photon_budget": photon_budget, "versions": software}
@@ -102,13 +117,26 @@ def save_dataset(
     return open_dataset(path)
 
 
-def _write_parts(folder: Path, counts: PhotonCounts | None, views: Views | None, truth: Truth | None) -> None:
+def _write_parts(
+    folder: Path,
+    counts: PhotonCounts | None,
+    views: Views | None,
+    truth: Truth | None,
+    view_z_mm: np.ndarray | None,
+) -> None:
     if counts is not None:
         write_counts(folder / COUNTS, counts)
     if views is not None:
         _write_radiance(folder, views)
-    if truth is not None:
-        _write_truth(folder, truth, counts)
+    maps = {} if truth is None else stored_maps(truth)
+    if view_z_mm is not None:
+        maps["view_z_mm"] = view_z_mm
+    if maps:
+        write_arrays_safely(folder / TRUTH, maps, TRUTH_LABELS)
+    if truth is not None and truth.photons is not None:
+        check_origins(truth.photons, counts)
+        ids = np.asarray(truth.photons.object_id).astype(np.int32)
+        write_photon_truth(folder / PHOTON_TRUTH, ids, as_stored(truth.photons.z_mm))
 
 
 def write_counts(folder: Path, counts: PhotonCounts) -> None:
@@ -210,28 +238,6 @@ def check_budget(photon_budget: object) -> float:
     return float(number)
 
 
-def _check_texts(texts: Mapping[str, object]) -> None:
-    """Raise `InputError` for a value that is neither text nor None."""
-    for name, text in texts.items():
-        if text is not None and not isinstance(text, str):
-            raise InputError(f"{name}: expected text, got {type(text).__name__}")
-
-
-def _check_truth(truth: object, images: Any) -> None:
-    """Raise `InputError` unless the truth is of the images' size and can be stored."""
-    if not isinstance(truth, Truth):
-        raise InputError(f"truth: expected Truth, got {type(truth).__name__}")
-    size = images.grid.height, images.grid.width
-    if truth.z_mm.shape != size:
-        raise InputError(f"truth: expected maps of {size}, as the images, got {truth.z_mm.shape}")
-    if truth.z_mm.dtype.kind not in "fiu" or truth.object_id.dtype.kind not in "iu":
-        raise InputError("truth: expected depths that are real and object ids that are whole numbers")
-    for key, name in truth.names.items():
-        whole = isinstance(key, int | np.integer) and not isinstance(key, bool) and abs(key) <= LARGEST_ID
-        if not whole or not isinstance(name, str):
-            raise InputError(f"truth: names: expected text by object id up to {LARGEST_ID}, got {key!r}")
-
-
 def _write_radiance(root: Path, views: Views) -> None:
     for k, l in np.ndindex(views.grid.rows, views.grid.cols):
         with np.errstate(over="ignore"):
@@ -239,32 +245,6 @@ def _write_radiance(root: Path, views: Views) -> None:
         if not np.isfinite(image).all():
             raise InputError(f"radiance: view ({k}, {l}) is too bright for float32")
         write_exr_safely(root / radiance_name(k, l), image)
-
-
-def _write_truth(root: Path, truth: Truth, counts: PhotonCounts | None) -> None:
-    maps = {"z_mm": _as_stored(truth.z_mm), "object_id": truth.object_id.astype(np.int32)}
-    for name in OPTIONAL_MAPS:
-        if getattr(truth, name) is not None:
-            maps[name] = getattr(truth, name)
-    write_arrays_safely(root / TRUTH, maps, TRUTH_LABELS)
-    if truth.photons is not None:
-        _check_origins(truth.photons, counts)
-        ids = np.asarray(truth.photons.object_id).astype(np.int32)
-        write_photon_truth(root / PHOTON_TRUTH, ids, _as_stored(truth.photons.z_mm))
-
-
-def _as_stored(z_mm: np.ndarray) -> np.ndarray:
-    return z_mm if z_mm.dtype == np.float32 else z_mm.astype(np.float64)
-
-
-def _check_origins(photons: PhotonTruth, counts: PhotonCounts | None) -> None:
-    """Raise `InputError` unless the origins are those of the counts, photon by photon."""
-    if counts is None:
-        raise InputError("truth: photons: there are no photon counts that they belong to")
-    events = counts.events
-    for name in "klij":
-        if not np.array_equal(getattr(photons, name), getattr(events, name).repeat(events.n)):
-            raise InputError("truth: photons: not those of the counts, in the order of their events")
 
 
 def _content(

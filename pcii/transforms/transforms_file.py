@@ -18,6 +18,8 @@ from pcii.transforms.parsed_members import Members, finite
 
 TRANSFORMS = "transforms.json"
 REMEDY = "expected a transforms.json as nerfstudio reads it"
+DEPTH_UNIT_M = 1e-3
+"""Of the numbers in files of depth, where `depth_unit_scale_factor` says nothing else; as in nerfstudio."""
 MOST_FRAMES = 1 << 16
 MOST_PIXELS = 1 << 20
 """Most pixels of a side."""
