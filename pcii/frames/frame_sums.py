@@ -18,6 +18,8 @@ from pcii.frames.frame_files import FrameFile
 
 MOST_KEPT = 1 << 24
 """Most single counts of all views whose frames are kept."""
+SEARCHED_BYTES = 1 << 18
+"""Of frames that are searched for set bits at once: the search takes up to 500 times as much memory."""
 
 
 def chosen_frames(asked: tuple[int, int] | None, frames: int, name: str) -> tuple[int, int]:
@@ -108,8 +110,10 @@ def _read(
             total = _sums(np.concatenate([*kept, np.empty(0, np.int64)]), span, grid)
             kept.clear()
         if total is None:
-            frame, i, j = places_set(frames)
-            kept.append((i * grid.width + j) * (stop - first) + (begin - first) + frame)
+            some = max(SEARCHED_BYTES // frames[0].nbytes, 1)
+            for low in range(0, len(frames), some):
+                frame, i, j = places_set(frames[low : low + some])
+                kept.append((i * grid.width + j) * (stop - first) + (begin + low - first) + frame)
             room -= found
         else:
             for low in range(0, len(frames), MOST_FRAMES_AT_ONCE):
@@ -125,18 +129,22 @@ def _sums(places: np.ndarray, span: tuple[int, int], grid: CameraGrid) -> np.nda
     return sums.reshape(grid.shape_HW).astype(np.min_scalar_type(frames))
 
 
-def _of_single_counts(kept: list[np.ndarray], frames: int, grid: CameraGrid, cfa: str | None) -> PhotonCounts:
+def _of_single_counts(
+    kept: list[np.ndarray], frames: int, grid: CameraGrid, cfa: str | None
+) -> PhotonCounts:
     """Counts with their frames, of the single counts of each view."""
-    columns: dict[str, list[np.ndarray]] = {name: [] for name in ("k", "l", "i", "j", "n", "frame")}
+    # Of the smallest types: these lists are in memory beside the sorted ones.
+    largest = {**dict(zip("klij", grid.shape_KLHW, strict=True)), "n": frames, "frame": frames}
+    columns: dict[str, list[np.ndarray]] = {name: [] for name in largest}
     for number in range(len(kept)):
         pixel, frame = np.divmod(kept[number], frames)
-        kept[number] = np.empty(0, np.int64)  # memory of one view at a time
+        kept[number] = np.empty(0, np.int64)
         starts = np.flatnonzero(np.diff(pixel, prepend=-1))
         k, l = divmod(number, grid.cols)
         i, j = np.divmod(pixel[starts], grid.width)
         n = np.diff(starts, append=pixel.size)
         found = {"k": np.full(starts.size, k), "l": np.full(starts.size, l), "i": i, "j": j, "n": n}
         for name, values in (found | {"frame": frame}).items():
-            columns[name].append(values.astype(np.int32))
-    k, l, i, j, n, frame = map(np.concatenate, columns.values())
+            columns[name].append(values.astype(np.min_scalar_type(largest[name])))
+    k, l, i, j, n, frame = (np.concatenate(columns.pop(name)) for name in largest)
     return PhotonCounts.from_events(k, l, i, j, n, grid, cfa=cfa, frames=frames, bits=1, frame=frame)
