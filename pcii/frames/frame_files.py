@@ -94,7 +94,7 @@ def packed_views_of(path: Path) -> np.ndarray:
 
 
 def _axes(names: str, packed: bool) -> str:
-    return f"({names}, W / 8), eight pixels in a byte," if packed else f"({names}, W)"
+    return f"({names}, W / 8) with eight pixels in a byte" if packed else f"({names}, W)"
 
 
 def _header(path: Path, *, packed: bool) -> tuple[ArrayHeader, int]:

@@ -129,9 +129,7 @@ def _sums(places: np.ndarray, span: tuple[int, int], grid: CameraGrid) -> np.nda
     return sums.reshape(grid.shape_HW).astype(np.min_scalar_type(frames))
 
 
-def _of_single_counts(
-    kept: list[np.ndarray], frames: int, grid: CameraGrid, cfa: str | None
-) -> PhotonCounts:
+def _of_single_counts(kept: list[np.ndarray], frames: int, grid: CameraGrid, cfa: str | None) -> PhotonCounts:
     """Counts with their frames, of the single counts of each view."""
     # Of the smallest types: these lists are in memory beside the sorted ones.
     largest = {**dict(zip("klij", grid.shape_KLHW, strict=True)), "n": frames, "frame": frames}

@@ -88,15 +88,14 @@ def import_cube(
 
 
 def notes_on_frames(counts: PhotonCounts, width: int | None) -> list[str]:
-    """What is to be said of counts of packed frames; `width` in px, None if it is that of all bits."""
+    """What is to be said of counts of frames; `width` in px of packed ones, None for that of all bits."""
     notes = []
     if width is not None and width % 8:
         notes.append(f"left out {-width % 8} padding bits at the end of each row, none of which is set")
-    if counts.frame_events is None:
-        notes.append(
-            f"only the sums of {counts.readout.frames} frames are kept: there are {counts.total} counts, and "
-            f"the frame of each is kept for up to {MOST_KEPT}"
-        )
+    if counts.readout.frames > 1 and counts.readout.bits == 1 and counts.frame is None:
+        why = f": there are {counts.total} counts, and the frame of each is kept for up to {MOST_KEPT}"
+        many = counts.total > MOST_KEPT
+        notes.append(f"only the sums of {counts.readout.frames} frames are kept{why if many else ''}")
     return notes
 
 

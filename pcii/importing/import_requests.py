@@ -236,7 +236,7 @@ def _counts(asked: Request, optics: Optics, report: Report) -> Imported:
         frames=views.frames,
         report=report,
     )
-    notes = notes_on_frames(images, views.width) if views.bitpack else []
+    notes = notes_on_frames(images, views.width)
     return Imported(images, f"photon counts of {asked.source.resolve().name}", notes=notes)
 
 
