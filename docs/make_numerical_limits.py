@@ -291,7 +291,7 @@ def _saved_views(case: Case) -> pcii.Dataset:
 def _exported(case: Case, format: Any) -> Any:
     """What comes back of an export where that is read by pcii."""
     case.without("bad depth", "beyond")
-    images: list[Any] = [case.views(1)] if format in ("exr", "hci") else []
+    images: list[Any] = [case.views(1)] if format in ("exr", "hci", "nerfstudio") else []
     if format != "exr":
         images.append(case.counts())
     dataset = pcii.save_dataset(case.folder / "set", images, case.truth)
@@ -419,6 +419,7 @@ def rows() -> dict[str, tuple[str, Callable[[Case], Any]]]:
         "export_dataset, exr, and import_exported": ("import_exported", lambda case: _exported(case, "exr")),
         "export_dataset, saii": ("export_dataset", lambda case: _exported(case, "saii")),
         "export_dataset, hci": ("export_dataset", lambda case: _exported(case, "hci")),
+        "export_dataset, nerfstudio": ("export_dataset", lambda case: _exported(case, "nerfstudio")),
         "import_arrays": (
             "import_arrays",
             _of_light(lambda case: pcii.import_arrays(case.light(), case.optics)),

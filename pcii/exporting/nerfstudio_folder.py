@@ -18,7 +18,7 @@ from pcii.io.dataset import Dataset
 from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import json_bytes
 from pcii.transforms.camera_poses import depths_ahead_mm
-from pcii.transforms.transforms_file import DEPTH_UNIT_M, TRANSFORMS
+from pcii.transforms.transforms_file import DEPTH_UNIT, DEPTH_UNIT_M, TRANSFORMS
 from pcii.transforms.written_members import frames_of, intrinsics_of
 
 
@@ -44,6 +44,6 @@ def write_nerfstudio(dataset: Dataset, folder: Path) -> None:
     if pictures.quantity == "photons":
         told["cfa"] = dataset.cfa
     if depths_mm is not None:
-        told["depth_unit_scale_factor"] = DEPTH_UNIT_M
+        told[DEPTH_UNIT] = DEPTH_UNIT_M
     document = intrinsics_of(dataset) | told | {"frames": frames}
     (folder / TRANSFORMS).write_bytes(json_bytes(document))

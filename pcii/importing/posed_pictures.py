@@ -24,7 +24,13 @@ from pcii.pictures.picture_files import Picture, decode, kind_of, picture_of
 from pcii.transforms.film_sizes import FilmSize, camera_grid_of
 from pcii.transforms.grid_of_poses import PoseGrid, find_grid
 from pcii.transforms.parsed_members import Members
-from pcii.transforms.transforms_file import DEPTH_UNIT_M, TRANSFORMS, TransformsFile, read_transforms
+from pcii.transforms.transforms_file import (
+    DEPTH_UNIT,
+    DEPTH_UNIT_M,
+    TRANSFORMS,
+    TransformsFile,
+    read_transforms,
+)
 
 DEPTH_KINDS = ("PNG", "TIFF")
 """Kinds of pictures of depths: whole numbers of a unit."""
@@ -156,7 +162,7 @@ def _depths(file: TransformsFile, found: PoseGrid) -> tuple[np.ndarray | None, l
     if without:
         return None, [f"without true depth: {file.frame_name(without[0])} has no depth_file_path"]
     told = Members(file.path, "", file.document)
-    unit_mm = 1000 * (told.above_zero(_UNIT) if told.has(_UNIT) else DEPTH_UNIT_M)
+    unit_mm = 1000 * (told.above_zero(DEPTH_UNIT) if told.has(DEPTH_UNIT) else DEPTH_UNIT_M)
     depths = np.empty((*found.numbers.shape, file.height, file.width), np.float32)
     for camera, path in np.ndenumerate(_files(file, found, file.depth_paths)):
         numbers = _depth_numbers(path)
@@ -172,10 +178,7 @@ def _depths(file: TransformsFile, found: PoseGrid) -> tuple[np.ndarray | None, l
         if not (z_mm >= 0).all():
             raise InputError(f"{path}: holds NaN or depths below 0")
         depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
-    return depths, [f"with the true depth of every view, in steps of {unit_mm:g} mm, 0 where nothing is hit"]
-
-
-_UNIT = "depth_unit_scale_factor"
+    return depths, [f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit"]
 
 
 def _depth_numbers(path: Path) -> np.ndarray | None:

@@ -231,3 +231,30 @@ def test_what_does_not_go_together_is_refused_in_a_sentence(tmp_path: Path, imag
         save_dataset(tmp_path / "d", images, **options)
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.iterdir())
+
+
+def test_depths_of_every_view_are_kept_with_and_without_a_virtual_centre(tmp_path: Path) -> None:
+    z_mm = np.arange(1, DENSE.size + 1).reshape(DENSE.shape) * 1.5
+    z_mm[0, 1, 2, 3] = np.inf
+    for name, truth in (("both", TRUTH), ("alone", None)):
+        save_dataset(tmp_path / name, COUNTED, truth, view_z_mm=z_mm, radiance_unit="cd/m^2")
+        dataset = open_dataset(tmp_path / name)
+        np.testing.assert_array_equal(dataset.truth_array("view_z_mm"), z_mm.astype(np.float32))
+        assert (dataset.truth is None) == (truth is None)
+        assert dataset.manifest["radiance_unit"] == "cd/m^2"
+        assert verify(tmp_path / name) > 2
+
+
+@pytest.mark.parametrize(
+    ("view_z_mm", "told"),
+    [
+        (np.ones((2, 3, 5, 4)), "expected real depths of"),
+        (np.ones(GRID.shape_KLHW, complex), "expected real depths of"),
+        (np.zeros(GRID.shape_KLHW), "above 0 mm and never NaN"),
+        (np.full(GRID.shape_KLHW, np.nan), "above 0 mm and never NaN"),
+    ],
+)
+def test_depths_of_views_that_cannot_be_are_refused(tmp_path: Path, view_z_mm, told) -> None:
+    with pytest.raises(InputError, match=f"^view_z_mm: .*{told}"):
+        save_dataset(tmp_path / "d", COUNTED, view_z_mm=view_z_mm)
+    assert not (tmp_path / "d").exists()
