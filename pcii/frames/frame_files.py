@@ -3,7 +3,6 @@
 They are read into a small buffer. The pages of a memory map would count as memory of the process.
 """
 
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,9 +99,12 @@ def _axes(names: str, packed: bool) -> str:
 def _header(path: Path, *, packed: bool) -> tuple[ArrayHeader, int]:
     """The header of a file that has all its numbers, in the order of its axes, and where they begin."""
     try:
-        if zipfile.is_zipfile(path):
-            raise InputError(f"{path}: is an archive; save a .npy file, which is read piece by piece")
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file")
         with path.open("rb") as file:
+            if file.read(2) == b"PK":
+                raise InputError(f"{path}: is an archive; save a .npy file, which is read piece by piece")
+            file.seek(0)
             header, start = read_array_header(file, path), file.tell()
         size = path.stat().st_size
     except OSError as fault:

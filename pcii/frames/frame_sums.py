@@ -39,14 +39,13 @@ def chosen_frames(asked: tuple[int, int] | None, frames: int, name: str) -> tupl
 
 
 def check_width(files: np.ndarray, width: int, whence: str) -> None:
-    """Raise `InputError` unless the rows of files (K, L) have as many bytes as so many pixels need."""
-    first: FrameFile = files.flat[0]
-    row = first.row if first.packed else packed_row(first.row)
-    if (width < 1 or packed_row(width) != row) if first.packed else width != first.row:
-        holds = f"{max(8 * row - 7, 1)} to {8 * row}" if first.packed else f"{first.row}"
+    """Raise `InputError` unless rows of packed files (K, L) have as many bytes as so many pixels need."""
+    first: FrameFile = files[0, 0]
+    if width < 1 or packed_row(width) != first.row:
+        most = 8 * first.row
         raise InputError(
-            f"{first.path}: its rows are of {holds} pixels, where {whence} says {width}; the width is wrong, "
-            "or bits are packed along another axis"
+            f"{first.path}: its rows are of {most - 7} to {most} pixels, where {whence} says {width}; the "
+            "width is wrong, or bits are packed along another axis"
         )
 
 

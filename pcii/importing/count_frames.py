@@ -59,7 +59,7 @@ def import_counts(
     if paths is not None and all(path.suffix == NUMPY for path in paths.flat):
         files = files_of_views(paths, packed=False)
         if files.flat[0].dtype == np.bool_:
-            return _of_bits(files, optics, files.flat[0].row, frames, cfa, report)
+            return _of_bits(files, optics, None, frames, cfa, report)
         stack = _of_numpy_files(files, frames)
     elif paths is not None:
         stack = _of_files(paths, frames)
@@ -121,8 +121,9 @@ def _of_bits(
 ) -> PhotonCounts:
     """Counts of files of bits, packed or of bool."""
     first: FrameFile = files[0, 0]
-    wide = 8 * first.row if width is None else width
-    check_width(files, wide, "--width")
+    wide = first.row * (8 if first.packed else 1) if width is None else width
+    if first.packed:
+        check_width(files, wide, "--width")
     span = chosen_frames(frames, first.frames, str(first.path))
     shape = (*files.shape, first.height, wide)
     _check_room(first.path, shape, np.min_scalar_type(span[1] - span[0]))

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tifffile
 from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
@@ -79,7 +80,7 @@ def test_a_dataset_of_visionsim_is_one_camera(tmp_path: Path, capsys) -> None:
     np.testing.assert_array_equal(dataset.counts.view(0, 0), BITS[1, 2].sum(axis=0))
 
 
-@pytest.mark.parametrize("kept", ["packed", "one file", "bool", "uint16"])
+@pytest.mark.parametrize("kept", ["packed", "one file", "bool", "uint16", "tif"])
 def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     order, pattern, source = ViewOrder(flip_rows=True), "{row}_{col}.npy", tmp_path / "views"
     options: dict[str, Any] = {"bitpack": True, "width": 13, "frames": (1, 7)}
@@ -87,6 +88,12 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
     if kept == "one file":
         source, pattern = tmp_path / "all.npy", None
         np.save(source, packed(BITS))
+    elif kept == "tif":
+        options, pattern = {"frames": (1, 7)}, "{row}_{col}.tif"
+        for k, l in np.ndindex(2, 3):
+            tifffile.imwrite(
+                source / f"{k}_{l}.tif", 300 * BITS[k, l].astype(np.uint16), photometric="minisblack"
+            )
     elif kept != "packed":
         options = {"frames": (1, 7)}
         for k, l in np.ndindex(2, 3):
@@ -94,10 +101,11 @@ def test_frames_in_numpy_files(tmp_path: Path, kept: str) -> None:
             np.save(source / f"{k}_{l}.npy", view)
     counts = import_counts(source, OPTICS, pattern=pattern, order=order, cfa="GRBG", **options)
     sums = BITS[::-1, :, 1:8].sum(axis=2)
-    np.testing.assert_array_equal(counts.dense, sums * (300 if kept == "uint16" else 1))
+    many = kept in ("uint16", "tif")
+    np.testing.assert_array_equal(counts.dense, sums * (300 if many else 1))
     assert counts.readout.frames == 7
-    assert counts.readout.bits == (None if kept == "uint16" else 1)
-    assert (counts.frame is None) == (kept == "uint16")
+    assert counts.readout.bits == (None if many else 1)
+    assert (counts.frame is None) == many
 
 
 @pytest.mark.parametrize(
@@ -213,6 +221,24 @@ def cut(root: Path) -> Path:
     return folder
 
 
+def missing(folder: Path) -> Path:
+    (folder / "01_02" / "frames.npy").unlink()
+    return folder
+
+
+def archive(root: Path) -> Path:
+    folder = files_of(root / "views", BITS)
+    with (folder / "0_2.npy").open("wb") as file:
+        np.savez(file, frames=CUBE)
+    return folder
+
+
+def no_array(root: Path) -> Path:
+    folder = files_of(root / "views", BITS)
+    (folder / "0_2.npy").write_bytes(b"\x93NUMPY\x01\x00\x10\x00{'shape': (-1,,) ")
+    return folder
+
+
 def turned(pose: np.ndarray) -> None:
     pose[0, :3] *= -1
 
@@ -252,6 +278,9 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
     ("moving camera", one_camera(moves), NO_OPTIONS, "a moving camera is no grid of cameras"),
     ("poses", one_camera(lambda d: d["frames"].pop()), NO_OPTIONS, "frames: says 8 frames, and .* has 9"),
     ("cut", cut, PACKED, r"0_1.npy: cut off, it has 197 of the 198 bytes of \(9, 11, 2\)"),
+    ("missing", lambda root: missing(cubes()(root)), NO_OPTIONS, "01_02/frames.npy: there is no such file"),
+    ("an archive", archive, PACKED, "is an archive; save a .npy file"),
+    ("no array", no_array, PACKED, "0_2.npy: not a NumPy array"),
     ("huge", header_alone, PACKED, "GiB, and at most 16 are read"),
     ("padding of files", views(CUBE), [*PACKED, "--width", 10], "bits beyond the 10 pixels of a row are set"),
     ("width of files", views(CUBE), [*PACKED, "--width", 17], "rows are of 9 to 16 pixels, where --width says 17"),
