@@ -36,6 +36,8 @@ DEPTH_KINDS = ("PNG", "TIFF")
 """Kinds of pictures of depths: whole numbers of a unit."""
 MOST_EXACT = 255
 """Largest count of which pictures of 8 bits keep every one."""
+BRIGHTEST = 1e30
+"""Radiance of white lies within this and its inverse, which float32 holds with all digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,23 +137,32 @@ class _Light:
             raise told.fault("unit", "expected text")
         if cfa is not None and not isinstance(cfa, str):
             raise told.fault("cfa", "expected a Bayer pattern such as GRBG")
+        white = told.above_zero("white", BRIGHTEST)
         if quantity == "photons":
-            return cls(file.path, "linear", True, told.above_zero("white"), None, cfa)
-        return cls(file.path, "srgb", False, told.above_zero("white"), unit)
+            return cls(file.path, "linear", True, white, None, cfa)
+        return cls(file.path, "srgb", False, white, unit)
 
     def images(self, shares: np.ndarray, grid: CameraGrid) -> tuple[Views | PhotonCounts, list[str]]:
         """What pictures (K, L, H, W, C) of shares of white show, and what is to be said of it."""
         if not self.is_photons:
-            return Views(shares * np.float32(self.white), grid), []
+            return Views(self._of_white(shares), grid), []
         try:
-            if self.white <= MOST_EXACT:
+            if (
+                self.white <= MOST_EXACT
+                and self.white.is_integer()
+                and 0 <= shares.min() <= shares.max() <= 1
+            ):
                 counts = np.rint(shares[..., 0] * self.white).astype(np.uint8)
                 if (photon_numbers(counts, self.white) == np.rint(shares[..., 0] * 255)).all():
                     return PhotonCounts.from_dense(counts, grid, cfa=self.cfa), []
-            views = Views(shares[..., :1] * np.float32(self.white), grid, self.cfa)
+            views = Views(self._of_white(shares[..., :1]), grid, self.cfa)
         except InputError as fault:
             raise InputError(f"{self.file}: {fault}") from None
         return views, ["pictures of 8 bits do not keep every photon: they are taken for radiance"]
+
+    def _of_white(self, shares: np.ndarray) -> np.ndarray:
+        with np.errstate(over="ignore"):  # whoever saves the views refuses infinity
+            return shares * np.float32(self.white)
 
 
 def _depths(file: TransformsFile, found: PoseGrid) -> tuple[np.ndarray | None, list[str]]:

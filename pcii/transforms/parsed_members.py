@@ -29,19 +29,19 @@ class Members:
         """Whether there is such a member, which is not null."""
         return self.values.get(name) is not None
 
-    def number(self, name: str) -> float:
-        """A number of at most `MOST` in size; raises `InputError` for anything else, and if it is missing."""
+    def number(self, name: str, most: float = MOST) -> float:
+        """A number of at most `most` in size; raises `InputError` for anything else, and if it is missing."""
         if not self.has(name):
             raise self.fault(name, "missing")
         found = finite(self.values[name])
-        if found is None or abs(found) > MOST:
-            raise self.fault(name, f"expected a number up to {MOST:g}, got {_shown(self.values[name])}")
+        if found is None or abs(found) > most:
+            raise self.fault(name, f"expected a number up to {most:g}, got {_shown(self.values[name])}")
         return found
 
-    def above_zero(self, name: str) -> float:
-        """A number above 0: from 1 / `MOST` to that."""
-        found = self.number(name)
-        if found < 1 / MOST:
+    def above_zero(self, name: str, most: float = MOST) -> float:
+        """A number above 0: from 1 / `most` to that."""
+        found = self.number(name, most)
+        if found < 1 / most:
             raise self.fault(name, f"expected a number above 0, got {found:g}")
         return found
 

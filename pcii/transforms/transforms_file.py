@@ -19,7 +19,7 @@ from pcii.transforms.parsed_members import Members, finite
 TRANSFORMS = "transforms.json"
 REMEDY = "expected a transforms.json as nerfstudio reads it"
 DEPTH_UNIT = "depth_unit_scale_factor"
-"""Member with the unit, in metres, of the numbers in files of depth; the name is that of nerfstudio's option."""
+"""Member with the unit, in metres, of the numbers in files of depth; named as nerfstudio's option."""
 DEPTH_UNIT_M = 1e-3
 """That unit where there is no such member; nerfstudio's default."""
 MOST_FRAMES = 1 << 16

@@ -158,6 +158,16 @@ def test_exported_again_every_byte_is_the_same(tmp_path: Path, grid, cfa) -> Non
     assert len(files(first.folder)) == 2 * grid.view_count + 1
 
 
+@pytest.mark.parametrize("white", [0.0, 1e-20, 1e20])
+def test_the_darkest_and_the_brightest_light_comes_back(tmp_path: Path, white: float) -> None:
+    grid = grid_of(1, 3, height=4, width=5)
+    light = white * np.linspace(0, 1, 3 * 4 * 5 * 3).reshape(*grid.shape_KLHW, 3)
+    pcii.save_dataset(tmp_path / "data", pcii.Views(light.astype(np.float32), grid))
+    first = exported(tmp_path / "data", "first")
+    assert command_line.run(app, ["import", str(first.folder), "-o", str(tmp_path / "again")]) == 0
+    assert files(exported(tmp_path / "again", "second").folder) == files(first.folder)
+
+
 def test_photons_come_back_each(tmp_path: Path) -> None:
     kept = pcii.open_dataset(make_dataset(tmp_path / "data"))
     dark = {name: entry for name, entry in kept.manifest["files"].items() if not name.startswith("radiance")}
