@@ -22,6 +22,7 @@ ROOMS = {
         "core",
         "io",
         "transforms",
+        "frames",
         "sections",
         "exporting",
         "evidence",

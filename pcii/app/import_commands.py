@@ -31,12 +31,14 @@ def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_S
         pcii import lenses.png -o out/lenses --lens-array 10 10 --lens-pitch-px 60.5 60.5 --focal-mm 3 \\
           --pixel-mm 0.01
         pcii import frames.npy -o out/spad --counts --pitch-mm 5 5 --focal-mm 50 --pixel-mm 0.05
+        pcii import cubes -o out/spad --counts --bitpack --pattern "{row}_{col}.npy" --pitch-mm 5 5 \\
+          --focal-mm 50 --pixel-mm 0.05
 
     Parameters
     ----------
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
-        benchmark, pictures with a transforms.json of nerfstudio, a picture of a lens array, an array in a
+        benchmark, pictures or photon cubes with a transforms.json, a picture of a lens array, an array in a
         .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W); or events.npz or
         views.exr of `simgen export`, which need no options.
     out

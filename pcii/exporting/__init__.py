@@ -11,6 +11,7 @@ exr_parts            One OpenEXR file: a part for each view with its radiance an
 hci_layout           The layout of the 4D Light Field Benchmark of Konstanz and Heidelberg (Honauer et
                      al., ACCV 2016).
 nerfstudio_folder    Pictures with the poses of their cameras, as nerfstudio and its kin read them.
+photon_cubes         Binary frames of every view, eight pixels in a byte, with the poses of the cameras.
 publication_terms    Under what terms a dataset is published, and who made it: what its card says and its
                      data do not.
 sub_aperture_images  Sub-aperture images: a PNG for each view, named by row and column of its camera, and

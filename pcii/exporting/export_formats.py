@@ -10,6 +10,7 @@ from pcii.exporting.event_archive import write_events
 from pcii.exporting.exr_parts import write_exr_parts
 from pcii.exporting.hci_layout import write_hci
 from pcii.exporting.nerfstudio_folder import write_nerfstudio
+from pcii.exporting.photon_cubes import write_photon_cubes
 from pcii.exporting.sub_aperture_images import write_sub_aperture_images
 from pcii.io.collection import Collection, open_collection
 from pcii.io.collection_layout import is_collection
@@ -17,11 +18,12 @@ from pcii.io.dataset import Dataset, open_dataset
 from pcii.store.folder_kind import check_free
 from pcii.store.safe_files import named_in_errors, new_folder_safely
 
-Format = Literal["hci", "saii", "nerfstudio", "events", "exr"]
+Format = Literal["hci", "saii", "nerfstudio", "photoncube", "events", "exr"]
 WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
     "hci": write_hci,
     "saii": write_sub_aperture_images,
     "nerfstudio": write_nerfstudio,
+    "photoncube": write_photon_cubes,
     "events": write_events,
     "exr": write_exr_parts,
 }
@@ -41,10 +43,10 @@ def export_dataset(
     Of a collection, or a part of one, each dataset is written to a folder in `out` that is named as its own.
     `budget` is a nested photon budget, whose photons are written instead of all. `format` is "hci" (the
     layout of the HCI 4D light field benchmark), "saii" (sub-aperture images as PNG, `row_col.png`),
-    "nerfstudio" (pictures and their poses, transforms.json), "events" (one NumPy archive) or "exr" (one
-    OpenEXR file with a part for each view); see docs/exchange.md. The folder is there as a whole or not at
-    all. Raises `InputError` for another format, a folder that holds
-    something or is part of the dataset, and a dataset that lacks what the format needs.
+    "nerfstudio" (pictures and their poses, transforms.json), "photoncube" (binary frames as packed bits, and
+    poses), "events" (one NumPy archive) or "exr" (one OpenEXR file with a part for each view); see
+    docs/exchange.md. The folder is there as a whole or not at all. Raises `InputError` for another format, a
+    folder that holds something or is part of the dataset, and a dataset that lacks what the format needs.
     """
     if format not in WRITERS:
         raise InputError(f"format: there is no {format!r}; use one of {', '.join(WRITERS)}")

@@ -4,7 +4,6 @@ import math
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
-from typing import IO, Any
 
 import numpy as np
 
@@ -14,10 +13,8 @@ from pcii.core.images import Views
 from pcii.importing.camera_order import AS_STORED, Optics, ViewOrder
 from pcii.importing.image_folders import check_size
 from pcii.importing.light_encoding import Encoding, check_encoding, to_radiance
+from pcii.pictures.array_headers import read_array_header
 from pcii.pictures.picture_files import check_unpacked
-
-LARGEST_BYTES = 1 << 34
-"""Most bytes of an array in a file, 16 GiB."""
 
 
 def import_arrays(
@@ -70,7 +67,7 @@ def opened_array(source: str | Path | np.ndarray, array: str | None = None) -> t
         if array is not None:
             raise InputError(f"{path}: has one array without a name; leave out --array")
         with path.open("rb") as file:
-            _check_header(file, path)
+            read_array_header(file, path)
         numbers = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or visible(str(fault))})") from None
@@ -99,21 +96,7 @@ def check_archive(path: Path, archive: zipfile.ZipFile, members: Iterable[str], 
     unpacked, packed = beside, 0
     for member in members:
         with archive.open(member) as file:
-            unpacked += _check_header(file, path)
+            header = read_array_header(file, path)
+            unpacked += math.prod(header.shape) * max(header.dtype.itemsize, 4)  # as float32 at least
         packed += archive.getinfo(member).compress_size
     check_unpacked(path, unpacked, packed, "save a .npy file, which is read piece by piece")
-
-
-def _check_header(file: IO[bytes], path: Path) -> int:
-    """Bytes that an array needs, as float32 at least; `InputError` for objects, or more than are allowed."""
-    version = np.lib.format.read_magic(file)
-    read: Any = (
-        np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    )
-    shape, _, dtype = read(file)
-    if dtype.hasobject:
-        raise InputError(f"{path}: holds Python objects; save plain numbers")
-    size = math.prod(shape) * dtype.itemsize
-    if size > LARGEST_BYTES:
-        raise InputError(f"{path}: {size / 2**30:.1f} GiB, and at most {LARGEST_BYTES / 2**30:g} are read")
-    return math.prod(shape) * max(dtype.itemsize, 4)

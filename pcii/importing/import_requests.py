@@ -13,9 +13,10 @@ from pcii.core.bayer import mosaic
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
+from pcii.frames.cube_folders import read_cube_folder
 from pcii.importing.array_files import import_arrays
 from pcii.importing.camera_order import Optics, ViewOrder
-from pcii.importing.count_frames import import_counts
+from pcii.importing.count_frames import import_counts, import_cube, notes_on_frames
 from pcii.importing.exported_files import exported_file, import_exported
 from pcii.importing.hci_scenes import PARAMETERS, import_hci
 from pcii.importing.image_folders import import_images, is_picture
@@ -23,6 +24,7 @@ from pcii.importing.lens_arrays import LensArray, import_lens_array
 from pcii.importing.light_encoding import Encoding
 from pcii.importing.posed_pictures import import_posed_pictures, transforms_in
 from pcii.transforms.film_sizes import FilmSize
+from pcii.transforms.transforms_file import TransformsFile, read_transforms
 
 WholePair = tuple[int, int] | None
 
@@ -39,6 +41,12 @@ class ViewOptions:
     """Name of the array in an .npz file that has several."""
     counts: bool = False
     """The files hold photon counts; pages of the TIFF file of a view are frames, which are added up."""
+    bitpack: bool = False
+    """Frames in .npy files are of bits, packed along the width as numpy.packbits does."""
+    width: int | None = None
+    """Pixels in a row of packed frames. Default: all bits."""
+    frames: WholePair = None
+    """First and last frame to add up, counted from 0. Default: all."""
     serpentine: bool = False
     """Every other row is stored backwards, as a stage takes them that moves to and fro."""
     swap_axes: bool = False
@@ -47,6 +55,11 @@ class ViewOptions:
     """Rows are counted from the bottom."""
     flip_cols: bool = False
     """Columns are counted from the right."""
+
+    @property
+    def of_frames(self) -> bool:
+        """Whether something is said of frames of counts."""
+        return self.bitpack or self.width is not None or self.frames is not None
 
     @property
     def order(self) -> ViewOrder:
@@ -115,7 +128,12 @@ def read(asked: Request, report: Report) -> Imported:
         raise InputError(f"{source}: there is no such file or folder")
     if views.counts and asked.encoding is not None:
         raise InputError("--counts: photon counts are linear; leave out --linear, --srgb and --gamma")
+    if asked.transforms is None and not views.counts and views.of_frames:
+        raise InputError("--bitpack, --width, --frames: are for --counts")
     if asked.transforms is not None:
+        file = read_transforms(asked.transforms)
+        if file.is_bitpacked:
+            return _cube(asked, file, report)
         return _with_pattern(_posed(asked, asked.transforms, report), asked.cfa)
     if views.pattern is None and asked.lenses is None and (source / PARAMETERS).is_file():
         return _with_pattern(_hci(asked, report), asked.cfa)
@@ -167,6 +185,24 @@ def _posed(asked: Request, file: Path, report: Report) -> Imported:
     )
 
 
+def _cube(asked: Request, file: TransformsFile, report: Report) -> Imported:
+    told = ViewOptions(counts=asked.views.counts, frames=asked.views.frames)
+    if asked.views != told or asked.encoding is not None:
+        raise InputError(
+            f"{file.path}: is of photon cubes and tells cameras and width; leave out options of views and "
+            "light other than --frames, or give --pattern"
+        )
+    if asked.cfa is not None and "cfa" in file.document:
+        raise InputError(f"{file.path}: tells the Bayer pattern; leave out --cfa")
+    folder = read_cube_folder(file, asked.film)
+    counts = import_cube(folder, cfa=asked.cfa, frames=asked.views.frames, report=report)
+    budget, name = folder.photon_budget, file.path.resolve().parent.name
+    if budget is not None:
+        budget *= counts.readout.frames / folder.frames
+    notes = [*folder.notes, *notes_on_frames(counts, file.width)]
+    return Imported(counts, f"photon cubes of {name}", notes=notes, photon_budget=budget)
+
+
 def _exported(file: Path) -> Imported:
     found = import_exported(file)
     notes = ["with the truth of the virtual centre"] if found.truth is not None else []
@@ -195,9 +231,13 @@ def _counts(asked: Request, optics: Optics, report: Report) -> Imported:
         array=views.array,
         order=views.order,
         cfa=asked.cfa,
+        bitpack=views.bitpack,
+        width=views.width,
+        frames=views.frames,
         report=report,
     )
-    return Imported(images, f"photon counts of {asked.source.resolve().name}")
+    notes = notes_on_frames(images, views.width)
+    return Imported(images, f"photon counts of {asked.source.resolve().name}", notes=notes)
 
 
 def _light(asked: Request, optics: Optics, report: Report) -> Imported:

@@ -169,7 +169,7 @@ def sheet(dataset: Path, *, out: Out) -> None:
 def export(
     dataset: Path,
     *,
-    format: Literal["hci", "saii", "nerfstudio", "events", "exr"],
+    format: Literal["hci", "saii", "nerfstudio", "photoncube", "events", "exr"],
     out: Out,
     budget: float | None = None,
 ) -> None:
@@ -177,14 +177,16 @@ def export(
 
     hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
     nerfstudio: a PNG for each view and transforms.json with the poses of the cameras, as neural
-    reconstruction reads them. events: a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part
-    for each view. Of a collection each dataset is written to a folder in the new one, named as its own.
+    reconstruction reads them. photoncube: the binary frames of each view as packed bits, with poses. events:
+    a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view. Of a collection
+    each dataset is written to a folder in the new one, named as its own.
 
     Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
         simgen export out/small --format hci -o out/hci/small
         simgen export out/small --format nerfstudio -o out/small-poses
+        simgen export out/spad --format photoncube -o out/spad-cubes
         simgen export out/paper --format saii --budget 300 -o out/paper-300
         simgen export out/sweep --format events -o out/sweep-events
 

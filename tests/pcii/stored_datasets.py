@@ -12,6 +12,7 @@ from pcii.base.errors import InputError
 from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 from pcii.io.dataset_layout import (
     COUNTS,
+    FRAME,
     PHOTON_TRUTH,
     RADIANCE,
     TRUTH,
@@ -28,11 +29,17 @@ IDS = np.where(np.isfinite(Z_MM), 1, 0)
 DENSE = np.random.default_rng(0).poisson(0.5, size=GRID.shape_KLHW)
 
 
-def make_dataset(root: Path, *, sparse: bool = True, **overrides: Any) -> Path:
-    """A finished dataset of counts, truth and radiance; `overrides` are members of its manifest."""
+def make_dataset(root: Path, *, sparse: bool = True, frames: int | None = None, **overrides: Any) -> Path:
+    """A finished dataset of counts, truth and radiance; `overrides` are members of its manifest.
+
+    Of so many binary `frames`, which it keeps, the photons of a pixel are in the first ones.
+    """
     root.mkdir()
     k, l, i, j = np.nonzero(DENSE)
     events = {"k": k, "l": l, "i": i, "j": j, "n": DENSE[k, l, i, j]}
+    if frames is not None:
+        events[FRAME] = np.concatenate([np.arange(n) for n in events["n"]])
+        overrides |= {"frames": frames, "bits": 1}
     write_arrays_safely(root / COUNTS, events if sparse else {"dense": DENSE}, COUNTS_LABELS)
     write_arrays_safely(root / TRUTH, {"z_mm": Z_MM, "object_id": IDS}, TRUTH_LABELS)
     photons = int(DENSE.sum())

@@ -150,7 +150,7 @@ def test_exr_keeps_a_mosaic_as_luminance(tmp_path):
 
 @pytest.mark.parametrize("format", WRITERS)
 def test_an_export_has_the_same_bytes_every_time(tmp_path, format):
-    data = make_dataset(tmp_path / "data")
+    data = make_dataset(tmp_path / "data", frames=8)
     contents = []
     for name in ("first", "second"):
         out = export_dataset(data, format, tmp_path / name)
@@ -161,7 +161,7 @@ def test_an_export_has_the_same_bytes_every_time(tmp_path, format):
 
 @pytest.mark.parametrize("format", WRITERS)
 def test_only_a_new_or_empty_folder_is_written(tmp_path, format):
-    data = make_dataset(tmp_path / "data")
+    data = make_dataset(tmp_path / "data", frames=8)
     full, empty = tmp_path / "full", tmp_path / "empty"
     full.mkdir()
     empty.mkdir()
@@ -194,7 +194,7 @@ def collection(tmp_path):
     rows = []
     for seed in (1, 2):
         recipe = {"scene": "two", "seed": seed, "photons": {"scope": "view", "budget": 10.0, "nested": []}}
-        path = make_dataset(root / f"seed_{seed}", recipe=recipe, identity=f"no. {seed}")
+        path = make_dataset(root / f"seed_{seed}", frames=8, recipe=recipe, identity=f"no. {seed}")
         rows.append(index_row(path.name, {"seed": seed}, read_manifest(path), path / MANIFEST))
     COLLECTION_FOLDER.write(root, {"fields": ["seed"]})
     write_index(root, rows)

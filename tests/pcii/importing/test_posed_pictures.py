@@ -161,7 +161,7 @@ def test_pictures_that_do_not_fit(tmp_path: Path, capsys) -> None:
     assert f"expected {H} x {W} numbers, as the pictures have" in refused(capsys, source)
     source = posed(tmp_path / "e", 1, 1, depth=np.full((H, W), np.nan))
     assert "holds NaN or depths below 0" in refused(capsys, source)
-    source = posed(tmp_path / "f", file_path="frames.npy", bitpack=True)
+    source = posed(tmp_path / "f", file_path="frames.npy")
     assert "file_path: has the pictures of all frames in one file" in refused(capsys, source)
 
 
