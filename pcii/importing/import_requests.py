@@ -134,7 +134,7 @@ def read(asked: Request, report: Report) -> Imported:
         file = read_transforms(asked.transforms)
         if file.is_bitpacked:
             return _cube(asked, file, report)
-        return _with_pattern(_posed(asked, asked.transforms, report), asked.cfa)
+        return _with_pattern(_posed(asked, file, report), asked.cfa)
     if views.pattern is None and asked.lenses is None and (source / PARAMETERS).is_file():
         return _with_pattern(_hci(asked, report), asked.cfa)
     if asked == Request(source) and (file := exported_file(source)) is not None:
@@ -167,14 +167,15 @@ def _hci(asked: Request, report: Report) -> Imported:
     return Imported(scene.views, origin, scene.truth, scene.z_range_mm, notes)
 
 
-def _posed(asked: Request, file: Path, report: Report) -> Imported:
+def _posed(asked: Request, file: TransformsFile, report: Report) -> Imported:
+    path = file.path
     if asked.optics is not None or asked.views != ViewOptions():
-        raise InputError(f"{file}: tells the cameras; leave out options of grid and order, or give --pattern")
+        raise InputError(f"{path}: tells the cameras; leave out options of grid and order, or give --pattern")
     found = import_posed_pictures(file, film=asked.film, encoding=asked.encoding, report=report)
     if isinstance(found.images, PhotonCounts) and asked.cfa is not None:
-        raise InputError(f"{file}: tells photon counts and their Bayer pattern; leave out --cfa")
+        raise InputError(f"{path}: tells photon counts and their Bayer pattern; leave out --cfa")
     what = "photons" if isinstance(found.images, PhotonCounts) else "pictures"
-    origin = f"{found.images.grid.view_count} {what} of {file.resolve().parent.name}, placed by {file.name}"
+    origin = f"{found.images.grid.view_count} {what} of {path.resolve().parent.name}, placed by {path.name}"
     return Imported(
         found.images,
         origin,

@@ -29,7 +29,6 @@ from pcii.transforms.transforms_file import (
     DEPTH_UNIT_M,
     TRANSFORMS,
     TransformsFile,
-    read_transforms,
 )
 
 DEPTH_KINDS = ("PNG", "TIFF")
@@ -61,7 +60,7 @@ def transforms_in(source: Path) -> Path | None:
 
 
 def import_posed_pictures(
-    path: str | Path,
+    file: TransformsFile,
     *,
     film: FilmSize | None = None,
     encoding: Encoding | None = None,
@@ -73,7 +72,6 @@ def import_posed_pictures(
     Whole numbers are sRGB and floats are linear, unless `encoding` says otherwise. Raises `InputError`,
     naming file and member, frame or picture, for what is missing, wrong, or no such grid.
     """
-    file = read_transforms(path)
     if file.stack_path is not None:
         raise InputError(
             f"{file.path}: file_path: has the pictures of all frames in one file; expected a file_path in "

@@ -20,6 +20,7 @@ from pcii.importing.posed_pictures import import_posed_pictures
 from pcii.io.dataset_layout import TRUTH, read_manifest, write_manifest
 from pcii.io.zarr_groups import write_arrays_safely
 from pcii.store.file_list import list_files
+from pcii.transforms.transforms_file import read_transforms
 
 
 def grid_of(rows: int, cols: int, **changes: Any) -> CameraGrid:
@@ -218,7 +219,7 @@ def test_true_cameras_are_told_and_depth_is_along_their_axes(tmp_path: Path) -> 
     for number in range(2):
         np.testing.assert_allclose(found.points_m(number)[..., 2], -0.6, rtol=1e-6)
     told = one_sentence(
-        lambda: import_posed_pictures(found.folder / "transforms.json"),
+        lambda: import_posed_pictures(read_transforms(found.folder / "transforms.json")),
         found.folder / "transforms.json",
     )
     assert "degrees from the common orientation" in told
