@@ -143,8 +143,8 @@ class Dataset(ShortForm):
         if self.has(f"{part}/{FRAME}"):
             names += (FRAME,)
         arrays = self._arrays(part, COUNTS_LABELS, names)
-        told, frame = self.manifest, arrays.get(FRAME)
-        counted: dict[str, Any] = {"frames": told.get("frames", 1), "bits": told.get("bits")}
+        manifest, frame = self.manifest, arrays.get(FRAME)
+        counted: dict[str, Any] = {"frames": manifest.get("frames", 1), "bits": manifest.get("bits")}
         try:
             if "dense" in arrays:
                 return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **counted)
