@@ -37,6 +37,20 @@ class NetworkInputs(NamedTuple):
     surface: np.ndarray
     light: np.ndarray
 
+    def part(self, rows: slice, cols: slice) -> "NetworkInputs":
+        """The inputs of some rows and columns of blocks, whole cells; the light stays that of the film."""
+        of_cells = (
+            slice(each.start // CELL_SIDE_BLOCKS, each.stop // CELL_SIDE_BLOCKS) for each in (rows, cols)
+        )
+        blocks, cells = np.s_[:, rows, cols], (slice(None), *of_cells)
+        return NetworkInputs(
+            self.evidence[blocks],
+            self.brightness[blocks],
+            self.coverage[cells],
+            self.surface[cells],
+            self.light,
+        )
+
 
 def inputs_of(
     evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int

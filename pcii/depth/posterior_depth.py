@@ -24,6 +24,7 @@ from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
+from pcii.imaging.bright_regions import box_around
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
@@ -48,6 +49,8 @@ class PosteriorDepth:
     """in so many of eight directions, which is more than what lies outside a convex outline can meet,"""
     near_px: float = 4.0
     """at a depth of which its own differs so little, in total disparity."""
+    margin_blocks: int = 64
+    """The network is run so far beyond the blocks with so many photons: two cells of its coarsest level."""
     most_empty: float = 0.9
     """No surface is seen where the probability of none is higher."""
     interpolation_blocks: float = 2.0
@@ -96,7 +99,12 @@ class PosteriorDepth:
             probability = surface_posterior(evidence.nats, self.prior).transpose(2, 0, 1)
             nothing = np.zeros((h, w), np.float32)
         else:
-            probability, nothing = network_posterior(self.network_inputs(evidence, planes, block_px))
+            inputs = self.network_inputs(evidence, planes, block_px)
+            # Where there are no photons there is no surface, and the depth map has no answer.
+            probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
+            part = self._lit_part(evidence.photons, block_px, nothing.shape)
+            if part is not None:
+                probability[:, *part], nothing[part] = network_posterior(inputs.part(*part))
         posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
         return posterior, evidence
 
@@ -106,7 +114,7 @@ class PosteriorDepth:
         """Where a surface is detected (h, w) bool, `plane` (h, w) the most probable one."""
         detected = self._has_photons(photons, plane, posterior.block_px)
         detected &= posterior.no_surface <= self.most_empty
-        agree = _halves_agree(data, posterior.planes, plane, posterior.block_px)
+        agree = _halves_agree(data, posterior.planes, plane, posterior.block_px, detected)
         surrounded = self._directions(agree & detected, plane, posterior) >= self.least_directions
         return detected & (agree | surrounded & (posterior.no_surface < 0.5))
 
@@ -139,14 +147,34 @@ class PosteriorDepth:
             met += found
         return met
 
+    def _lit_part(
+        self, photons: np.ndarray, block_px: int, shape: tuple[int, ...]
+    ) -> tuple[slice, slice] | None:
+        """Rows and columns of blocks with enough photons at any plane, and a margin; None if there are none.
+
+        In whole cells of the network's coarsest level, as of the film of `shape` blocks.
+        """
+        lit = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
+        if not lit.any():
+            return None
+        margin = self.margin_blocks // CELL_BLOCKS
+        part = []
+        for axis, size in zip(box_around(lit, (margin, margin)), shape, strict=True):
+            first, last = axis.start * CELL_BLOCKS // MULTIPLE, -(-axis.stop * CELL_BLOCKS // MULTIPLE)
+            part.append(slice(first * MULTIPLE, min(last * MULTIPLE, size)))
+        return part[0], part[1]
+
     def _has_photons(self, photons: np.ndarray, best: np.ndarray, block_px: int) -> np.ndarray:
         """Whether there are enough photons (h, w) around a block at the plane `best` (h, w)."""
+        i, j = (np.arange(size) // CELL_BLOCKS for size in best.shape)
+        return self._photons_around(photons, block_px)[best, i[:, None], j] >= self.least_photons
+
+    def _photons_around(self, photons: np.ndarray, block_px: int) -> np.ndarray:
+        """Photons (Z, h / 4, w / 4) in a Gaussian window of weight 1 at its centre."""
         from scipy.ndimage import gaussian_filter
 
         sigma = self.window_px / (block_px * CELL_BLOCKS)
-        around = gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
-        i, j = (np.arange(size) // CELL_BLOCKS for size in best.shape)
-        return around[best, i[:, None], j] >= self.least_photons
+        return gaussian_filter(photons, sigma, mode="constant", axes=(1, 2)) * (2 * np.pi * sigma**2)
 
 
 def _without_faults(data: PhotonCounts | Views) -> PhotonCounts | Views:
@@ -159,11 +187,12 @@ def _moved(by: int, size: int) -> tuple[slice, slice]:
 
 
 def _halves_agree(
-    data: PhotonCounts | Views, planes: FocalPlanes, best: np.ndarray, block_px: int
+    data: PhotonCounts | Views, planes: FocalPlanes, best: np.ndarray, block_px: int, where: np.ndarray
 ) -> np.ndarray:
     """Whether two halves of the cameras agree (h, w) that there is structure at the plane `best` (h, w).
 
-    Structure is there at neighbouring planes as well, so that every other one is enough.
+    Structure is there at neighbouring planes as well, so that every other one is enough. Only the blocks
+    `where` (h, w) bool are asked about; the windows around no others are summed.
     """
     every_other = planes.take(slice(None, None, 2))
     i, j = (
@@ -171,6 +200,9 @@ def _halves_agree(
         for size, blocks in zip(data.grid.shape_HW, best.shape, strict=True)
     )
     plane = best[np.ix_(i, j)] // 2
-    agree = halves_of(data, every_other, out_of_focus=True).agree(plane, np.ones(plane.shape, bool))
+    asked = np.zeros(plane.shape, bool)
+    i, j = (index * block_px // CELL_PX for index in np.nonzero(where))
+    asked[i, j] = True
+    agree = halves_of(data, every_other, out_of_focus=True).agree(plane, asked)
     agree = on_pixels(agree, CELL_PX, data.grid.shape_HW)
     return agree[::block_px, ::block_px]

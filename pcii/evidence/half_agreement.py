@@ -117,7 +117,7 @@ class Halves:
             if not undecided.any():
                 break
             here, own_sum = self._at_labels(size, sigma, label, undecided)
-            outside, outside_sum = self._outside_range(size, sigma, label.shape)
+            outside, outside_sum = self._outside_range(size, sigma, undecided)
             is_inside = own_sum >= outside_sum
             agreed |= undecided & here & is_inside
             undecided &= ~here & (is_inside | ~outside)
@@ -163,16 +163,16 @@ class Halves:
                 result[cells][selected] = on_pixels(values, side, selected.shape)[selected]
         return agreed, total
 
-    def _outside_range(
-        self, size: int, sigma: float, shape: tuple[int, ...]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Whether the halves agree around each cell on anything outside (h, w), and the largest sums."""
-        outside = self.outside[size]
+    def _outside_range(self, size: int, sigma: float, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether halves agree around the cells `where` on anything outside (h, w), and the largest sums."""
+        side, reach, outside = BLOCKS_CELLS[size], int(WINDOW_SIGMAS * sigma), self.outside[size]
         agreed, largest = np.zeros(outside.p.shape[1:], bool), np.full(outside.p.shape[1:], -np.inf)
+        box = box_around(block_sums(where, side, np.float64) > 0, (reach, reach))
         for z in range(len(outside.p)):
-            agreed |= _agreement(outside.at(z), sigma) >= least_agreement(len(outside.p))
-            np.maximum(largest, _windowed(outside.p[z], sigma), out=largest)
-        return on_pixels(agreed, BLOCKS_CELLS[size], shape), on_pixels(largest, BLOCKS_CELLS[size], shape)
+            there = outside.at((z, *box))
+            agreed[box] |= _agreement(there, sigma) >= least_agreement(len(outside.p))
+            np.maximum(largest[box], _windowed(there.p, sigma), out=largest[box])
+        return on_pixels(agreed, side, where.shape), on_pixels(largest, side, where.shape)
 
 
 def least_agreement(planes: int) -> float:

@@ -201,8 +201,15 @@ class Dataset(ShortForm):
                 f"{self.path / MANIFEST}: radiance_channels: missing, though it lists {RADIANCE}"
             )
         cfa = self.cfa if channels == 1 else None
-        shape = (*self.grid.shape_KLHW, channels)
-        return Views(StoredRadiance(shape, lambda k, l: self.check(radiance_name(k, l))), self.grid, cfa)
+        shape, known = (*self.grid.shape_KLHW, channels), set[str]()
+
+        def file_of(k: int, l: int) -> Path:
+            name = radiance_name(k, l)
+            path = self.check(name, content=name not in known)
+            known.add(name)
+            return path
+
+        return Views(StoredRadiance(shape, file_of), self.grid, cfa)
 
     @property
     def counts_or_views(self) -> PhotonCounts | Views:

@@ -8,6 +8,7 @@ deviations.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from pcii.sections.image_moves import Moves, Running, groups_of, moves_of, step_
 from pcii.sections.recycled_memory import empty
 
 BATCH = 8
-"""Views in memory at a time when they are read from disk."""
+"""Views that are read from disk at a time; as many are added meanwhile."""
 
 
 def sum_views(
@@ -181,13 +182,22 @@ def _in_memory(data: Views) -> np.ndarray | None:
 
 
 def _batches(data: Views) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Batches of view numbers (V,) and images (V, H, N)."""
+    """Batches of view numbers (V,) and images (V, H, N); the next one is read while one is added."""
     K, L, H, W = data.grid.shape_KLHW
-    images = np.empty((min(BATCH, K * L), H, W * data.radiance.shape[4]), dtype=_dtype(data))
-    for views in np.split(np.arange(K * L), range(BATCH, K * L, BATCH)):
+
+    def read(views: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        images = np.empty((views.size, H, W * data.radiance.shape[4]), dtype=_dtype(data))
         for number, view in enumerate(views.tolist()):
             images[number] = np.asarray(data.radiance[view // L, view % L]).reshape(H, -1)
-        yield views, images[: views.size]
+        return views, images
+
+    first, *others = np.split(np.arange(K * L), range(BATCH, K * L, BATCH))
+    with ThreadPoolExecutor(1, "views") as reader:
+        ahead = reader.submit(read, first)
+        for views in others:
+            batch, ahead = ahead.result(), reader.submit(read, views)
+            yield batch
+        yield ahead.result()
 
 
 def _not_faint(data: Views, variance: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Radiance images of views; on disk as products of a dataset, or as what its photon counts are drawn from."""
 
+from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -46,24 +48,35 @@ class RenderedViews:
     out: Path
 
     def render(self, render_scene: RenderScene, report: Report) -> None:
-        """Write every view that is not on disk yet."""
-        grid, cfa = self.rig.grid, self.sensor.bayer
-        for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-            number, exact = k * grid.cols + l, self._exact_file(k, l)
-            if not exact.is_file():
-                image = exact_view(render_scene, self.rig, k, l, self.samples_per_pixel, self.seed)
-                write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, cfa)[..., None])
-            if self.sensor.full_light is not None and self.radiance != "none":
-                assert self.exposure is not None
-                measured = full_light_image(
-                    read_exr(exact),
-                    cfa,
-                    photons_per_radiance(self.exposure, grid.pixel_mm),
-                    self.sensor,
-                    seeds.generator(self.seed, view=number, stage="full light"),
-                )
-                write_exr_safely(self.out / radiance_name(k, l), measured)
-            report("views", done, grid.view_count)
+        """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
+        grid, written = self.rig.grid, 0
+        with ThreadPoolExecutor(1, "views") as writer:
+            writing: deque[Future[None]] = deque()
+            for k, l in np.ndindex(grid.rows, grid.cols):
+                image = None
+                if not self._exact_file(k, l).is_file():
+                    image = exact_view(render_scene, self.rig, k, l, self.samples_per_pixel, self.seed)
+                writing.append(writer.submit(self._write, k, l, image))
+                while writing and (len(writing) > 1 or k * grid.cols + l == grid.view_count - 1):
+                    writing.popleft().result()
+                    written += 1
+                    report("views", written, grid.view_count)
+
+    def _write(self, k: int, l: int, image: np.ndarray | None) -> None:
+        """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""
+        cfa, exact = self.sensor.bayer, self._exact_file(k, l)
+        if image is not None:
+            write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, cfa)[..., None])
+        if self.sensor.full_light is not None and self.radiance != "none":
+            assert self.exposure is not None
+            measured = full_light_image(
+                read_exr(exact),
+                cfa,
+                photons_per_radiance(self.exposure, self.rig.grid.pixel_mm),
+                self.sensor,
+                seeds.generator(self.seed, view=k * self.rig.grid.cols + l, stage="full light"),
+            )
+            write_exr_safely(self.out / radiance_name(k, l), measured)
 
     def mosaic(self, k: int, l: int) -> np.ndarray:
         """Radiance that each of the sensor's pixels gets in a view that is on disk, (H, W)."""

@@ -11,8 +11,10 @@ from pcii.core.estimates import DepthMap, DepthPosterior
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.methods import estimate_depth
+from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import surface_posterior
+from pcii.depth.surface_network import network_posterior
 from pcii.evidence.texture_evidence import evidence_of_texture
 
 RANGE_MM = (1 / 9, 1 / 1)
@@ -207,3 +209,36 @@ def test_a_range_without_end_is_refused():
     counts = PhotonCounts.from_dense(np.ones((2, 2, 8, 8), dtype=int), unit_grid(2, 2, 8, 8))
     with pytest.raises(InputError, match="choose a farther near end"):
         estimate_depth(counts, (1e-6, 1.0))
+
+
+def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, monkeypatch) -> None:
+    """The dark far from all photons is left out: bounded, as the depth map of the whole film says."""
+    events, range_mm = two_squares.counts.events, (1 / 8, 1 / 2)
+    grid = unit_grid(7, 7, 640, 704)
+    place = events.k, events.l, events.i + 64, events.j + 64, events.n
+    counts, sizes = PhotonCounts.from_events(*place, grid, cfa="GRBG"), list[tuple[int, ...]]()
+
+    def noting(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
+        sizes.append(inputs.evidence.shape[1:])
+        return network_posterior(inputs)
+
+    monkeypatch.setattr("pcii.depth.posterior_depth.network_posterior", noting)
+    whole, part, edges = (PosteriorDepth(margin_blocks=n)(counts, range_mm) for n in (1000, 64, 0))
+    assert sizes == [(320, 352), (224, 224), (128, 128)]  # blocks of 2 px
+
+    def errors_px(found: DepthMap) -> np.ndarray:
+        both = np.isfinite(found.z_mm) & np.isfinite(whole.z_mm)
+        assert (np.isfinite(found.z_mm) != np.isfinite(whole.z_mm)).mean() < 1e-3
+        return np.abs(6 / found.z_mm[both] - 6 / whole.z_mm[both])
+
+    assert errors_px(part).mean() < 0.01
+    assert errors_px(edges).mean() > 3 * errors_px(part).mean()  # the fault: no margin
+
+
+def test_without_photons_the_network_is_not_run(monkeypatch) -> None:
+    monkeypatch.setattr("pcii.depth.posterior_depth.network_posterior", None)
+    grid = unit_grid(2, 2, 64, 64)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, int), grid)
+    posterior = PosteriorDepth().posterior(dark, RANGE_MM)
+    assert (posterior.no_surface == 1).all()
+    assert not posterior.probability.any()
