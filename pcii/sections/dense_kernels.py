@@ -3,7 +3,7 @@
 import numpy as np
 
 from pcii.base.compiled_loops import shared
-from pcii.sections.image_moves import Groups, Moves, Running
+from pcii.sections.image_moves import Groups, Moves
 from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
 
 BAND = 16
@@ -19,14 +19,14 @@ def sum_views(
     first_band: int,
     last_band: int,
     sums: np.ndarray,
-    variance: np.ndarray,
+    variance: np.ndarray | None,
     images: np.ndarray,
     moves: Moves,
     groups: Groups,
 ) -> bool:
     """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
 
-    `variance` is empty if it is not wanted. Returns whether the results and all images are finite.
+    `variance` is None if it is not wanted. Returns whether the results and all images are finite.
     """
     height, width = images.shape[1:]
     bad = bad_rows(images, moves) if first_band == 0 else 0
@@ -35,47 +35,60 @@ def sum_views(
         bottom = min(top + BAND, height)
         shape = (moves.ends.size, bottom - top, width)
         total = np.zeros(shape)
-        squares, first = np.zeros(shape if variance.size else (0, 0, 0)), np.zeros((0, 0, 0))
-        if variance.size:
-            first = np.full(shape, np.nan)
-        running = Running(total, squares, first)
-        band_variance = variance[top:bottom] if variance.size else variance
-        bad += add_rows(running, images, moves, top, 0, bottom - top)
+        squares = np.zeros(shape) if variance is not None else None
+        first = np.full(shape, np.nan) if variance is not None else None
+        band_variance = variance[top:bottom] if variance is not None else None
+        bad += add_rows(total, squares, first, images, moves, top, 0, bottom - top)
         for line in range(bottom - top):
-            merge_line(sums[top:bottom], band_variance, running, groups, top, line)
+            merge_line(sums[top:bottom], band_variance, total, squares, first, groups, top, line)
             bad += not_finite(sums[top + line])
-            if variance.size:
+            if variance is not None and squares is not None:
                 bad += not_finite(squares[:, line]) + not_finite(variance[top + line])
     return bad == 0
 
 
-@shared(lambda running, images, moves: _bands(images.shape[1]))
-def add_views(first_band: int, last_band: int, running: Running, images: np.ndarray, moves: Moves) -> bool:
-    """Add shifted images (V, H, N) to running sums of their groups.
+@shared(lambda total, squares, first, images, moves: _bands(images.shape[1]))
+def add_views(
+    first_band: int,
+    last_band: int,
+    total: np.ndarray,
+    squares: np.ndarray | None,
+    first: np.ndarray | None,
+    images: np.ndarray,
+    moves: Moves,
+) -> bool:
+    """Add shifted images (V, H, N) to running sums of their groups (see `row_kernels`).
 
     Returns whether all pixels that fall outside the section are finite.
     """
     bad = bad_rows(images, moves) if first_band == 0 else 0
-    height = running.total.shape[1]
+    height = total.shape[1]
     for band in range(first_band, last_band):
-        bad += add_rows(running, images, moves, 0, band * BAND, min((band + 1) * BAND, height))
+        bad += add_rows(total, squares, first, images, moves, 0, band * BAND, min((band + 1) * BAND, height))
     return bad == 0
 
 
 @shared(lambda sums, *_: len(sums))
 def merge_groups(
-    first: int, last: int, sums: np.ndarray, variance: np.ndarray, running: Running, groups: Groups
+    first_line: int,
+    last_line: int,
+    sums: np.ndarray,
+    variance: np.ndarray | None,
+    total: np.ndarray,
+    squares: np.ndarray | None,
+    first: np.ndarray | None,
+    groups: Groups,
 ) -> bool:
-    """Sums and, unless it is empty, variances (H, W, C) from the running sums of the groups.
+    """Sums and, if they are wanted, variances (H, W, C) from the running sums of the groups.
 
     Returns whether the results are finite.
     """
     bad = 0
-    for line in range(first, last):
-        merge_line(sums, variance, running, groups, 0, line)
+    for line in range(first_line, last_line):
+        merge_line(sums, variance, total, squares, first, groups, 0, line)
         bad += not_finite(sums[line])
-        if variance.size:
-            bad += not_finite(running.squares[:, line]) + not_finite(variance[line])
+        if variance is not None and squares is not None:
+            bad += not_finite(squares[:, line]) + not_finite(variance[line])
     return bad == 0
 
 

@@ -19,7 +19,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Shifts
-from pcii.sections.image_moves import Moves, Running, groups_of, moves_of, step_px
+from pcii.sections.image_moves import Moves, groups_of, moves_of, step_px
 from pcii.sections.recycled_memory import empty
 
 BATCH = 8
@@ -48,7 +48,8 @@ def sum_views(
     if not finite:
         _raise_not_finite(data)
     sums = _stacked([plane.sums for plane in planes])
-    return sums, _not_faint(data, _stacked([plane.variance for plane in planes])) if variance else None
+    variances = [plane.variance for plane in planes if plane.variance is not None]
+    return sums, _not_faint(data, _stacked(variances)) if variance else None
 
 
 def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) -> np.ndarray:
@@ -113,11 +114,11 @@ class _Plane:
         grid = data.grid
         cfa, C = colours_apart(data, shifts)
         self.row_px, self.col_px = (px[plane] for px in planes.nearest_shifts_px(step_px(shifts)))
-        self.is_mosaic, self.with_variance = cfa is not None, variance
+        self.is_mosaic = cfa is not None
         self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
         self.groups = groups_of(self.row_px, self.col_px, grid, cfa)
         self.sums = empty((*grid.shape_HW, C), dtype)
-        self.variance = empty(self.sums.shape if variance else (0, grid.width, C), dtype)
+        self.variance = empty(self.sums.shape, dtype) if variance else None
 
     def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Make the section of images (V, H, N) of all views; returns whether it and the images are finite."""
@@ -131,26 +132,25 @@ class _Plane:
         H, W, _ = self.sums.shape
         shape = (self.group_count, H, W * self.channels)
         self.total = np.zeros(shape)
-        self.squares = np.zeros(shape if self.with_variance else (0, 0, 0))
-        self.first = np.full(self.squares.shape, np.nan)
+        self.squares = np.zeros(shape) if self.variance is not None else None
+        self.first = np.full(shape, np.nan) if self.variance is not None else None
 
     def add(self, views: np.ndarray, images: np.ndarray) -> bool:
         """Add images (V, H, N) of these views; returns whether the pixels outside the section are finite."""
         from pcii.sections import dense_kernels
 
-        return all(dense_kernels.add_views(self._running(), images, self._moves(views)))
+        running = self.total, self.squares, self.first
+        return all(dense_kernels.add_views(*running, images, self._moves(views)))
 
     def finish(self) -> bool:
         """Compute the result from the running sums; returns whether it is finite."""
         from pcii.sections import dense_kernels
 
-        return all(dense_kernels.merge_groups(self.sums, self.variance, self._running(), self.groups))
+        running = self.total, self.squares, self.first
+        return all(dense_kernels.merge_groups(self.sums, self.variance, *running, self.groups))
 
     def _moves(self, views: np.ndarray) -> Moves:
         return moves_of(self.row_px, self.col_px, views, self.channels, self.is_mosaic)
-
-    def _running(self) -> Running:
-        return Running(self.total, self.squares, self.first)
 
 
 def colours_apart(data: Views | PhotonCounts, shifts: Shifts) -> tuple[str | None, int]:

@@ -24,18 +24,6 @@ class Moves(NamedTuple):
     ends: np.ndarray
 
 
-class Running(NamedTuple):
-    """Running sums of groups of images, (G, H, N) float64, N columns times channels.
-
-    `total` and `squares` sum differences from the `first` sample of each voxel, NaN before there is one;
-    `squares` and `first` may be empty: then the samples themselves are summed.
-    """
-
-    total: np.ndarray
-    squares: np.ndarray
-    first: np.ndarray
-
-
 class Groups(NamedTuple):
     """Samples that the groups of images contain.
 

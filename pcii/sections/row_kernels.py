@@ -1,6 +1,9 @@
 """Compiled functions for one row of a section: sums of shifted images, and of their squared deviations.
 
-`running` is a `Running`, `moves` are `Moves` and `groups` are `Groups` of `image_moves`.
+`moves` are `Moves` and `groups` are `Groups` of `image_moves`. Running sums of groups of images are `total`,
+`squares` and `first`, (G, H, N) float64, N columns times channels: sums of the samples or, if variances are
+wanted, of their differences from the `first` one, which is NaN where there is none yet, and of these
+differences squared. Else the last two are None, and so is `variance`: what is done with them is not compiled.
 """
 
 import numpy as np
@@ -19,18 +22,17 @@ def not_finite(values) -> int:
 
 
 @helper
-def add_rows(running, images, moves, top, start, stop) -> int:
+def add_rows(total, squares, first, images, moves, top, start, stop) -> int:
     """Add all images to the rows `start` to `stop` of a band of a section that begins at row `top`.
 
     The rows of an image are read in the order in which they lie in memory. Returns how many pixels of these
     rows are not finite and fall outside the section.
     """
     _, height, width = images.shape
-    total, squares, first = running
     source, row_shift, col_shift, ends = moves
     begin = bad = 0
     for g in range(ends.size):
-        if squares.size:
+        if squares is not None:
             for line in range(start, stop):
                 _find_first(first[g, line], images, top + line, moves, begin, ends[g])
         for m in range(begin, ends[g], 4):
@@ -40,7 +42,7 @@ def add_rows(running, images, moves, top, start, stop) -> int:
                 for n in four:
                     if 0 <= row - row_shift[n] < height:
                         bad += _bad_outside(images[source[n], row - row_shift[n]], col_shift[n])
-                if squares.size:
+                if squares is not None:
                     running_row = total[g, line], squares[g, line], first[g, line]
                     _add_deviations_of_four(running_row, images, row, moves, four)
                     continue
@@ -156,10 +158,9 @@ def bad_rows(images, moves) -> int:
 
 
 @helper
-def merge_line(sums, variance, running, groups, top, line) -> None:
+def merge_line(sums, variance, total, squares, first, groups, top, line) -> None:
     """One row of `merge_groups`; groups of one colour are merged as by Chan, Golub and LeVeque 1983."""
     _, width, channels = sums.shape
-    total, squares, first = running
     by_row, by_col, phases = groups
     row = top + line
     if not phases.size:
@@ -170,7 +171,7 @@ def merge_line(sums, variance, running, groups, top, line) -> None:
             for colour in range(channels):
                 index = col * channels + colour
                 voxel_sum = total[0, line, index]
-                if variance.size:
+                if variance is not None:
                     squared = _deviations(voxel_sum, squares[0, line, index], inverse)
                     variance[line, col, colour] = squared * unbiased
                     voxel_sum += first[0, line, index] * n if n > 0 else 0.0
@@ -182,7 +183,7 @@ def merge_line(sums, variance, running, groups, top, line) -> None:
             rows, colour, g = by_row[p, row], 2 * phase, 2 * p + q
             for col in range(parity, width, 2):
                 voxel_sum, n = total[g, line, col], rows * by_col[q, col]
-                if variance.size:
+                if variance is not None:
                     squared = _deviations(voxel_sum, squares[g, line, col], 1 / max(n, 1))
                     variance[line, col, colour] = squared / max(n - 1, 1)
                     voxel_sum += first[g, line, col] * n if n > 0 else 0.0
@@ -193,7 +194,7 @@ def merge_line(sums, variance, running, groups, top, line) -> None:
             n, m = by_row[p, row] * by_col[q, col], by_row[1 - p, row] * by_col[1 - q, col]
             a, b = total[g, line, col], total[h, line, col]
             voxel_sum = a + b
-            if variance.size:
+            if variance is not None:
                 inverse_n, inverse_m = 1 / max(n, 1), 1 / max(m, 1)
                 squared = _deviations(a, squares[g, line, col], inverse_n) + _deviations(
                     b, squares[h, line, col], inverse_m
