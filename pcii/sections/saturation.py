@@ -14,14 +14,11 @@ import numpy as np
 from pcii.core.bayer import colour_index
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_events import Readout
+from pcii.core.photon_events import NEGLIGIBLE_LOSS, Readout
 
 BLOCK_PX = 8
 """Light is taken as even over blocks of so many pixels to a side, colour by colour: larger ones would average
 bright spots away, smaller ones hardly ever hold two photons."""
-NEGLIGIBLE_LOSS = 0.02
-"""Up to so much the Poisson model of depth and removal holds well: contrasts and the variance of counts are
-each too small by this share, less than the noise of either."""
 
 
 def saturation_loss(counts: PhotonCounts) -> float:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from pcii.core.bayer import channel_count
-from pcii.core.photon_events import clipped_mean
+from pcii.core.photon_events import NEGLIGIBLE_LOSS, clipped_mean
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts
 
 LEAST_PHOTONS = 100
@@ -13,8 +13,6 @@ LEAST_PHOTONS = 100
 LEAST_VOXEL_COUNTS = 0.1
 MOST_LOST_SHARE = 0.5
 MOST_FALSE_SHARE = 0.5
-MOST_SATURATED_SHARE = 0.02
-"""Up to so much depth and removal are meant for, which take counts for Poisson numbers."""
 
 
 def photon_findings(facts: Facts) -> list[Finding]:
@@ -91,7 +89,7 @@ def _saturation_findings(facts: Facts) -> list[Finding]:
     per_frame = brightest / sensor.frames
     lost = 1 - float(clipped_mean(np.array(per_frame), most)) / per_frame if per_frame > 0 else 0.0
     text = f"{thing.name}: {per_frame:.2g} photons per pixel and frame, of which {lost:.1%} saturate"
-    if lost <= MOST_SATURATED_SHARE:
+    if lost <= NEGLIGIBLE_LOSS:
         return [Finding("ok", "photons", text)]
     return [Finding("warn", "photons", text, "raise sensor.frames, or take less light")]
 

@@ -148,7 +148,7 @@ def test_one_frame_is_always_known_and_several_only_if_they_were_kept() -> None:
         ({"frames": 2.0}, "frames: expected a whole number"),
         ({"bits": 33}, "bits: expected a whole number from 1 to 32"),
         ({"bits": True}, "bits: expected a whole number"),
-        ({"n": [3]}, "n: a pixel has 3 counts, and 2 frames of 1 bits hold 2"),
+        ({"n": [3]}, "n: a pixel has 3 counts, where frames = 2, bits = 1 hold 2"),
         ({"frame": [0]}, "frame: expected one for each of 2 counts"),
         ({"frame": [0, 2]}, "frame: 2 is outside 0 .. 1"),
         ({"frame": [1, 1]}, "frame: a pixel has more counts in frame 1 than 1"),
