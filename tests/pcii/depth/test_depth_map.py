@@ -213,7 +213,7 @@ def test_a_range_without_end_is_refused():
 
 def test_the_network_is_run_where_there_are_photons_and_a_margin(two_squares, monkeypatch) -> None:
     """The dark far from all photons is left out: bounded, as the depth map of the whole film says."""
-    events, range_mm = two_squares.counts.events, (1 / 8, 1 / 2)
+    events, range_mm = two_squares.counts.events, (1 / 4, 1 / 2.4)
     grid = unit_grid(7, 7, 640, 704)
     place = events.k, events.l, events.i + 64, events.j + 64, events.n
     counts, sizes = PhotonCounts.from_events(*place, grid, cfa="GRBG"), list[tuple[int, ...]]()
