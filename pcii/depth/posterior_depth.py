@@ -102,7 +102,7 @@ class PosteriorDepth:
             inputs = self.network_inputs(evidence, planes, block_px)
             # Where there are no photons there is no surface, and the depth map has no answer.
             probability, nothing = np.zeros_like(inputs.evidence), np.ones_like(inputs.evidence[0])
-            part = self._lit_part(evidence.photons, block_px, nothing.shape)
+            part = self._part_with_photons(evidence.photons, block_px, nothing.shape)
             if part is not None:
                 probability[:, *part], nothing[part] = network_posterior(inputs.part(*part))
         posterior = DepthPosterior(planes, probability[:, :h, :w], nothing[:h, :w], block_px)
@@ -147,19 +147,20 @@ class PosteriorDepth:
             met += found
         return met
 
-    def _lit_part(
+    def _part_with_photons(
         self, photons: np.ndarray, block_px: int, shape: tuple[int, ...]
     ) -> tuple[slice, slice] | None:
-        """Rows and columns of blocks with enough photons at any plane, and a margin; None if there are none.
+        """The smallest box of rows and columns, in blocks, that the network has to be run on; None if empty.
 
-        In whole cells of the network's coarsest level, as of the film of `shape` blocks.
+        It holds all blocks with enough photons around them at any plane, with a margin, and is a whole number
+        of cells of the network's coarsest level, on a film of `shape` blocks.
         """
-        lit = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
-        if not lit.any():
+        enough = np.max(self._photons_around(photons, block_px), axis=0) >= self.least_photons
+        if not enough.any():
             return None
         margin = self.margin_blocks // CELL_BLOCKS
         part = []
-        for axis, size in zip(box_around(lit, (margin, margin)), shape, strict=True):
+        for axis, size in zip(box_around(enough, (margin, margin)), shape, strict=True):
             first, last = axis.start * CELL_BLOCKS // MULTIPLE, -(-axis.stop * CELL_BLOCKS // MULTIPLE)
             part.append(slice(first * MULTIPLE, min(last * MULTIPLE, size)))
         return part[0], part[1]

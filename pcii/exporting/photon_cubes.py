@@ -22,7 +22,7 @@ from pcii.exporting.view_names import row_and_column
 from pcii.io.dataset import Dataset
 from pcii.store.safe_files import json_bytes
 from pcii.transforms.camera_poses import principal_points_px
-from pcii.transforms.transforms_file import MOST_FRAMES, TRANSFORMS
+from pcii.transforms.transforms_file import MOST_POSES, TRANSFORMS
 from pcii.transforms.written_members import frames_of, intrinsics_of
 
 FRAMES = "frames.npy"
@@ -72,10 +72,10 @@ def _kept_frames(dataset: Dataset) -> tuple[FrameEvents, int]:
     if bits != 1:
         what = "its counts have no limit" if bits is None else f"its frames are of {bits} bits"
         raise InputError(f"{dataset.path}: {what}, and the frames of a photon cube are of one bit")
-    if frames > MOST_FRAMES:
+    if frames > MOST_POSES:
         raise InputError(
             f"{dataset.path}: has {frames} frames, and a photon cube, which lists a pose for each, has at "
-            f"most {MOST_FRAMES}"
+            f"most {MOST_POSES}"
         )
     events = counts.frame_events
     if events is None:

@@ -17,8 +17,10 @@ from pcii.io.dataset_writer import check_budget
 from pcii.transforms.film_sizes import FilmSize, camera_grid_of
 from pcii.transforms.grid_of_poses import find_grid
 from pcii.transforms.parsed_members import Members
-from pcii.transforms.transforms_file import MOST_FRAMES, TransformsFile
+from pcii.transforms.transforms_file import TransformsFile
 
+MOST_CHANNELS = 1 << 16
+"""Beyond it is no number of channels."""
 ROUNDING = 1e-9
 """Of numbers of poses that are equal: metres, or parts of a rotation."""
 
@@ -48,7 +50,7 @@ def read_cube_folder(file: TransformsFile, film: FilmSize | None = None) -> Cube
     told = Members(file.path, "", file.document)
     if file.document.get("bitpack_dim") != 2:
         raise told.fault("bitpack_dim", "expected 2: bits that are packed along the width")
-    if told.has("c") and told.whole("c", MOST_FRAMES) != 1:
+    if told.has("c") and told.whole("c", MOST_CHANNELS) != 1:
         raise told.fault("c", "expected 1; of a photon cube one channel is read")
     cfa = file.document.get("cfa")
     if cfa is not None and not isinstance(cfa, str):

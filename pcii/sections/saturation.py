@@ -18,7 +18,7 @@ from pcii.core.photon_events import NEGLIGIBLE_LOSS, Readout
 
 BLOCK_PX = 8
 """Light is taken as even over blocks of so many pixels to a side, colour by colour: larger ones would average
-bright spots away, smaller ones hardly ever hold two photons."""
+bright spots away, smaller ones hardly ever hold two photons (docs/single_photon.md has other sizes)."""
 
 
 def saturation_loss(counts: PhotonCounts) -> float:
@@ -34,8 +34,13 @@ def saturation_loss(counts: PhotonCounts) -> float:
     block = ((rows * across + cols) * colours + colour_index(*grid.shape_HW, counts.cfa)).ravel()
     trials = np.bincount(block, minlength=down * across * colours) * float(counts.readout.frames)
     arrived = 0.0
-    for k, l in np.ndindex(grid.rows, grid.cols):
-        counted = np.bincount(block, counts.view(k, l).ravel(), minlength=trials.size)
+    for number in range(grid.view_count):
+        if counts.is_sparse:  # whole images of few photons would take ten times as long
+            events, own = counts.events, slice(*counts.view_starts[number : number + 2])
+            of, n = block[events.i[own].astype(np.int64) * grid.width + events.j[own]], events.n[own]
+        else:
+            of, n = block, counts.view(*divmod(number, grid.cols)).ravel()
+        counted = np.bincount(of, n, minlength=trials.size)
         lit = counted > 0
         arrived += float(_photons(counted[lit], trials[lit], counts.readout).sum())
     return max(0.0, 1 - counts.total / arrived)

@@ -11,6 +11,7 @@ from pcii.transforms.lattice_fit import Lattice, lattice_of, line_through
 from pcii.transforms.transforms_file import MOST_PX, TransformsFile
 
 MOST_CAMERAS = 1000
+"""All pairs of rows, and of columns, are compared: half a million of a single row."""
 NEAREST_SHARE = 1 / 4
 """Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
 what is nearer is seen by at most four cameras of a row. Their depth is focal length in px x pitch /

@@ -22,11 +22,12 @@ DEPTH_UNIT = "depth_unit_scale_factor"
 """Member with the unit, in metres, of the numbers in files of depth; named as nerfstudio's option."""
 DEPTH_UNIT_M = 1e-3
 """That unit where there is no such member; nerfstudio's default."""
-MOST_FRAMES = 1 << 16
+MOST_POSES = 1 << 16
+"""Frames of a file: a photon cube of visionsim has a pose for each of its frames, a thousand or more."""
 MOST_PIXELS = 1 << 20
-"""Most pixels of a side."""
+"""Pixels of a side; no sensor has a tenth of it."""
 FARTHEST_M = 1e6
-"""Of a camera from the origin of its world."""
+"""Of a camera from the origin of its world; doubles place it to 1e-7 mm there."""
 MOST_PX = 0.1
 """What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""
 MOST_SKEW = 1e-4
@@ -81,8 +82,8 @@ def read_transforms(path: str | Path) -> TransformsFile:
     listed = document.get("frames")
     if not isinstance(listed, list) or not listed:
         raise top.fault("frames", "expected a list with a frame for each picture")
-    if len(listed) > MOST_FRAMES:
-        raise top.fault("frames", f"has {len(listed)} frames, and at most {MOST_FRAMES} are read")
+    if len(listed) > MOST_POSES:
+        raise top.fault("frames", f"has {len(listed)} frames, and at most {MOST_POSES} are read")
     stack_path = top.inner_path("file_path") if top.has("file_path") else None
     frames = []
     for number, values in enumerate(listed):

@@ -14,7 +14,7 @@ def intrinsics_of(dataset: Dataset) -> dict[str, Any]:
     """Members at the top of the file: focal length in px, size and, where all cameras share it, centre.
 
     In a sheared grid each camera has a centre of its own, which its frame tells: nerfstudio would take one at
-    the top for all. The grid in mm is told unless the cameras are not quite on it.
+    the top for all. The grid in mm is written too, unless the cameras have errors of calibration.
     """
     grid = dataset.grid
     focal_px = grid.focal_mm / grid.pixel_mm

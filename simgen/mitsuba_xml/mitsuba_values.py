@@ -196,8 +196,8 @@ def _rotate(step: Element) -> np.ndarray:
     return matrix
 
 
-def _lookat_matrix(step: Element) -> np.ndarray:
-    """To the origin, +Z turned to the target, +Y as near to `up` as can be and +X to the left."""
+def _look_at(step: Element) -> np.ndarray:
+    """Rigid motion (4, 4) to `origin` that turns +Z towards `target`, and +Y as far as possible to `up`."""
     origin, target = (np.array(_three(step.attributes[key])) for key in ("origin", "target"))
     ahead = _unit(target - origin, "'target' must not be at 'origin'")
     up = np.array(_three(step.attributes.get("up") or "0 0 0"))
@@ -243,6 +243,6 @@ STEPS = {
     "translate": _translate,
     "scale": _scale,
     "rotate": _rotate,
-    "lookat": _lookat_matrix,
+    "lookat": _look_at,
     "matrix": _matrix,
 }

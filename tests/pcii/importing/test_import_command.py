@@ -2,7 +2,6 @@
 """`pcii import` as a new user types it, and fifty ways to give it something wrong."""
 
 import io
-import re
 import shutil
 import zipfile
 import zlib
@@ -13,14 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
+from command_runs import check_refused, run
 from picture_folders import H, W, make_folder, numbers, write
 from PIL import Image
 from png_files import chunk, png_file
 from rendered_cards import Card, render
 from test_other_sources import PARAMETERS, hci_folder, pfm
 
-from pcii.app.commands import app
-from pcii.base import command_line
 from pcii.base.srgb import linear_to_srgb
 from pcii.core.camera_grid import CameraGrid
 from pcii.io.dataset import open_dataset
@@ -29,10 +27,6 @@ from pcii.io.verification import verify
 CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
 NAMED = ["--pattern", "{col}_{row}.png", *CAMERAS]
 GRID = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 120, height=90, width=120)
-
-
-def run(*arguments: object) -> int:
-    return command_line.run(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")
@@ -436,10 +430,4 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
 
 @pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
 def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
-    source, out = make(tmp_path), tmp_path / "out"
-    capsys.readouterr()
-    assert run("import", source, "-o", out, *options) == 2
-    *_, said = capsys.readouterr().err.strip().split("\n")
-    assert said.startswith("error: ")
-    assert re.search(words, said), said
-    assert not out.exists()
+    check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)

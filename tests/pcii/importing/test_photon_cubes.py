@@ -2,7 +2,6 @@
 """Photon cubes come in as they went out; frames of strangers come in, and what is wrong is one sentence."""
 
 import json
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import tifffile
+from command_runs import check_refused, run
 from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
-from pcii.app.commands import app
-from pcii.base import command_line
 from pcii.core.camera_grid import CameraGrid
 from pcii.exporting.export_formats import export_dataset
 from pcii.importing.camera_order import ViewOrder
@@ -29,10 +27,6 @@ EIGHTS = CameraGrid(
 )
 BITS = bits_of(GRID)
 CUBE = packed(BITS[1, 0])
-
-
-def run(*arguments: object) -> int:
-    return command_line.run(app, [str(argument) for argument in arguments])
 
 
 def contents(root: Path) -> dict[Path, bytes]:
@@ -296,10 +290,4 @@ WRONG: list[tuple[str, Make, list[Any], str]] = [
 
 @pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
 def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
-    source, out = make(tmp_path), tmp_path / "out"
-    capsys.readouterr()
-    assert run("import", source, "-o", out, *options) == 2
-    *_, said = capsys.readouterr().err.strip().split("\n")
-    assert said.startswith("error: ")
-    assert re.search(words, said), said
-    assert not out.exists()
+    check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)

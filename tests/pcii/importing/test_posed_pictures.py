@@ -6,18 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_runs import run
 from picture_folders import H, W, numbers, write
 from posed_frames import frames_of
 
-from pcii.app.commands import app
-from pcii.base import command_line
 from pcii.base.srgb import srgb_to_linear
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.verification import verify
-
-
-def run(*arguments: object) -> int:
-    return command_line.run(app, [str(argument) for argument in arguments])
 
 
 def posed(
