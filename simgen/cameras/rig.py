@@ -51,6 +51,14 @@ class Camera:
         scale_px = self.grid.focal_mm / self.grid.pixel_mm
         return np.stack([x / z * scale_px + self.shift_px[0], y / z * scale_px + self.shift_px[1]], axis=1)
 
+    def of_window(self, rows: slice, cols: slice) -> "Camera":
+        """The same camera with these rows and columns of its film only."""
+        grid, (right, down) = self.grid, self.shift_px
+        right += (grid.width - cols.stop - cols.start) / 2
+        down += (grid.height - rows.stop - rows.start) / 2
+        window = replace(grid, height=rows.stop - rows.start, width=cols.stop - cols.start)
+        return replace(self, grid=window, shift_px=(right, down))
+
     def _turned(self, rows: np.ndarray, by: np.ndarray) -> np.ndarray:
         return rows if np.array_equal(by, np.eye(3)) else rows @ by
 

@@ -103,7 +103,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
             "identity": identity,
             "backend": engine,
             "photons": photons,
-            "skipped": skipped(prepared, photons, traced_for_visibility(out)),
+            "skipped": skipped(prepared, photons, traced_for_visibility(out), render_scene, capture.rig),
             "timings_s": clock.seconds,
             "files": files,
         }
@@ -151,6 +151,7 @@ def _work(
         recipe.exposure,
         products.radiance,
         made.samples if made is not None and renders else recipe.render.samples_per_pixel,
+        None if renders else recipe.render.background_samples_per_pixel,
         capture.seed,
         out,
     )

@@ -3,7 +3,9 @@
 from dataclasses import asdict
 from typing import Any
 
+from simgen.cameras.rig import Rig
 from simgen.dataset.prepared import Prepared
+from simgen.dataset.rendered_views import background_paths_saved
 from simgen.dataset.software import versions
 from simgen.renderer.mitsuba_scene import RenderScene
 
@@ -32,7 +34,11 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
 
 
 def skipped(
-    prepared: Prepared, photons: dict[str, Any] | None, shadow_rays: int | None
+    prepared: Prepared,
+    photons: dict[str, Any] | None,
+    shadow_rays: int | None,
+    render_scene: RenderScene,
+    rig: Rig,
 ) -> list[dict[str, Any]]:
     """What was not done: what, why, and how much work that saved, and its unit.
 
@@ -56,6 +62,12 @@ def skipped(
     elif products.radiance == "mosaic" and recipe.cfa is not None:
         what = "two of three colours of the radiance images"
         add(what, "the Bayer pattern hides them", 8 * pixels, "bytes before compression")
+    renders_for_photons = photons is not None and photons["method"] == "dense"
+    if products.radiance != "none" and not renders_for_photons:
+        saved = background_paths_saved(render_scene, rig, recipe.render)
+        if saved:
+            why = f"the recipe asks for {recipe.render.background_samples_per_pixel} per pixel there"
+            add("samples where no object can be seen", why, saved, "light paths")
     if shadow_rays is not None:
         what = "visibility of some points"
         add(what, "no shape can stand in the way", pixels - shadow_rays, "rays")

@@ -14,21 +14,44 @@ from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.renderer.radiance import render_view
+from simgen.renderer.radiance import render_view, windows_of_objects
 from simgen.sensor.detector import full_light_image
 from simgen.sensor.exposure import photons_per_radiance
-from simgen.spec.recipe import Exposure, Sensor
+from simgen.spec.recipe import Exposure, Render, Sensor
 
 RENDERED = ".rendered"
 """Folder of exact views that are no product in themselves; gone when the dataset is finished."""
 
 
 def exact_view(
-    render_scene: RenderScene, rig: Rig, k: int, l: int, samples_per_pixel: int, seed: int
+    render_scene: RenderScene,
+    rig: Rig,
+    k: int,
+    l: int,
+    samples_per_pixel: int,
+    seed: int,
+    background_samples: int | None = None,
 ) -> np.ndarray:
     """Radiance (H, W, C), float32, of camera (k, l), with noise of its own; `seed` is that of the draw."""
-    own = seeds.integer(seed, view=k * rig.grid.cols + l, stage="radiance")
-    return render_view(render_scene, rig, k, l, samples_per_pixel=samples_per_pixel, seed=own)
+    return render_view(
+        render_scene,
+        rig,
+        k,
+        l,
+        samples_per_pixel=samples_per_pixel,
+        background_samples=background_samples,
+        seed=seeds.integer(seed, view=k * rig.grid.cols + l, stage="radiance"),
+    )
+
+
+def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
+    """Light paths that all views take less than with `render.samples_per_pixel` everywhere."""
+    fewer = render.background_samples_per_pixel
+    if fewer is None:
+        return 0
+    cameras = (rig.camera(k, l) for k, l in np.ndindex(rig.grid.rows, rig.grid.cols))
+    saved = (windows_of_objects(render_scene, each, render.samples_per_pixel, fewer)[1] for each in cameras)
+    return sum(max(paths, 0) for paths in saved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +67,7 @@ class RenderedViews:
     exposure: Exposure | None
     radiance: Literal["none", "mosaic", "rgb"]
     samples_per_pixel: int
+    background_samples: int | None
     seed: int
     out: Path
 
@@ -55,12 +79,16 @@ class RenderedViews:
             for k, l in np.ndindex(grid.rows, grid.cols):
                 image = None
                 if not self._exact_file(k, l).is_file():
-                    image = exact_view(render_scene, self.rig, k, l, self.samples_per_pixel, self.seed)
+                    image = self._exact(render_scene, k, l)
                 writing.append(writer.submit(self._write, k, l, image))
                 while writing and (len(writing) > 1 or k * grid.cols + l == grid.view_count - 1):
                     writing.popleft().result()
                     written += 1
                     report("views", written, grid.view_count)
+
+    def _exact(self, render_scene: RenderScene, k: int, l: int) -> np.ndarray:
+        samples = self.samples_per_pixel, self.seed, self.background_samples
+        return exact_view(render_scene, self.rig, k, l, *samples)
 
     def _write(self, k: int, l: int, image: np.ndarray | None) -> None:
         """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""

@@ -1,10 +1,14 @@
 """Dense radiance of one view: every pixel, by path tracing."""
 
+from collections.abc import Iterator
+from itertools import count
 from typing import Any
 
 import numpy as np
 
-from simgen.cameras.rig import Cameras, as_rig
+from simgen.cameras.film_windows import Window, covered_px, object_windows
+from simgen.cameras.rig import Camera, Cameras, as_rig
+from simgen.renderer.backend import shape_numbers
 from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_colours import spectrum_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -23,30 +27,75 @@ def render_view(
     *,
     samples_per_pixel: int,
     seed: int,
+    background_samples: int | None = None,
     independent: bool = False,
 ) -> np.ndarray:
     """Linear radiance (H, W, C), float32, of camera (k, l): sRGB whose luminance is in cd/m^2.
 
     In spectral mode: what pixels of each of the camera's colours see, in the unit of `filters`.
 
-    The mean of `samples_per_pixel` paths through each pixel's square; the same bytes for the same
-    seed on the same backend. Views need different seeds: with one seed their noise is the same. The paths of
-    a pixel are spread evenly over it and over the lamps (correlated multi-jittered sampling, Kensler 2013),
-    which at 4 or 8 paths has the error of four times as many `independent` ones.
+    The mean of `samples_per_pixel` paths through each pixel's square, or of `background_samples` outside the
+    windows that objects are in; the same bytes for the same seed on the same backend. Views need different
+    seeds: with one seed their noise is the same. The paths of a pixel are spread evenly over it and over the
+    lamps (correlated multi-jittered sampling, Kensler 2013), which at 4 or 8 paths has the error of four
+    times as many `independent` ones.
     """
-    mi = render_scene.mi
-    sampler = {"type": "independent" if independent else "multijitter"}
     camera = as_rig(cameras).camera(k, l)
-    plugin = sensor_plugin(mi, camera, sampler)
+    sampler = {"type": "independent" if independent else "multijitter"}
+    own_seeds = ((seed + number * SEED_STEP) % 2**32 for number in count())
+
+    def mean_of_paths(camera: Camera, samples: int) -> np.ndarray:
+        return _mean_of_paths(render_scene, camera, sampler, samples, own_seeds)
+
+    if background_samples is None:
+        return mean_of_paths(camera, samples_per_pixel)
+    windows, saved = windows_of_objects(render_scene, camera, samples_per_pixel, background_samples)
+    if saved <= 0:
+        return mean_of_paths(camera, samples_per_pixel)
+    image = mean_of_paths(camera, background_samples)
+    for rows, cols in windows:
+        image[rows, cols] = mean_of_paths(camera.of_window(rows, cols), samples_per_pixel)
+    return image
+
+
+def windows_of_objects(
+    render_scene: RenderScene, camera: Camera, samples_per_pixel: int, background_samples: int
+) -> tuple[list[Window], int]:
+    """Where objects can be seen, and how many light paths fewer samples elsewhere save."""
+    windows = object_windows(camera, _object_boxes_mm(render_scene))
+    pixels = camera.grid.height * camera.grid.width
+    paths = background_samples * pixels + samples_per_pixel * covered_px(windows)
+    return windows, samples_per_pixel * pixels - paths
+
+
+def _mean_of_paths(
+    render_scene: RenderScene,
+    camera: Camera,
+    sampler: dict[str, Any],
+    samples_per_pixel: int,
+    own_seeds: Iterator[int],
+) -> np.ndarray:
+    """The film of a camera, (H, W, C) float32; each part of its samples takes the next seed."""
+    mi, plugin = render_scene.mi, sensor_plugin(render_scene.mi, camera, sampler)
     if render_scene.filters is not None:
         plugin["film"] = _film(plugin["film"], render_scene.filters)
     sensor = mi.load_dict(plugin)
-    channels = 3 if render_scene.filters is None else len(render_scene.filters.sensitivity)
-    total = np.zeros((camera.grid.height, camera.grid.width, channels))
-    for number, samples in enumerate(_parts(samples_per_pixel)):
-        own_seed = (seed + number * SEED_STEP) % 2**32
-        total += samples * np.array(mi.render(render_scene.scene, sensor=sensor, spp=samples, seed=own_seed))
+    total = np.zeros(())
+    for samples in _parts(samples_per_pixel):
+        image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=samples, seed=next(own_seeds)))
+        if samples == samples_per_pixel:
+            return image
+        total = total + samples * image.astype(np.float64)
     return (total / samples_per_pixel).astype(np.float32)
+
+
+def _object_boxes_mm(render_scene: RenderScene) -> np.ndarray:
+    """Corners (N, 8, 3) of the bounding boxes of the scene's objects."""
+    scene = render_scene.scene
+    objects = render_scene.object_of_shape[shape_numbers(scene)] > 0
+    boxes = [shape.bbox() for shape, is_object in zip(scene.shapes(), objects, strict=True) if is_object]
+    corners = [[box.corner(number) for number in range(8)] for box in boxes]
+    return np.array(corners, dtype=np.float64).reshape(-1, 8, 3)
 
 
 def _parts(samples: int) -> list[int]:

@@ -149,8 +149,16 @@ class Render(Strict):
 
     samples_per_pixel: Count = 16
     """Light paths through each pixel of the radiance images; photon counts choose their own number."""
+    background_samples_per_pixel: Count | None = None
+    """Paths where no object can be seen, if fewer are enough there, as for a dark backdrop."""
     max_depth: Count = 3
     """Longest light path in segments: 2 is direct light, 3 adds one bounce."""
+
+    @model_validator(mode="after")
+    def _objects_come_first(self) -> Self:
+        if (self.background_samples_per_pixel or 0) > self.samples_per_pixel:
+            raise ValueError("background_samples_per_pixel: expected at most samples_per_pixel")
+        return self
 
 
 class Products(Strict):
@@ -217,12 +225,12 @@ class Recipe(Strict):
 
     @model_validator(mode="after")
     def _one_pass_renders_a_view(self) -> Self:
-        paths = self.grid.height * self.grid.width * self.render.samples_per_pixel
+        grid, samples = self.grid, self.render.samples_per_pixel
+        paths = samples * grid.height * grid.width
         if paths >= MOST_PATHS:
             raise ValueError(
-                f"a view of {self.grid.height} x {self.grid.width} pixels with "
-                f"{self.render.samples_per_pixel} samples each is {paths} paths; fewer than "
-                f"{MOST_PATHS} can be rendered at once"
+                f"a view of {grid.height} x {grid.width} pixels with {samples} samples each is {paths} "
+                f"paths; fewer than {MOST_PATHS} can be rendered at once"
             )
         return self
 
@@ -231,9 +239,7 @@ class Recipe(Strict):
         if self.exposure is None and self.photons.scope == "exposure":
             raise ValueError("photons.scope: 'exposure' needs the table [exposure] with f_number and time_s")
         if self.exposure is None and self.sensor.full_light is not None:
-            raise ValueError(
-                "sensor.full_light: a camera's images need the table [exposure] with f_number and time_s"
-            )
+            raise ValueError("sensor.full_light: needs the table [exposure] with f_number and time_s")
         return self
 
     @model_validator(mode="after")

@@ -137,7 +137,7 @@ EXPOSED = {"f_number": 8.0, "time_s": 0.01}
             "nested: an exposure has no budget; use scope 'view', 'channel' or 'scene'",
         ),
         ({"photons": {"scope": "exposure"}}, "photons.scope: 'exposure' needs the table [exposure]"),
-        ({"sensor": {"full_light": {}}}, "sensor.full_light: a camera's images need the table [exposure]"),
+        ({"sensor": {"full_light": {}}}, "sensor.full_light: needs the table [exposure]"),
         ({"exposure": {"f_number": 0}}, "'exposure.f_number': input should be greater than 0, got 0"),
         ({"exposure": {"time_s": -1}}, "'exposure.time_s'"),
         ({"exposure": {"time_s": float("inf")}}, "'exposure.time_s'"),

@@ -53,6 +53,13 @@ def test_a_dataset_explains_itself(made: Path) -> None:
     assert verify(made) == len(manifest["files"])
 
 
+def test_fewer_samples_of_the_background_are_said_with_what_they_saved(tmp_path: Path) -> None:
+    render = {"samples_per_pixel": 4, "background_samples_per_pixel": 1}
+    manifest = generate(recipe(render=render), Path(), tmp_path / "sparse")
+    (saved,) = (entry["saved"] for entry in manifest["skipped"] if "no object can be seen" in entry["what"])
+    assert 0 < saved < 3 * 6 * 64 * 60
+
+
 def test_it_opens_as_types_that_agree_with_the_recipe(made: Path) -> None:
     dataset = open_dataset(made)
     assert dataset.grid.shape_KLHW == (2, 3, 64, 60)

@@ -82,6 +82,7 @@ RECIPE = {
     "photons": {"budget": 500.0, "nested": [100.0, 200.0]},
     "analysis": {"z_mm": [500.0], "z_range_mm": [400.0, 700.0]},
     "products": {"view_truth": ["z_mm"]},
+    "render": {"background_samples_per_pixel": 4},
 }
 EXPOSED = {
     "scene": "here",

@@ -1,0 +1,47 @@
+"""Dense radiance: fewer samples where no object can be seen."""
+
+import numpy as np
+import pytest
+from lit_scenes import two_balls
+
+from pcii.core.camera_grid import CameraGrid
+from simgen.cameras.rig import as_rig
+from simgen.renderer.radiance import render_view, windows_of_objects
+
+pytestmark = pytest.mark.renders
+GRID = CameraGrid(
+    rows=1,
+    cols=2,
+    pitch_mm=(9.0, 5.0),
+    focal_mm=50.0,
+    pixel_mm=0.5,
+    height=70,
+    width=80,
+    shear_px=(1.5, 0.0),
+)
+
+
+def test_objects_have_their_samples_and_the_background_fewer() -> None:
+    scene = two_balls()
+    sparse, least, dense = (
+        render_view(scene, GRID, 0, 1, samples_per_pixel=samples, background_samples=fewer, seed=4)
+        for samples, fewer in ((256, 1), (1, None), (256, None))
+    )
+    windows, saved = windows_of_objects(scene, as_rig(GRID).camera(0, 1), 256, 1)
+    is_window = np.zeros((GRID.height, GRID.width), dtype=bool)
+    for rows, cols in windows:
+        is_window[rows, cols] = True
+    np.testing.assert_array_equal(sparse[~is_window], least[~is_window])
+    # Where objects are, two renderings of 256 samples: each pixel of a window that were one pixel off would
+    # differ by half the brightest light at outlines.
+    assert np.abs(sparse - dense)[is_window].max() < 0.1 * dense.max()
+    assert not np.array_equal(sparse[is_window], dense[is_window])
+    assert saved == 255 * GRID.height * GRID.width - 256 * is_window.sum()
+
+
+def test_windows_that_would_cost_more_are_not_made() -> None:
+    scene = two_balls()
+    plain, fewer = (
+        render_view(scene, GRID, 0, 0, samples_per_pixel=2, background_samples=n, seed=4) for n in (None, 2)
+    )
+    np.testing.assert_array_equal(plain, fewer)
