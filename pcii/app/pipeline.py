@@ -19,6 +19,8 @@ from pcii.metrics.scoring import score
 from pcii.removal.methods import DEFAULT_METHODS, find_method
 from pcii.sections.reconstruction import reconstruct
 
+FULL_LIGHT_STEP = "sections at full light"
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -77,24 +79,26 @@ def analyse(
         report("analysis", done, total)
         return made
 
-    full_light = finished(
-        "sections at full light", timed(lambda: full_light_sections(dataset, planes, report))
-    )
-    if counts is None:
-        assert full_light is not None
-        sections = finished("sections", (full_light, 0.0))
-    else:
-        sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
-    focus: list[Segmented] = []
-    steps.begin(removals)
-    # Depth needs nothing of the other steps, and most of its time leaves the interpreter to them.
-    with ThreadPoolExecutor(1) as beside:
+    full_light: Sections | None = None
+    # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
+    with ThreadPoolExecutor(2, "beside") as beside:
+        lit = beside.submit(timed, partial(full_light_sections, dataset, planes, report))
+        if counts is None:
+            full_light = finished(FULL_LIGHT_STEP, lit.result())
+            assert full_light is not None
+            sections = finished("sections", (full_light, 0.0))
+        else:
+            sections = finished("sections", timed(lambda: reconstruct(counts, planes)))
+        focus: list[Segmented] = []
+        steps.begin(removals)
         map_depth = partial(estimate_depth, seen, z_range_mm, method=depth_method)
         mapped = beside.submit(steps.depth, depth_method, z_range_mm, map_depth)
         for method, remove_by in removals.items():
             assert counts is not None
             remove = partial(remove_by, counts, sections)
             focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
+        if counts is not None:
+            full_light = finished(FULL_LIGHT_STEP, lit.result())
         depth = finished(DEPTH_STEP, mapped.result())
     scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
     result = finished("score", timed(lambda: scored(dataset=dataset.name)))

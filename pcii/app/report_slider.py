@@ -16,7 +16,7 @@ from pcii.app.report_figures import Crop, Shown, block_estimate, smoothing_words
 from pcii.base.progress import Report
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
-from pcii.core.images import Views
+from pcii.core.images import Views, window_of
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
@@ -30,7 +30,7 @@ FINEST_STEP_PX = 1.0
 """Sections whose total disparities differ by less look the same."""
 MOST_VOXELS = 40_000_000
 """Voxels of the sections in memory at once, 1.2 GB of radiance: 13 planes of 1024 x 1024 pixels in three
-colours. Each such group reads all full-light views."""
+colours, of a part of the film more. Each such group reads all full-light views."""
 MOST_BLOCKS = 40_000
 """Blocks of pixels that are read out."""
 
@@ -63,6 +63,8 @@ def slider(shown: Shown, report: Report) -> dict[str, Any]:
 
     Photons are shown smoothed, and as they are too.
     """
+    from pcii.base.compiled_loops import each_in_threads
+
     outcome, crop = shown.outcome, shown.crop
     dataset = outcome.dataset
     planes, own = slider_planes(outcome)
@@ -77,15 +79,17 @@ def slider(shown: Shown, report: Report) -> dict[str, Any]:
     for number, (label, source) in enumerate(sources):
         ways = dict.fromkeys((shown.smoothing_px, 0.0) if isinstance(source, PhotonCounts) else (0.0,))
         seen: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {way: [] for way in ways}
-        for done, (sections, plane) in enumerate(_each(source, planes), start=1):
+        around, inside = (source, crop) if isinstance(source, PhotonCounts) else _around(source, crop, planes)
+        own_blocks = replace(inside, step_px=blocks.step_px)
+        for done, (sections, plane) in enumerate(_each(around, planes), start=1):
             for way, estimates in seen.items():
-                estimates.append(block_estimate(sections, plane, crop, way))
+                estimates.append(block_estimate(sections, plane, inside, way))
             if number == 0:
-                read.append(_read_values(sections, plane, blocks))
+                read.append(_read_values(sections, plane, own_blocks))
             report(f"pictures of {label}", done, len(planes))
         for way, estimates in seen.items():
             words = smoothing_words(way) or " as they are" * (len(seen) > 1)
-            images = [picture.photo_uri(image) for image in encoded(estimates)]
+            images = each_in_threads(picture.photo_uri, encoded(estimates))
             lights.append({"label": f"{label}{words}", "images": images})
     maps = _maps(outcome, blocks)
     step_mm = max(each["step"] for each in maps if each["name"] in ("estimate", "truth"))
@@ -104,10 +108,27 @@ def slider(shown: Shown, report: Report) -> dict[str, Any]:
     }
 
 
+def _around(views: Views, crop: Crop, planes: FocalPlanes) -> tuple[Views, Crop]:
+    """The part of the views that sections of the crop are made of, and where the crop is in it."""
+
+    def with_margin(side: slice, shifts_px: np.ndarray, size: int) -> slice:
+        reach_px = int(np.abs(shifts_px).max())
+        # From an even pixel on, so that a mosaic keeps its pattern.
+        return slice(max(side.start - reach_px, 0) // 2 * 2, min(side.stop + reach_px, size))
+
+    sides, shape = (crop.rows, crop.cols), views.grid.shape_HW
+    rows, cols = map(with_margin, sides, planes.whole_shifts_px, shape)
+    inside = (
+        slice(s.start - part.start, s.stop - part.start) for s, part in zip(sides, (rows, cols), strict=True)
+    )
+    return window_of(views, rows, cols), Crop(*inside, step_px=crop.step_px)
+
+
 def _each(source: PhotonCounts | Views, planes: FocalPlanes) -> Iterator[tuple[Sections, int]]:
-    at_once = max(1, MOST_VOXELS // (planes.grid.height * planes.grid.width * source.channel_count))
+    at_once = max(1, MOST_VOXELS // (source.grid.height * source.grid.width * source.channel_count))
     for first in range(0, len(planes), at_once):
-        sections = reconstruct(source, planes.take(slice(first, first + at_once)))
+        some = planes.take(slice(first, first + at_once))
+        sections = reconstruct(source, replace(some, grid=source.grid))
         for plane in range(len(sections.planes)):
             yield sections, plane
 

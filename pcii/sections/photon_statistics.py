@@ -92,15 +92,19 @@ def pooled_samples(sections: Sections, window_px: int) -> np.ndarray:
 
 
 def _window_means(values: np.ndarray, window_px: int) -> np.ndarray:
-    """Means (H, W, C) float64 over square windows; outside the film there is nothing."""
-    from scipy.ndimage import uniform_filter
+    """Means (H, W, C) float64 over square windows of odd side; outside the film there is nothing."""
+    from scipy.ndimage import uniform_filter1d
 
-    from pcii.base.compiled_loops import each_in_threads
-
-    means = values.astype(np.float64)
-    colours = list(np.moveaxis(means, -1, 0))
-    each_in_threads(lambda colour: uniform_filter(colour, window_px, colour, "constant"), colours)
-    return means
+    H, W, C = values.shape
+    padded, means = np.zeros((H + window_px, W * C)), np.empty((H, W, C))
+    padded[window_px // 2 :][:H] = values.reshape(H, -1)
+    # Whole rows at a time; SciPy takes columns one by one, and then memory is what limits it.
+    total = padded[:window_px].sum(axis=0)
+    for row, entering, leaving in zip(means.reshape(H, -1), padded[window_px:], padded, strict=False):
+        np.divide(total, window_px, out=row)
+        total += entering
+        total -= leaving
+    return uniform_filter1d(means, window_px, axis=1, mode="constant")
 
 
 def region_entropy_bits(pooled: np.ndarray, region: np.ndarray, tops: np.ndarray) -> float:
