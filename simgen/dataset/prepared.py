@@ -1,5 +1,6 @@
 """A recipe with all that it names, and the parts of it that each stage of the work takes."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 
 from pcii.io.dataset_layout import DATASET_FOLDER
 from pcii.store.hashes import hash_file, hash_json
+from simgen.assets.asset_files import read_assets
 from simgen.base import random_streams as seeds
 from simgen.base.asset_names import asset
 from simgen.cameras.calibration import rig_of
@@ -83,8 +85,11 @@ class Prepared:
 
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
-        mi = backend.load(spectral=self.recipe.is_spectral)
-        return build(mi, self.scene, self.folder, self.recipe.render.max_depth, self.curves)
+        with ThreadPoolExecutor(1) as beside:  # the files are read by another process while this one loads
+            assets = beside.submit(read_assets, self.scene, self.folder)
+            mi = backend.load(spectral=self.recipe.is_spectral)
+            described = self.scene, self.folder, self.recipe.render.max_depth, self.curves
+            return build(mi, *described, assets.result())
 
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:

@@ -20,6 +20,7 @@ from copy import copy
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
+from simgen.base.neighbourhoods import over_squares
 from simgen.photons.disparity_layers import DisparityLayers, Samples
 
 COARSE_TILES = 8
@@ -150,8 +151,6 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
 
 def _without_gaps(layers: DisparityLayers, tiles: np.ndarray) -> np.ndarray:
     """These tiles (N,), sorted, and those in gaps between them: a closing of each layer by a square."""
-    from scipy.ndimage import maximum_filter, minimum_filter
-
     if not tiles.size:
         return tiles
     closed = []
@@ -159,11 +158,11 @@ def _without_gaps(layers: DisparityLayers, tiles: np.ndarray) -> np.ndarray:
     for in_layer in np.split(tiles, np.flatnonzero(np.diff(tiles // per_layer)) + 1):
         layer, row, col = layers.layer_row_col(in_layer)
         top, left = row.min(), col.min()
-        mask = np.zeros((row.max() - top + 1 + 2 * side, col.max() - left + 1 + 2 * side), dtype=bool)
-        mask[row - top + side, col - left + side] = True
-        mask = minimum_filter(maximum_filter(mask, side), side)
-        row, col = np.nonzero(mask)
-        closed.append(layers.flat(layer[0], row + top - side, col + left - side))
+        margin = side - 1
+        mask = np.zeros((row.max() - top + 1 + 2 * margin, col.max() - left + 1 + 2 * margin), dtype=bool)
+        mask[row - top + margin, col - left + margin] = True
+        row, col = np.nonzero(over_squares(np.minimum, over_squares(np.maximum, mask, side), side))
+        closed.append(layers.flat(layer[0], row + top, col + left))
     return np.concatenate(closed)
 
 

@@ -40,16 +40,22 @@ class RenderScene:
 
 
 def build(
-    mi: Any, scene: Scene, folder: Path, max_depth: int, curves: np.ndarray | None = None
+    mi: Any,
+    scene: Scene,
+    folder: Path,
+    max_depth: int,
+    curves: np.ndarray | None = None,
+    assets: Assets | None = None,
 ) -> RenderScene:
     """Load a scene into Mitsuba, in the variant that is set.
 
-    `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs. Raises
-    `InputError` for a mesh or texture that cannot be used.
+    `curves` (C, N) are the camera's sensitivities (see `spectra`), which a spectral variant needs; `assets`
+    are the files in the folder, if they have been read. Raises `InputError` for a mesh or texture that cannot
+    be used.
     """
     if not is_scalar(mi):
         load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
-    assets = read_assets(scene, folder)
+    assets = assets or read_assets(scene, folder)
     names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
     plugins: dict[str, Any] = {
         "type": "scene",

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from simgen.base.neighbourhoods import over_squares
 from simgen.cameras.rig import Camera
 from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -39,8 +40,6 @@ def _lattice() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _beside_another(object_id: np.ndarray) -> np.ndarray:
-    from scipy.ndimage import maximum_filter, minimum_filter
-
     # No object has the id -1: what stands beyond the frame is another for all we know.
-    most, least = (pick(object_id, 3, mode="constant", cval=-1) for pick in (maximum_filter, minimum_filter))
-    return np.asarray(most != least)
+    framed = np.pad(object_id, 1, constant_values=-1)
+    return over_squares(np.maximum, framed, 3) != over_squares(np.minimum, framed, 3)
