@@ -4,6 +4,7 @@ asset_names     Names of files that a scene brings along, and where these files 
                 folder.
 locations       Where scenes and recipes are found: the working directory, the source tree, the installed
                 package.
+machine_cache   What takes long to find out and does not change on a machine, kept between processes.
 neighbourhoods  Extreme values around each place of a map.
 overrides       Values given as `key=value`, as `--set` has them.
 random_streams  Random streams, keyed by stage of the work: the same for any number of workers and any

@@ -11,8 +11,6 @@ with the libraries.
 
 import contextlib
 import ctypes.util
-import hashlib
-import json
 import os
 import platform
 import re
@@ -20,7 +18,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
@@ -28,7 +26,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.base.errors import InputError
-from pcii.store.safe_files import write_json_safely
+from simgen.base.machine_cache import kept
 from simgen.renderer.installation import check_installed
 
 Kind = Literal["cuda", "llvm", "scalar"]
@@ -218,7 +216,12 @@ def _try_llvm(path: Path) -> Candidate:
 def _try(kind: Kind, library: str, number: str) -> Candidate:
     """Run the probe kernel in a subprocess, or read what it showed before."""
     name = f"{kind.upper()} {number}".strip()
-    works, detail = _cached(_key(kind, library), lambda: _probe(kind, library))
+    works, detail = kept(
+        "backend",
+        _deciding(kind, library),
+        lambda: dict(zip(("works", "detail"), _probe(kind, library), strict=True)),
+        lambda answer: (bool(answer["works"]), str(answer["detail"])),
+    )
     return Candidate(kind, library, number, works, f"{name} {detail}")
 
 
@@ -265,8 +268,8 @@ def _major_version(path: Path) -> int | None:
     return None
 
 
-def _key(kind: Kind, library: str) -> str:
-    """A name for the probe's answer that changes when the libraries or the interpreter do."""
+def _deciding(kind: Kind, library: str) -> list[str]:
+    """What decides on the probe's answer: the libraries and the interpreter."""
     parts = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
     path = Path(library)
     if path.exists():
@@ -276,20 +279,7 @@ def _key(kind: Kind, library: str) -> str:
         driver = Path("/proc/driver/nvidia/version")
         devices = os.environ.get("CUDA_VISIBLE_DEVICES", "all"), *map(str, Path("/dev").glob("nvidia*"))
         parts += [driver.read_text() if driver.exists() else "", *devices]
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
-
-
-def _cached(key: str, probe: Callable[[], tuple[bool, str]]) -> tuple[bool, str]:
-    """The stored answer under `key`, or a new one, stored; without a writable cache just a new one."""
-    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    path = root / "simgen" / f"backend-{key[:32]}.json"
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        answer = json.loads(path.read_text())
-        return bool(answer["works"]), str(answer["detail"])
-    works, detail = probe()
-    with contextlib.suppress(OSError):
-        write_json_safely(path, {"works": works, "detail": detail})
-    return works, detail
+    return parts
 
 
 def describe(*, spectral: bool = False) -> dict[str, Any]:

@@ -112,9 +112,11 @@ def texture_plugin(
     mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool, tiled: bool = False
 ) -> dict[str, Any]:
     """Pixels (H, W, C) as the texture of this shape; `raw` ones are no colours that become spectra."""
-    return {
+    ordered = _in_renderers_order(pixels, shape)
+    # A bitmap is converted, which takes as long as tracing 500 000 paths; only that can become spectra.
+    held = {"data": mi.TensorXf(ordered)} if raw else {"bitmap": _bitmap(mi, ordered)}
+    return held | {
         "type": "bitmap",
-        "bitmap": _bitmap(mi, _in_renderers_order(pixels, shape)),
         "raw": raw,
         "filter_type": "bilinear",
         # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
@@ -131,8 +133,8 @@ def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
 def _in_renderers_order(pixels: np.ndarray, shape: Shape) -> np.ndarray:
     """A texture's pixels (H, W, C) in the order that the renderer takes them for this shape."""
     if isinstance(shape, Card):
-        return np.ascontiguousarray(pixels[::-1])  # a rectangle's v runs up, an image's rows down
-    return pixels
+        pixels = pixels[::-1]  # a rectangle's v runs up, an image's rows down
+    return np.ascontiguousarray(pixels)
 
 
 def aspect_of(shape: Shape) -> float:

@@ -7,12 +7,15 @@ its integral with the CIE luminosity function, divided by that function's integr
 
 import warnings
 from functools import cache
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
+from simgen.base.machine_cache import kept
 from simgen.base.srgb import FROM_XYZ
 from simgen.base.strict_models import suggestion
 
@@ -21,7 +24,9 @@ PEAK_NM = 555.0
 """Where a lumen is 1/683 W."""
 DAYLIGHT = "D65"
 """The white of sRGB."""
-PATCHES = "ColorChecker N Ohta"
+CHART = "ColorChecker N Ohta"
+OBSERVER = "CIE 1931 2 Degree Standard Observer"
+KINDS = OBSERVERS, ILLUMINANTS, PATCHES = "observers", "illuminants", "patches"
 
 
 def integral(values: np.ndarray) -> Any:
@@ -48,10 +53,38 @@ def measured(table: Any, *, outside: float | None = None) -> np.ndarray:
     return np.clip(aligned.values.T, 0, None)
 
 
+@cache
+def _standard() -> dict[str, dict[str, np.ndarray]]:
+    """Spectra at `WAVELENGTH_NM` by kind and name; kept on the machine, since colour takes long to load."""
+    depends_on = version("colour-science"), version("scipy"), Path(__file__).read_text()
+    return kept("spectra", depends_on, _from_colour_science, _as_arrays)
+
+
+def _from_colour_science() -> dict[str, dict[str, Any]]:
+    colour = colour_science()
+    found = {
+        OBSERVERS: {OBSERVER: colour.MSDS_CMFS[OBSERVER]},
+        ILLUMINANTS: {name: one for name, one in colour.SDS_ILLUMINANTS.items() if _covers_wavelengths(one)},
+        # Without the densities that follow the names of the grey ones.
+        PATCHES: {name.split(" (")[0]: one for name, one in colour.SDS_COLOURCHECKERS[CHART].items()},
+    }
+    return {
+        kind: {name: measured(one).tolist() for name, one in tables.items()} for kind, tables in found.items()
+    }
+
+
+def _as_arrays(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
+    """Raises KeyError or ValueError unless all of them are there."""
+    read = {kind: {name: np.array(one) for name, one in found[kind].items()} for kind in KINDS}
+    for tables in read.values():
+        if not tables or any(one.shape[-1] != WAVELENGTH_NM.size for one in tables.values()):
+            raise ValueError("spectra are damaged")
+    return read
+
+
 def illuminant_names() -> list[str]:
     """Names of the illuminants that are known at all wavelengths."""
-    tables = colour_science().SDS_ILLUMINANTS.items()
-    return [name for name, table in tables if _covers_wavelengths(table)]
+    return list(_standard()[ILLUMINANTS])
 
 
 def _covers_wavelengths(table: Any) -> bool:
@@ -59,7 +92,7 @@ def _covers_wavelengths(table: Any) -> bool:
 
 
 def known_illuminant(name: str) -> str:
-    """The name, if there is such an illuminant, else `InputError`; of D65 this is known without colour."""
+    """The name, if there is such an illuminant, else `InputError`; D65 is not even looked up."""
     if name != DAYLIGHT:
         illuminant(name)
     return name
@@ -71,32 +104,31 @@ def illuminant(name: str) -> np.ndarray:
 
     Raises `InputError` for one that is not known, or not at all of the wavelengths.
     """
-    table = colour_science().SDS_ILLUMINANTS
-    if name not in table:
-        raise InputError(f"there is no illuminant {name!r}{suggestion(name, illuminant_names())}")
-    if not _covers_wavelengths(table[name]):
+    power = _standard()[ILLUMINANTS].get(name)
+    if power is None:
+        table = colour_science().SDS_ILLUMINANTS
+        if name not in table:
+            raise InputError(f"there is no illuminant {name!r}{suggestion(name, illuminant_names())}")
         known_nm = table[name].wavelengths
         raise InputError(
             f"illuminant {name!r} is only known from {known_nm[0]:g} to {known_nm[-1]:g} nm, and 380 to "
             "780 nm are needed; use another, such as D55 or A"
         )
-    power = measured(table[name])
     luminosity = observer()[1]
     return power * (integral(luminosity) / integral(power * luminosity))
 
 
 def tint(name: str) -> np.ndarray:
     """Linear sRGB (3,) of a CIE illuminant at luminance 1; channels outside the gamut are cut to 0."""
-    if name == DAYLIGHT:  # also spares the second that colour takes to load
+    if name == DAYLIGHT:
         return np.ones(3)
     rgb = np.clip(FROM_XYZ @ integral(observer() * illuminant(name)), 0, None)
     return rgb / (LUMINANCE @ rgb)
 
 
-@cache
 def observer() -> np.ndarray:
     """Colour matching functions (3, N) of the CIE 1931 2 degree standard observer."""
-    return measured(colour_science().MSDS_CMFS["CIE 1931 2 Degree Standard Observer"])
+    return _standard()[OBSERVERS][OBSERVER]
 
 
 def known_patch(name: str) -> str:
@@ -105,24 +137,17 @@ def known_patch(name: str) -> str:
     return name
 
 
-@cache
 def patch(name: str) -> np.ndarray:
     """Reflectance (N,) of a ColorChecker patch by its name, such as "dark skin" or "neutral 5"."""
-    table = _patches()
-    if name not in table:
-        raise InputError(f"there is no patch {name!r}{suggestion(name, list(table))}")
-    return measured(table[name])
-
-
-@cache
-def _patches() -> dict[str, Any]:
-    """The 24 by name, without the densities that follow the names of the grey ones."""
-    return {name.split(" (")[0]: one for name, one in colour_science().SDS_COLOURCHECKERS[PATCHES].items()}
+    known = _standard()[PATCHES]
+    if name not in known:
+        raise InputError(f"there is no patch {name!r}{suggestion(name, list(known))}")
+    return known[name]
 
 
 def patch_names() -> list[str]:
     """Names of the 24 patches in the chart's order, row by row."""
-    return list(_patches())
+    return list(_standard()[PATCHES])
 
 
 def linear_srgb(reflectance: np.ndarray) -> np.ndarray:

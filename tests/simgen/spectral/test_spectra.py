@@ -11,6 +11,7 @@ import pytest
 from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.scene import Scene
+from simgen.spectral import spectra
 from simgen.spectral.camera_curves import sensitivity
 from simgen.spectral.filters import CELLS, Filters, filters_for
 from simgen.spectral.spectra import (
@@ -19,6 +20,7 @@ from simgen.spectral.spectra import (
     illuminant,
     integral,
     linear_srgb,
+    measured,
     observer,
     patch,
     patch_names,
@@ -49,6 +51,22 @@ def test_grey_patches_are_grey_and_red_is_red() -> None:
     assert patch_names()[0] == "dark skin"
     # A surface that reflects everything is white.
     np.testing.assert_allclose(linear_srgb(np.ones(WAVELENGTH_NM.size)), 1, rtol=1e-12)
+
+
+def test_spectra_are_kept_between_processes_to_the_bit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(spectra, "_standard", spectra._standard.__wrapped__)  # no cache in this process
+    direct = measured(colour_science().SDS_COLOURCHECKERS["ColorChecker N Ohta"]["cyan"])
+    np.testing.assert_array_equal(patch("cyan"), direct)
+    (file,) = (tmp_path / "simgen").iterdir()
+    with monkeypatch.context() as without_colour:
+        without_colour.setattr(spectra, "colour_science", None)
+        np.testing.assert_array_equal(patch("cyan"), direct)
+    for damage in ("", "{}", '{"observers": {}, "illuminants": {}, "patches": {}}'):
+        file.write_text(damage)
+        np.testing.assert_array_equal(patch("cyan"), direct)
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
@@ -178,8 +196,9 @@ def test_names_that_do_not_exist_are_told_with_their_place_in_the_scene() -> Non
 
 
 @pytest.mark.renders
-@pytest.mark.parametrize(("reflectance", "loads"), [([0.2, 0.3, 0.4], False), ("dark skin", True)])
-def test_colour_science_is_loaded_only_for_scenes_that_need_it(reflectance: object, loads: bool) -> None:
+@pytest.mark.parametrize("reflectance", [[0.2, 0.3, 0.4], "dark skin"])
+def test_colour_science_is_not_loaded_for_spectra_that_are_kept(reflectance: object) -> None:
+    patch("dark skin")  # keeps them
     script = f"""
 import sys
 import pathlib
@@ -190,7 +209,7 @@ mitsuba_scene.build(backend.load(), world, pathlib.Path(), 2)
 print("colour" in sys.modules)
 """
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.split()[-1] == str(loads)
+    assert done.stdout.split()[-1] == "False"
 
 
 def test_unknown_names_get_a_suggestion() -> None:
