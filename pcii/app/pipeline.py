@@ -82,9 +82,9 @@ def analyse(
     full_light: Sections | None = None
     # Full light and depth need nothing of the other steps, and mostly leave the interpreter to them.
     with ThreadPoolExecutor(2, "beside") as beside:
-        lit = beside.submit(timed, partial(full_light_sections, dataset, planes, report))
+        summed = beside.submit(timed, partial(full_light_sections, dataset, planes, report))
         if counts is None:
-            full_light = finished(FULL_LIGHT_STEP, lit.result())
+            full_light = finished(FULL_LIGHT_STEP, summed.result())
             assert full_light is not None
             sections = finished("sections", (full_light, 0.0))
         else:
@@ -98,7 +98,7 @@ def analyse(
             remove = partial(remove_by, counts, sections)
             focus.append(finished(removal_step(method), steps.removal(method, sections, remove)))
         if counts is not None:
-            full_light = finished(FULL_LIGHT_STEP, lit.result())
+            full_light = finished(FULL_LIGHT_STEP, summed.result())
         depth = finished(DEPTH_STEP, mapped.result())
     scored = partial(score, focus, depth, dataset.truth, grid=dataset.grid, full_light=full_light)
     result = finished("score", timed(lambda: scored(dataset=dataset.name)))

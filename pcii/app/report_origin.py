@@ -73,7 +73,7 @@ def _of_analysis(outcome: Outcome, smoothing_px: float | None) -> list[tuple[str
     methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))
     versions = {name: text for method in methods for name, text in software_of(method).items()}
     now = datetime.now(UTC)
-    beside = "; steps run side by side" if outcome.focus else ""
+    beside = "; steps ran side by side" if outcome.focus else ""
     return [
         ("command", _command(outcome, smoothing_px)),
         ("date", f"{now:%Y-%m-%d %H:%M} UTC"),

@@ -16,12 +16,13 @@ from pcii.app.report_figures import Crop, Shown, block_estimate, smoothing_words
 from pcii.base.progress import Report
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
-from pcii.core.images import Views, window_of
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import encoded
 from pcii.imaging.blocks import evenly_chosen
+from pcii.sections.film_parts import views_around
 from pcii.sections.reconstruction import reconstruct
 
 MOST_PLANES = 20
@@ -79,9 +80,12 @@ def slider(shown: Shown, report: Report) -> dict[str, Any]:
     for number, (label, source) in enumerate(sources):
         ways = dict.fromkeys((shown.smoothing_px, 0.0) if isinstance(source, PhotonCounts) else (0.0,))
         seen: dict[float, list[tuple[np.ndarray, np.ndarray]]] = {way: [] for way in ways}
-        around, inside = (source, crop) if isinstance(source, PhotonCounts) else _around(source, crop, planes)
+        part, part_planes, inside = source, planes, crop
+        if isinstance(source, Views):
+            part, part_planes, sides = views_around(source, planes, crop.rows, crop.cols)
+            inside = Crop(*sides, crop.step_px)
         own_blocks = replace(inside, step_px=blocks.step_px)
-        for done, (sections, plane) in enumerate(_each(around, planes), start=1):
+        for done, (sections, plane) in enumerate(_each(part, part_planes), start=1):
             for way, estimates in seen.items():
                 estimates.append(block_estimate(sections, plane, inside, way))
             if number == 0:
@@ -108,27 +112,10 @@ def slider(shown: Shown, report: Report) -> dict[str, Any]:
     }
 
 
-def _around(views: Views, crop: Crop, planes: FocalPlanes) -> tuple[Views, Crop]:
-    """The part of the views that sections of the crop are made of, and where the crop is in it."""
-
-    def with_margin(side: slice, shifts_px: np.ndarray, size: int) -> slice:
-        reach_px = int(np.abs(shifts_px).max())
-        # From an even pixel on, so that a mosaic keeps its pattern.
-        return slice(max(side.start - reach_px, 0) // 2 * 2, min(side.stop + reach_px, size))
-
-    sides, shape = (crop.rows, crop.cols), views.grid.shape_HW
-    rows, cols = map(with_margin, sides, planes.whole_shifts_px, shape)
-    inside = (
-        slice(s.start - part.start, s.stop - part.start) for s, part in zip(sides, (rows, cols), strict=True)
-    )
-    return window_of(views, rows, cols), Crop(*inside, step_px=crop.step_px)
-
-
 def _each(source: PhotonCounts | Views, planes: FocalPlanes) -> Iterator[tuple[Sections, int]]:
-    at_once = max(1, MOST_VOXELS // (source.grid.height * source.grid.width * source.channel_count))
+    at_once = max(1, MOST_VOXELS // (planes.grid.height * planes.grid.width * source.channel_count))
     for first in range(0, len(planes), at_once):
-        some = planes.take(slice(first, first + at_once))
-        sections = reconstruct(source, replace(some, grid=source.grid))
+        sections = reconstruct(source, planes.take(slice(first, first + at_once)))
         for plane in range(len(sections.planes)):
             yield sections, plane
 

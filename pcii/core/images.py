@@ -128,34 +128,6 @@ class _Scaled:
         return np.asarray(self.radiance[index], dtype=np.float64) / self.scale
 
 
-@dataclass(frozen=True)
-class _Window:
-    """Rows and columns of every view of some radiance, one view at a time."""
-
-    radiance: ArrayLike5D
-    rows: slice
-    cols: slice
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        K, L, *_, C = self.radiance.shape
-        return K, L, self.rows.stop - self.rows.start, self.cols.stop - self.cols.start, C
-
-    @property
-    def dtype(self) -> np.dtype | None:
-        return getattr(self.radiance, "dtype", None)
-
-    def __getitem__(self, index: Any, /) -> np.ndarray:
-        return np.asarray(self.radiance[index])[self.rows, self.cols]
-
-
-def window_of(views: Views, rows: slice, cols: slice) -> Views:
-    """These rows and columns of the film of every view; of a mosaic, both begin at an even pixel."""
-    window = _Window(views.radiance, rows, cols)
-    height, width = window.shape[2:4]
-    return replace(views, radiance=window, grid=replace(views.grid, height=height, width=width))
-
-
 def in_binary_unit(views: Views) -> Views:
     """The same views in the unit `binary_scale`, in double precision where that is not 1."""
     scale = binary_scale(views)

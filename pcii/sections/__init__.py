@@ -6,6 +6,7 @@ demosaicing        Demosaicing of Bayer images: the gradient-based interpolation
 dense_kernels      Compiled loops that add up whole images, with their variances.
 dense_sections     Sections of dense images: whole rows of every view added to whole rows of the section.
 event_kernels      Compiled loops over photons: sections, and samples of windows.
+film_parts         Parts of the film: what of every view a part of the sections is made of.
 image_moves        Whole-pixel moves of whole images: by how much each view moves, with what weight, in
                    what order.
 photon_statistics  Statistics of photon counts: pooled samples, entropy, and the variance of Poisson

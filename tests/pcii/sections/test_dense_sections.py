@@ -1,5 +1,7 @@
 """Sections of dense views: sums and variances of the samples at each voxel, whatever the shifts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,9 +11,11 @@ from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import mosaic
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic
+from pcii.sections.film_parts import views_around
 from pcii.sections.reconstruction import reconstruct
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
@@ -50,6 +54,28 @@ def test_sums_and_variances_are_those_of_the_samples(
     without = reconstruct(Views(images, grid, cfa), z)
     np.testing.assert_array_equal(without.counts, sections.counts)
     assert without.variance is None
+
+
+@given(
+    cameras=st.tuples(st.integers(1, 4), st.integers(1, 4)),
+    film=st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    shear=st.tuples(st.floats(-2, 2), st.floats(-2, 2)),
+    z=st.lists(st.floats(0.3, 8), min_size=1, max_size=3),
+    cfa=patterns,
+    seed=st.integers(0, 999),
+)
+@at_least(100)
+def test_a_part_of_the_sections_is_made_of_a_part_of_the_views(cameras, film, shear, z, cfa, seed) -> None:
+    grid = replace(unit_grid(*cameras, *film, (1.0, 1.0)), shear_px=shear)
+    rng = np.random.default_rng(seed)
+    views = Views(rng.random((*grid.shape_KLHW, 1 if cfa else 3)), grid, cfa)
+    rows, cols = (slice(*sorted(rng.choice(size + 1, 2, replace=False).tolist())) for size in film)
+    part, planes, inside = views_around(views, FocalPlanes.at_depths(grid, z), rows, cols)
+    whole, ours = reconstruct(views, z), reconstruct(part, planes)
+    for name in ("counts", "coverage"):
+        expected = getattr(whole, name)[:, rows, cols]
+        # The order of the sums is another, for views that are in memory.
+        np.testing.assert_allclose(getattr(ours, name)[:, *inside], expected, rtol=1e-12)
 
 
 def test_more_views_than_are_held_at_a_time() -> None:
