@@ -11,7 +11,7 @@ from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.scene import Scene
 from simgen.spectral.camera_curves import sensitivity
-from simgen.spectral.spectra import PATCHES, colour_science, patch_names
+from simgen.spectral.spectra import CHART, colour_science, patch_names
 
 ACROSS, DOWN, SIDE_PX, BORDER_PX = 6, 4, 16, 2
 WHITE = 18
@@ -79,7 +79,7 @@ def integrated(lamp: str, camera: str | None) -> np.ndarray:
         sensitivities = colour.MSDS_CAMERA_SENSITIVITIES[camera].copy()
         curves = sensitivities.align(shape, extrapolator_kwargs=nothing)
     light = colour.SDS_ILLUMINANTS[lamp].copy().align(shape)
-    patches = [one.copy().align(shape) for one in colour.SDS_COLOURCHECKERS[PATCHES].values()]
+    patches = [one.copy().align(shape) for one in colour.SDS_COLOURCHECKERS[CHART].values()]
     seen = [colour.sd_to_XYZ(one, cmfs=curves, illuminant=light, method="Integration") for one in patches]
     return np.array(seen) / 100
 
