@@ -58,7 +58,7 @@ stress: llvm
 
 bench-setup: llvm
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[bench,cluster]'
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check '.[denoiser]' \
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[denoiser]' \
 	  || echo "the denoiser could not be installed; its rows are left out"
 
 bench: bench-setup

@@ -52,6 +52,7 @@ ROOMS = {
         "photons",
         "dataset",
         "collection",
+        "benchmark",
         "check",
         "figures",
         "app",
@@ -76,6 +77,8 @@ LONGER = {
 }
 # Where a whole recipe is known, beside the commands: everything else takes parts of it.
 KNOW_RECIPE = {
+    "simgen.benchmark.benchmark_datasets",
+    "simgen.collection.series",
     "simgen.check.targets",
     "simgen.dataset.generation",
     "simgen.dataset.prepared",

@@ -2,6 +2,7 @@
 
 authoring_commands   Commands that write scenes and recipes: to start from, one draw of many, from another
                      program's file.
+benchmark_commands   The command `simgen benchmark`.
 commands             The `simgen` command.
 distribution_schema  The JSON Schema of scene files: that of one scene, and a distribution wherever a
                      value may be drawn.

@@ -11,6 +11,7 @@ from pcii.base.command_output import answer, answer_json, complain, results_fold
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, import_scene, new_recipe, new_scene
+from simgen.app.benchmark_commands import benchmark
 from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
 
 app = command_line.command_app(
@@ -20,7 +21,18 @@ app = command_line.command_app(
 MOST_TOLD = 5
 """Faults of datasets that a collection's last lines tell."""
 
-for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, draw, import_scene):
+for command in (
+    scenes,
+    recipes,
+    schema,
+    check,
+    preview,
+    new_scene,
+    new_recipe,
+    draw,
+    import_scene,
+    benchmark,
+):
     app.command(command)
 
 
@@ -232,4 +244,4 @@ def verify(dataset: Path, *, json: Json = False) -> None:
 
 def main() -> int:
     """Entry point of the `simgen` command."""
-    return command_line.run(app, resuming=("generate",))
+    return command_line.run(app, resuming=("generate", "benchmark"))

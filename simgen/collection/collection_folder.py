@@ -20,14 +20,14 @@ from pcii.io.collection_layout import (
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from pcii.store.safe_files import locked, temporaries_of
+from simgen.collection.series import Series
 from simgen.dataset.software import decisive_versions, other_versions
-from simgen.spec.sweeps import Sweep
 
 Row = Mapping[str, Any]
 
 
-def begin(sweep: Sweep, out: Path) -> None:
-    """Make the folder of a sweep's collection, or see that it is one of the same recipe.
+def begin(series: Series, out: Path) -> None:
+    """Make the folder of a collection, or see that it is one of the same recipe.
 
     Other values of the swept fields may be there already; a collection that ended without any dataset gives
     way to another. `InputError` for a file, a dataset, the
@@ -36,8 +36,8 @@ def begin(sweep: Sweep, out: Path) -> None:
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
     document = {
-        "fields": [axis.field for axis in sweep.axes],
-        "recipe": {name: value for name, value in sweep.base.items() if name != "publication"},
+        "fields": list(series.fields),
+        "recipe": {name: value for name, value in series.base.items() if name != "publication"},
         "versions": decisive_versions(),
     }
     COLLECTION_FOLDER.guard(out)
@@ -66,23 +66,23 @@ def _is_free(out: Path) -> bool:
     return (out / INDEX).is_file() and not any(entry.is_dir() for entry in os.scandir(out))
 
 
-def row_of(sweep: Sweep, number: int, out: Path, manifest: Mapping[str, Any]) -> Row:
+def row_of(series: Series, number: int, out: Path, manifest: Mapping[str, Any]) -> Row:
     """The index's row of a finished dataset."""
-    name = sweep.folder(number)
-    return index_row(name, sweep.values(number), manifest, out / name / MANIFEST)
+    name = series.folder(number)
+    return index_row(name, series.values(number), manifest, out / name / MANIFEST)
 
 
-def write_whole_index(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> None:
-    """Write the index of all finished datasets in the folder: these of the sweep by number, and others.
+def write_whole_index(series: Series, out: Path, rows: Mapping[int, Row]) -> None:
+    """Write the index of all finished datasets in the folder: these of the series by number, and others.
 
     Others are those that the index listed before, and those that other processes have finished. Nothing is
     written where that is there already, so that a folder that is read-only will do.
     """
-    if temporaries_of(out, INDEX, COLLECTION) or not _is_listed(out, _finished_rows(sweep, out, rows)):
+    if temporaries_of(out, INDEX, COLLECTION) or not _is_listed(out, _finished_rows(series, out, rows)):
         with locked(out / COLLECTION, wait=True):
             for left in temporaries_of(out, INDEX, COLLECTION):
                 left.unlink()
-            write_index(out, _finished_rows(sweep, out, rows))
+            write_index(out, _finished_rows(series, out, rows))
 
 
 def _is_listed(out: Path, rows: Sequence[Row]) -> bool:
@@ -90,15 +90,15 @@ def _is_listed(out: Path, rows: Sequence[Row]) -> bool:
     return (out / INDEX).is_file() and (out / INDEX).read_bytes() == index_bytes(rows)
 
 
-def _finished_rows(sweep: Sweep, out: Path, rows: Mapping[int, Row]) -> list[Row]:
+def _finished_rows(series: Series, out: Path, rows: Mapping[int, Row]) -> list[Row]:
     listed = {row["path"]: row for row in _known(out)}
     present = {entry.name for entry in os.scandir(out) if entry.is_dir()}
     found: dict[str, Row] = {}
-    for number in range(len(sweep)):
-        name = sweep.folder(number)
+    for number in range(len(series)):
+        name = series.folder(number)
         row = rows.get(number) or listed.get(name)
         if row is None and name in present and _is_finished(out / name):
-            row = row_of(sweep, number, out, read_written_manifest(out / name))
+            row = row_of(series, number, out, read_written_manifest(out / name))
         if row is not None:
             found[name] = row
     others = {name: row for name, row in listed.items() if name not in found and name in present}

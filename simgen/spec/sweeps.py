@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
@@ -66,6 +65,11 @@ class Sweep:
     source: str
     recipe_folder: Path
 
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """The swept fields, dotted."""
+        return tuple(axis.field for axis in self.axes)
+
     def __len__(self) -> int:
         return math.prod(len(axis.values) for axis in self.axes)
 
@@ -96,7 +100,7 @@ class Sweep:
             _put(plain, field, value)
         return plain
 
-    @cached_property
+    @property
     def base(self) -> dict[str, Any]:
         """What all datasets have in common: the recipe with all defaults, None for the swept values."""
         resolved = self.recipe(0).model_dump(mode="json")

@@ -1,0 +1,84 @@
+"""Making a benchmark: all of its datasets as one collection, and the certificate of what they are."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
+from pcii.base.progress import Report, silent
+from pcii.io.collection_layout import read_index
+from pcii.store.hashes import hash_json
+from pcii.store.safe_files import write_json_safely
+from simgen.base.strict_models import suggestion
+from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
+from simgen.benchmark.certificate import Content, Verdict, compare, contents_of
+from simgen.benchmark.definition import Definition, Half
+from simgen.collection.whole_collection import generate_collection
+from simgen.dataset.software import versions
+from simgen.renderer import backend
+
+CERTIFICATE = "certificate.json"
+
+
+def scenes_of(definition: Definition, half: Half | None, names: tuple[str, ...]) -> tuple[str, ...]:
+    """The scenes of one half, and of these names if any are given; `InputError` for one that is not there."""
+    known = [scene.name for scene in definition.scene]
+    for name in names:
+        if name not in known:
+            raise InputError(f"scene: {definition.name} has no {name!r}{suggestion(name, known)}")
+    of_half = [scene.name for scene in definition.scene if half in (None, scene.half)]
+    chosen = tuple(name for name in of_half if not names or name in names)
+    if not chosen:
+        raise InputError(f"scene: none of these scenes is in the {half} half")
+    return chosen
+
+
+def make_benchmark(
+    definition: Definition,
+    file: Path,
+    out: Path,
+    *,
+    half: Half | None = None,
+    names: tuple[str, ...] = (),
+    executor: Executor = ALONE,
+    report: Report = silent,
+) -> list[str]:
+    """Make the datasets of a benchmark in the folder `out`, or go on with them; faults of those that failed.
+
+    `file` is that of the definition; `half` and `names` choose scenes, and others may follow in the same
+    folder. Raises `InputError` as `generate_collection` does.
+    """
+    datasets = BenchmarkDatasets(definition, file.parent.parent, scenes_of(definition, half, names))
+    return generate_collection(datasets, out, executor, report)
+
+
+def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
+    """Compare all datasets in `out` with the published ones, and write the certificate there."""
+    own: dict[str, Content] = {}
+    total = len(read_index(out))
+    for name, content in contents_of(out):
+        own[name] = content
+        report("certificate", len(own), total)
+    published = published_contents(file)
+    verdict = compare(own, published)
+    document = {
+        "benchmark": definition.name,
+        "definition_sha256": hash_json(definition.model_dump(mode="json")),
+        "verdict": verdict.sentence(),
+        "backend": backend.describe(),
+        "versions": versions(),
+        **asdict(verdict),
+        "datasets": own,
+    }
+    write_json_safely(out / CERTIFICATE, document)
+    return verdict
+
+
+def published_contents(file: Path) -> dict[str, Any]:
+    """Contents of the published datasets by name, from the file beside that of the definition."""
+    published = file.with_suffix(f".{CERTIFICATE}")
+    if not published.is_file():
+        return {}
+    return json.loads(published.read_text())["datasets"]

@@ -1,0 +1,152 @@
+"""A benchmark of two small scenes: made, resumed, certified, and compared with other datasets."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tomli_w
+
+import pcii
+from pcii.base.errors import InputError
+from pcii.base.executor import Executor
+from pcii.io.verification import verify
+from simgen.app.commands import app
+from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
+from simgen.benchmark.certificate import compare
+from simgen.benchmark.definition import Definition, benchmark_files, load_definition
+from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
+
+pytestmark = pytest.mark.renders
+SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
+SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
+DEFINITION: dict[str, Any] = {
+    "name": "small",
+    "title": "two scenes",
+    "photons_per_view": [30, 400],
+    "brighter_photons_per_view": [3000],
+    "seeds": [1, 2, 3],
+    "frames": 8,
+    "set": [*(f"{name}={value}" for name, value in SMALL.items()), "render.samples_per_pixel=1"],
+    "scene": [
+        SCENE | {"name": "pair", "frames": True},
+        SCENE | {"name": "wall", "kind": "nothing", "half": "test", "recipe": "blank"},
+    ],
+}
+
+
+def written(folder: Path, **changes: Any) -> tuple[Definition, Path]:
+    file = folder / "benchmarks" / "small.toml"
+    file.parent.mkdir(exist_ok=True, parents=True)
+    file.write_text(tomli_w.dumps(DEFINITION | changes))
+    return load_definition(str(file))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Definition, Path, Path]:
+    """A definition, its file, and the benchmark, which is published as it is."""
+    folder = tmp_path_factory.mktemp("benchmark")
+    definition, file = written(folder)
+    assert make_benchmark(definition, file, folder / "made") == []
+    assert certify(definition, file, folder / "made").problems  # nothing is published yet
+    (folder / "made" / CERTIFICATE).rename(file.with_suffix(f".{CERTIFICATE}"))
+    return definition, file, folder / "made"
+
+
+def contents(file: Path) -> dict[str, Mapping[str, Any]]:
+    return json.loads(file.with_suffix(f".{CERTIFICATE}").read_text())["datasets"]
+
+
+def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definition, Path, Path]) -> None:
+    collection = pcii.open_collection(made[2])
+    assert [row["path"] for row in collection.rows] == [
+        "pair_photons_1",
+        "pair_photons_2",
+        "pair_photons_3",
+        "pair_frames_1",
+        "pair_full-light",
+        "wall_photons_1",
+        "wall_photons_2",
+        "wall_photons_3",
+        "wall_full-light",
+    ]
+    assert len(collection.where(half="test")) == 4
+    photons, frames, bright = collection[0], collection[3], collection[4]
+    assert photons.budgets == (30, 400, 3000)
+    assert collection[1].budgets == (30, 400)
+    assert frames.counts.readout.frames == 8
+    assert frames.counts.readout.bits == 1
+    assert bright.views is not None
+    assert not bright.has_counts
+    verify(made[2])
+
+
+def test_two_processes_give_the_published_bytes(made: tuple[Definition, Path, Path], tmp_path: Path) -> None:
+    definition, file, _ = made
+    for half in ("test", "development"):  # in two steps, into one folder
+        make_benchmark(definition, file, tmp_path / "again", half=half, executor=Executor(workers=2))
+    verdict = certify(definition, file, tmp_path / "again")
+    assert (verdict.compared, verdict.same_bytes, verdict.problems) == (9, 9, ())
+    assert json.loads((tmp_path / "again" / CERTIFICATE).read_text())["verdict"] == verdict.sentence()
+
+
+def test_other_draws_of_the_same_light_are_told_from_other_light(made: tuple[Definition, Path, Path]) -> None:
+    published = contents(made[1])
+    first, second = published["pair_photons_2"], published["pair_photons_3"]
+    verdict = compare({"x": first}, {"x": second})
+    assert (verdict.same_bytes, verdict.problems) == (0, ())
+    assert verdict.least_p > 1e-3
+    assert "draws of the same light" in verdict.sentence()
+    (problem,) = compare({"x": published["wall_photons_2"]}, {"x": first}).problems
+    assert problem.startswith("x: its photons lie elsewhere")
+    bright = published["pair_full-light"]
+    brighter = dict(bright) | {"sha256": "", "light": (1.02 * np.array(bright["light"])).tolist()}
+    (problem,) = compare({"x": brighter}, {"x": bright}).problems
+    assert problem.startswith("x: its views have other light")
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"seeds": []}, "seeds: expected at least one, each once"),
+        ({"photons_per_view": [300, 30]}, "photons_per_view: expected growing numbers"),
+        ({"brighter_photons_per_view": [20]}, "and larger ones of brighter light"),
+        ({"scene": [SCENE | {"name": "a"}, SCENE | {"name": "a"}]}, "'a' is there twice"),
+        ({"scene": [SCENE | {"name": "a", "kind": "odd"}]}, r"scene\[0\]\.kind"),
+        ({"scene": [SCENE | {"name": "A B"}]}, r"scene\[0\]\.name"),
+    ],
+)
+def test_bad_definitions_are_refused(changes: dict[str, Any], says: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=says):
+        written(tmp_path, **changes)
+
+
+def test_scenes_that_are_not_there_are_named(
+    made: tuple[Definition, Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from pcii.base import command_line
+
+    arguments = ["benchmark", "make", str(made[1]), "-o", str(tmp_path / "x"), "--scene", "pear"]
+    assert command_line.run(app, arguments) == 2
+    assert "small has no 'pear'; did you mean 'pair'?" in capsys.readouterr().err
+    assert command_line.run(app, [*arguments[:-1], "pair", "--half", "test"]) == 2
+    assert "none of these scenes is in the test half" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()
+
+
+def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves() -> None:
+    definition, file = load_definition("pcii-bench-1")
+    assert file == benchmark_files()["pcii-bench-1"]
+    halves = [scene.half for scene in definition.scene]
+    assert len(halves) == 24
+    assert halves.count("test") == 12
+    assert len({scene.kind for scene in definition.scene}) == 7
+    assert sum(scene.frames for scene in definition.scene) == 4
+    datasets = BenchmarkDatasets(definition, file.parent.parent)
+    assert len(datasets) == 24 * 4 + 4
+    for number in range(len(datasets)):
+        recipe = datasets.recipe(number)
+        assert recipe.photons.budget == (100_000 if recipe.seed == 1 else 10_000)
+        assert recipe.grid.height == recipe.grid.width == 1024
