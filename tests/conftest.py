@@ -43,3 +43,18 @@ def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("data") / "nested"
     generate(Recipe.model_validate(recipe), Path(), out)
     return out
+
+
+@pytest.fixture(scope="session")
+def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """That of `small_benchmark`: two scenes of 2 x 2 views, with the certificate that publishes it."""
+    from small_benchmark import written
+
+    from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
+
+    folder = tmp_path_factory.mktemp("benchmark")
+    definition, file = written(folder)
+    assert make_benchmark(definition, file, folder / "made") == []
+    assert certify(definition, file, folder / "made").problems  # nothing is published yet
+    (folder / "made" / CERTIFICATE).rename(file.with_suffix(f".{CERTIFICATE}"))
+    return folder / "made"

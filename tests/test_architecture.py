@@ -34,6 +34,7 @@ ROOMS = {
         "baselines",
         "metrics",
         "evaluation",
+        "benchmark",
         "app",
     ],
     "simgen": [

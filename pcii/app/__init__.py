@@ -1,10 +1,9 @@
 """The `pcii` command: order of the analysis, folder of results, report.
 
+benchmark_commands  The command `pcii benchmark`.
 command_options  Options that several commands take: folder of results, depths, a smaller photon budget.
 commands         The `pcii` command.
-import_commands  The command `pcii import`: images made by others become a dataset.
-import_options   Options of `pcii import`: of views and their order, cameras, lens arrays, light, and the
-                 dataset.
+import_commands  The command `pcii import`: images made by others become a dataset; and its options.
 long_steps       The long steps of an analysis; what an earlier run did is kept if nothing that it follows
                  from has changed.
 pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from pcii.app.benchmark_commands import benchmark
 from pcii.app.command_options import Budget, Depths, Json, Out, opened
 from pcii.app.import_commands import import_dataset
 from pcii.app.results import Results
@@ -20,7 +21,7 @@ app = command_line.command_app(
 )
 
 app.command(import_dataset, name="import")
-for command in (reconstruct, depth, segment):
+for command in (reconstruct, depth, segment, benchmark):
     app.command(command)
 
 
@@ -226,4 +227,4 @@ def verify(folder: Path, *, json: Json = False) -> None:
 
 def main() -> int:
     """Entry point of the `pcii` command."""
-    return command_line.run(app, resuming=("run", "evaluate"))
+    return command_line.run(app, resuming=("run", "evaluate", "benchmark"))

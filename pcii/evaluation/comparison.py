@@ -12,6 +12,7 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
+from pcii.core.estimates import DepthMap, Segmented
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -84,9 +85,23 @@ def evaluate(
     if executor != ALONE:
         _check_sendable(named)
     tasks = tasks_of([open_dataset(path) for path in find_datasets(datasets)], named, budgets, z_mm)
-    claim_rows(folder)
-    with all_rows(folder) as rows:
+    again = measure(EvaluationJob(tasks, folder.resolve()), executor, report)
+    with all_rows(folder) as rows, named_in_errors(folder):
+        result = summarise(rows) | {"again": again}
+        write_evaluation(folder, result)
+    return result
+
+
+def measure(job: "EvaluationJob", executor: Executor, report: Report) -> list[dict[str, Any]]:
+    """Add the rows of a job's tasks to those in its folder, but for those that are there and still count.
+
+    Returns which had to be made again, and why. Raises `InputError` for what `claim_rows` refuses, and for a
+    task that fails.
+    """
+    claim_rows(job.out)
+    with all_rows(job.out) as rows:
         made_by = {key_of(row): row.get("software") for row in rows}
+    tasks = job.tasks
     software = {task.method: _software(task) for task in {task.method: task for task in tasks}.values()}
     remaining = [task for task in tasks if task.function or made_by.get(task.key) != software[task.method]]
     if len(remaining) < len(tasks):
@@ -95,16 +110,13 @@ def evaluate(
     again = _again(remaining, made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
-    job = EvaluationJob(remaining, folder.resolve())
+    job.tasks = remaining
     with closing(executor.run(job, range(len(remaining)), report)) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)
             report("scores", finished, len(remaining))
-    with all_rows(folder) as rows, named_in_errors(folder):
-        result = summarise(rows) | {"again": again}
-        write_evaluation(folder, result)
-    return result
+    return again
 
 
 def _software(task: Task) -> dict[str, str] | None:
@@ -196,8 +208,8 @@ class EvaluationJob:
 
         compiled_loops.use_threads(count)
 
-    def _measured(self, task: Task) -> Row:
-        """The row of a task; the first call of a method at a budget is a warm-up, the second is timed."""
+    def estimated(self, task: Task) -> tuple[float | None, Segmented | DepthMap]:
+        """Seconds and result of a task; the first call of a method at a budget is a warm-up."""
         data, estimator = task.data, estimator_of(task.method)
         seen = data.counts_or_views
 
@@ -211,20 +223,26 @@ class EvaluationJob:
         if (task.budget, task.method) not in self.warm:
             work()
             self.warm.add((task.budget, task.method))
+        return timed(work)
+
+    def _measured(self, task: Task) -> Row:
+        """The row of a task."""
         if task.method not in self.software:  # that of this process, which may be on another machine
             self.software[task.method] = _software(task)
-        seconds, estimate = timed(work)
+        seconds, estimate = self.estimated(task)
+        data = task.data
+        seen = data.counts_or_views
         photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
         row = described(data, task.z_mm) | {
             "budget": task.budget,
             "photons_per_view": photons,
             "method": task.method,
-            "seconds": round(seconds, 6),
+            "seconds": None if seconds is None else round(seconds, 6),
             "software": self.software[task.method],
             "date": f"{datetime.now(UTC):%Y-%m-%d}",
             "machine": machine(),
         }
-        if estimator is not None:
+        if isinstance(estimate, DepthMap):
             depth = dict(score(None, estimate, data.truth, grid=data.grid).depth)
             return row | {"depth": depth} | self._bounds(data, seen, task.z_mm)
         result = score(estimate, None, data.truth)

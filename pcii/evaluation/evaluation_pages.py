@@ -21,10 +21,10 @@ from pcii.store.hashes import hash_file
 from pcii.store.safe_files import sweep_temporaries, write_bytes_safely
 
 
-def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
+def write_evaluation(out: Path, evaluation: Mapping[str, Any], others: Sequence[str] = ()) -> None:
     """Write the result of `summarise` as evaluation.md and evaluation.html, and last as evaluation.json.
 
-    The caller keeps others from adding rows meanwhile.
+    That lists the files `others` too. The caller keeps others from adding rows meanwhile.
     """
     sweep_temporaries(out)
     made = _made(evaluation, hash_file(out / ROWS))
@@ -34,7 +34,7 @@ def write_evaluation(out: Path, evaluation: Mapping[str, Any]) -> None:
     }
     for name, content in pages.items():
         write_bytes_safely(out / name, content)
-    seal_evaluation(out, evaluation, list(pages))
+    seal_evaluation(out, evaluation, [*pages, *others])
 
 
 def _methods(evaluation: Mapping[str, Any], part: str) -> list[str]:

@@ -41,9 +41,10 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
         rows = [row for row in group["results"] if row["method"] == method and row[part].get(measure)]
         style = _style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
         lit = [row for row in rows if row["photons_per_view"] is not None]
+        timed = [row for row in rows if row["seconds"] is not None]
         for axes, own, places in (
             (by_photons, lit, [row["photons_per_view"] for row in lit]),
-            (by_seconds, rows, [row["seconds"]["mean"] for row in rows]),
+            (by_seconds, timed, [row["seconds"]["mean"] for row in timed]),
         ):
             if own:
                 means = [row[part][measure] for row in own]

@@ -124,12 +124,13 @@ def _group(recipe: str, rows: Sequence[Row]) -> dict[str, Any]:
 
 def _result(budget: Budget, method: str, rows: Sequence[Row]) -> dict[str, Any]:
     photons = [row["photons_per_view"] for row in rows if row["photons_per_view"] is not None]
+    seconds = [row["seconds"] for row in rows if row["seconds"] is not None]  # of maps nobody knows
     result: dict[str, Any] = {
         "budget": budget,
         "method": method,
         "seeds": len(rows),
         "photons_per_view": sum(photons) / len(photons) if photons else None,
-        "seconds": positive_mean_interval([row["seconds"] for row in rows]).figures(),
+        "seconds": positive_mean_interval(seconds).figures() if seconds else None,
     }
     if "depth" in rows[0]:
         return result | {"depth": _means([row["depth"] for row in rows])} | _bounds(rows)

@@ -68,7 +68,7 @@ class BenchmarkDatasets:
         settings = [
             *self.definition.set,
             *scene.set,
-            f"title={scene.name}",
+            f"title={scene.name}{', binary frames' * (light == 'frames')}",
             f"seed={seed}",
             "photons.scope=view",
             f"photons.budget={most}",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomli_w
+from small_benchmark import SCENE, written
 
 import pcii
 from pcii.base.errors import InputError
@@ -20,39 +20,12 @@ from simgen.benchmark.definition import Definition, benchmark_files, load_defini
 from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
 
 pytestmark = pytest.mark.renders
-SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
-SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
-DEFINITION: dict[str, Any] = {
-    "name": "small",
-    "title": "two scenes",
-    "photons_per_view": [30, 400],
-    "brighter_photons_per_view": [3000],
-    "seeds": [1, 2, 3],
-    "frames": 8,
-    "set": [*(f"{name}={value}" for name, value in SMALL.items()), "render.samples_per_pixel=1"],
-    "scene": [
-        SCENE | {"name": "pair", "frames": True},
-        SCENE | {"name": "wall", "kind": "nothing", "half": "test", "recipe": "blank"},
-    ],
-}
 
 
-def written(folder: Path, **changes: Any) -> tuple[Definition, Path]:
-    file = folder / "benchmarks" / "small.toml"
-    file.parent.mkdir(exist_ok=True, parents=True)
-    file.write_text(tomli_w.dumps(DEFINITION | changes))
-    return load_definition(str(file))
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Definition, Path, Path]:
+@pytest.fixture
+def made(small_benchmark: Path) -> tuple[Definition, Path, Path]:
     """A definition, its file, and the benchmark, which is published as it is."""
-    folder = tmp_path_factory.mktemp("benchmark")
-    definition, file = written(folder)
-    assert make_benchmark(definition, file, folder / "made") == []
-    assert certify(definition, file, folder / "made").problems  # nothing is published yet
-    (folder / "made" / CERTIFICATE).rename(file.with_suffix(f".{CERTIFICATE}"))
-    return definition, file, folder / "made"
+    return *written(small_benchmark.parent), small_benchmark
 
 
 def contents(file: Path) -> dict[str, Mapping[str, Any]]:
@@ -76,7 +49,7 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
     photons, frames, bright = collection[0], collection[3], collection[4]
     assert photons.budgets == (30, 400, 3000)
     assert collection[1].budgets == (30, 400)
-    assert frames.counts.readout.frames == 8
+    assert frames.counts.readout.frames == 200
     assert frames.counts.readout.bits == 1
     assert bright.views is not None
     assert not bright.has_counts

@@ -1,0 +1,82 @@
+"""The command `pcii benchmark`."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from cyclopts import App, Parameter
+
+from pcii.app.command_options import Out
+from pcii.base.command_output import say, say_next_page
+from pcii.base.executor import ALONE, Executor
+from pcii.base.progress import Stages
+
+Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
+Half = Annotated[
+    Literal["development", "test"], Parameter(help="Methods are tuned on the one and reported on the other.")
+]
+Workers = Annotated[Executor, Parameter(name="*")]
+
+benchmark = App(name="benchmark", help="Score methods on the public benchmark.")
+
+
+@benchmark.command
+def run(method: str, *, data: Data, out: Out, half: Half = "test", executor: Workers = ALONE) -> None:
+    """Run a method on the datasets of a benchmark and score it; run again to resume.
+
+    OUT is an evaluation with submission.json beside it.
+
+    Examples of use:
+
+        pcii benchmark run three-step --data out/bench -o out/three-step
+        pcii benchmark run depth:variance-sweep --data out/bench -o out/variance-sweep
+        pcii benchmark run my_module:remove --data out/bench --half development -o out/mine
+        pcii benchmark run depth:my_module:estimate --data out/bench -o out/mine
+
+    Parameters
+    ----------
+    method
+        A method of removal, or depth:NAME; or module:function, of the working directory or installed, and
+        depth:module:function.
+    out
+        Folder for the scores: new, empty, or those of an earlier run, which is extended.
+    """
+    from pcii.benchmark.benchmark_collection import open_benchmark
+    from pcii.benchmark.submission_scores import run_method
+
+    with Stages() as report:
+        result = run_method(method, open_benchmark(data), out, half=half, executor=executor, report=report)
+    _tell(out, result)
+
+
+@benchmark.command
+def score(folder: Path, *, data: Data, out: Out, half: Half = "test", executor: Workers = ALONE) -> None:
+    """Score maps of depth and masks that were made elsewhere, after checking all of them.
+
+    FOLDER has submission.json, and for each dataset and light a folder such as ramp_photons_1/1000 with
+    depth.npz, .pfm or .exr, or with masks.npz or mask_540.png and so on.
+
+    Examples of use:
+
+        pcii benchmark score my-results --data out/bench -o out/mine
+
+    Parameters
+    ----------
+    folder
+        Folder of the results.
+    out
+        Folder for the scores: new, empty, or those of an earlier call.
+    """
+    from pcii.benchmark.benchmark_collection import open_benchmark
+    from pcii.benchmark.submission_scores import score_submission
+
+    with Stages() as report:
+        result = score_submission(
+            folder, open_benchmark(data), out, half=half, executor=executor, report=report
+        )
+    _tell(out, result)
+
+
+def _tell(out: Path, result: dict[str, Any]) -> None:
+    scenes, rows = len(result["groups"]), sum(group["datasets"] for group in result["groups"])
+    say(f"{out}: scores of {rows} datasets of {scenes} scenes")
+    say_next_page(out / "evaluation.html")

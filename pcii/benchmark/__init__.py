@@ -1,0 +1,6 @@
+"""The public benchmark: methods run on it by us, results that others send, and the scores of both.
+
+benchmark_collection  The datasets of a benchmark, which `simgen benchmark make` makes, by half and light.
+submission_scores     Scores of a method, run here, or of maps that were made elsewhere.
+submitted_maps        Maps of depth and masks of a submission: where they are, checked as they are read.
+"""

@@ -1,0 +1,242 @@
+"""Scores of a method, run here, or of maps that were made elsewhere.
+
+Both are an evaluation (`pcii.evaluation`) with a submission.json beside it, which says whose they are.
+Photons, frames and full light of a scene are one scene in it, whatever their recipes.
+"""
+
+import importlib
+import json
+import resource
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
+from pcii.base.plain_text import visible
+from pcii.base.progress import Report, silent
+from pcii.benchmark.benchmark_collection import BenchmarkCollection, Half
+from pcii.benchmark.submitted_maps import (
+    has_depth,
+    has_masks,
+    light_folder,
+    submitted_depth,
+    submitted_masks,
+)
+from pcii.core.estimates import DepthMap, Segmented
+from pcii.evaluation.comparison import EvaluationJob, measure
+from pcii.evaluation.evaluation_pages import write_evaluation
+from pcii.evaluation.method_names import (
+    Function,
+    Method,
+    depth_name,
+    estimator_of,
+    full_name,
+    named_functions,
+)
+from pcii.evaluation.rows import all_rows
+from pcii.evaluation.summary import summarise
+from pcii.evaluation.tasks import Task, tasks_of
+from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
+from pcii.io.dataset_layout import RADIANCE
+from pcii.store.safe_files import named_in_errors, write_json_safely
+
+SUBMISSION = "submission.json"
+TEXTS = ("authors", "url", "description", "trained_on")
+"""What may be said of a submission beside the name of its method."""
+
+
+def run_method(
+    method: str,
+    data: BenchmarkCollection,
+    out: Path,
+    *,
+    half: Half = "test",
+    executor: Executor = ALONE,
+    report: Report = silent,
+) -> dict[str, Any]:
+    """Score a method on one half of a benchmark, in the folder `out`; the figures of `summarise`.
+
+    `method` is a name, as of `pcii.evaluate`, or "module:function" for a removal of one's own, and
+    "depth:module:function" for depth. Rows that are in the folder already are kept, as by `evaluate`. Raises
+    `InputError` for a method that is not there, and as `evaluate` does.
+    """
+    named = named_functions([_method(method)])
+    (name,) = named
+    tasks: list[Task] = []
+    for dataset in data.datasets(half):
+        lights = [each for each in lights_of(dataset) if each is not None and _takes(name, named, each)]
+        if lights:
+            tasks += tasks_of([dataset], named, lights)
+    # Of the last dataset's tasks the full name: "depth" is the default method of depth.
+    said = {"method": tasks[-1].method if tasks else name, "made": "run by pcii benchmark run"}
+    return _scored(EvaluationJob(tasks, out.resolve()), data, half, said, executor, report)
+
+
+def score_submission(
+    folder: Path,
+    data: BenchmarkCollection,
+    out: Path,
+    *,
+    half: Half = "test",
+    executor: Executor = ALONE,
+    report: Report = silent,
+) -> dict[str, Any]:
+    """Score the maps in a folder (`submitted_maps`) on one half of a benchmark; the figures of `summarise`.
+
+    submission.json there names the method. Raises `InputError` for a submission with any fault, before
+    anything is scored: it says which, the first few of them.
+    """
+    said = read_submission(folder, data)
+    tasks, faults = _submitted(folder, data.datasets(half), said["method"])
+    for number, task in enumerate(tasks, start=1):
+        try:
+            given(folder, task)
+        except InputError as fault:
+            faults.append(str(fault))
+        report("checks", number, len(tasks))
+    if not tasks and not faults:
+        faults = [f"{folder}: has no results of a dataset of the {half} half"]
+    if faults:
+        more = f"; and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
+        raise InputError("; ".join(faults[:MOST_FAULTS]) + more)
+    return _scored(SubmissionJob(tasks, out.resolve(), folder), data, half, said, executor, report)
+
+
+MOST_FAULTS = 5
+"""Faults of a submission that are told at a time."""
+
+
+class SubmissionJob(EvaluationJob):
+    """The job of scoring maps in a folder: each task reads what there is instead of calling a method."""
+
+    def __init__(self, tasks: Sequence[Task], out: Path, folder: Path) -> None:
+        super().__init__(tasks, out)
+        self.folder = folder
+
+    def estimated(self, task: Task) -> tuple[float | None, Segmented | DepthMap]:
+        """The result of a task, of which nobody measured the time."""
+        return None, given(self.folder, task)
+
+
+def given(folder: Path, task: Task) -> Segmented | DepthMap:
+    """The result of a task as a submission gives it; `InputError`, naming the file, for one with a fault."""
+    inside = folder / task.dataset.name / light_folder(task.budget)
+    if estimator_of(task.method) is not None:
+        return submitted_depth(inside, task.dataset)
+    return submitted_masks(inside, task.dataset, task.data.counts, task.method)
+
+
+def lights_of(dataset: Dataset) -> list[Budget]:
+    """Photon budgets of a dataset, and full light if it has radiance."""
+    found: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
+    if dataset.has(RADIANCE):
+        found.append(FULL_LIGHT)
+    return found
+
+
+def read_submission(folder: Path, data: BenchmarkCollection) -> dict[str, Any]:
+    """What submission.json says; `InputError` if it is missing, or of another benchmark."""
+    file = folder / SUBMISSION
+    form = f'expected {{"benchmark": "{data.name}", "method": NAME}}, and if you like {", ".join(TEXTS)}'
+    try:
+        said = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{file}: is missing; {form}") from None
+    except (OSError, ValueError):
+        raise InputError(f"{file}: is no JSON; {form}") from None
+    known = {"benchmark", "method", *TEXTS}
+    if (
+        not isinstance(said, dict)
+        or not {"benchmark", "method"} <= said.keys() <= known
+        or not all(isinstance(value, str) and value for value in said.values())
+    ):
+        raise InputError(f"{file}: {form}, all of them text")
+    if said["benchmark"] != data.name:
+        raise InputError(f"{file}: benchmark: is {visible(said['benchmark'])!r}, and the data {data.name!r}")
+    try:
+        named_functions([(said["method"], _given_as_maps)])
+    except InputError as fault:
+        raise InputError(f"{file}: method: {fault}") from None
+    return said | {"made": "scored from maps by pcii benchmark score"}
+
+
+def _given_as_maps(*_: Any) -> Any:
+    raise AssertionError("maps are read, not computed")
+
+
+def _submitted(folder: Path, datasets: Sequence[Dataset], method: str) -> tuple[list[Task], list[str]]:
+    """The tasks that a submission has results of, and a sentence for each of its faults.
+
+    Whatever light it has results of, it has them of all datasets that have this light.
+    """
+    by_name, faults = {dataset.name: dataset for dataset in datasets}, list[str]()
+    for entry in sorted(folder.iterdir()):
+        if entry.is_dir() and entry.name not in by_name:
+            faults.append(f"{entry}: there is no such dataset in this half")
+    tasks: list[Task] = []
+    found: dict[tuple[str, Budget], list[Dataset]] = {}
+    for dataset in datasets:
+        lights: dict[str, Budget] = {light_folder(light): light for light in lights_of(dataset)}
+        for entry in sorted((folder / dataset.name).glob("*/")):
+            if entry.name not in lights:
+                faults.append(f"{entry}: expected a folder for each light, {', '.join(lights)}")
+                continue
+            light: Budget = lights[entry.name]
+            for has, name in ((has_masks(entry), method), (has_depth(entry), depth_name(method))):
+                if has and (light != FULL_LIGHT or estimator_of(name) is not None):
+                    tasks.append(Task(dataset, light, name, _given_as_maps, ()))
+                    found.setdefault((name, light), []).append(dataset)
+            if not has_masks(entry) and not has_depth(entry):
+                faults.append(f"{entry}: has neither a depth map nor masks")
+    for (name, light), own in found.items():
+        what = "depth" if estimator_of(name) is not None else "masks"
+        for dataset in datasets:
+            if light in lights_of(dataset) and dataset not in own:
+                faults.append(f"{folder / dataset.name / light_folder(light)}: has no {what}")
+    return tasks, faults
+
+
+def _scored(
+    job: EvaluationJob,
+    data: BenchmarkCollection,
+    half: Half,
+    said: Mapping[str, Any],
+    executor: Executor,
+    report: Report,
+) -> dict[str, Any]:
+    out = job.out
+    again = measure(job, executor, report)
+    memory = max(
+        resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    entry = {"benchmark": data.name, **said, "half": half, "peak_memory_mb": round(memory / 1024)}
+    with all_rows(out) as rows, named_in_errors(out):
+        result = summarise([row | {"recipe": row["title"]} for row in rows]) | {"again": again}
+        write_json_safely(out / SUBMISSION, entry)
+        write_evaluation(out, result, (SUBMISSION,))
+    return result
+
+
+def _takes(name: str, named: Mapping[str, Function | None], light: Budget) -> bool:
+    functions = [each for each, function in named.items() if function is not None]
+    return full_name(name, full_light=light == FULL_LIGHT, functions=functions) is not None
+
+
+def _method(text: str) -> Method:
+    """A method as it is named on a command line: by its name, or as module:function."""
+    estimator = estimator_of(text)
+    module, colon, function = (text if estimator is None else estimator).partition(":")
+    if not colon:
+        return text
+    if "" not in sys.path:
+        sys.path.insert(0, "")  # modules of the working directory, as `python -m` has them
+    try:
+        found = getattr(importlib.import_module(module), function)
+    except (ImportError, AttributeError, ValueError) as fault:
+        raise InputError(f"method: {text!r} cannot be loaded ({visible(str(fault))})") from None
+    if not callable(found):
+        raise InputError(f"method: {function!r} of {module!r} is no function")
+    name = function if estimator is None else depth_name(function)
+    return name, found

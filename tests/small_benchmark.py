@@ -1,0 +1,31 @@
+"""A benchmark of two small scenes, for the tests of making it and of scoring on it."""
+
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from simgen.benchmark.definition import Definition, load_definition
+
+SMALL = {"grid.rows": 2, "grid.cols": 2, "grid.height": 130, "grid.width": 140, "grid.pixel_mm": 0.25}
+SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
+DEFINITION: dict[str, Any] = {
+    "name": "small",
+    "title": "two scenes",
+    "photons_per_view": [30, 400],
+    "brighter_photons_per_view": [3000],
+    "seeds": [1, 2, 3],
+    "frames": 200,
+    "set": [*(f"{name}={value}" for name, value in SMALL.items()), "render.samples_per_pixel=1"],
+    "scene": [
+        SCENE | {"name": "pair", "frames": True},
+        SCENE | {"name": "wall", "kind": "nothing", "half": "test", "recipe": "blank"},
+    ],
+}
+
+
+def written(folder: Path, **changes: Any) -> tuple[Definition, Path]:
+    file = folder / "benchmarks" / "small.toml"
+    file.parent.mkdir(exist_ok=True, parents=True)
+    file.write_text(tomli_w.dumps(DEFINITION | changes))
+    return load_definition(str(file))
