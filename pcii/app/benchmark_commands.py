@@ -16,7 +16,16 @@ Half = Annotated[
 ]
 Workers = Annotated[Executor, Parameter(name="*")]
 
-benchmark = App(name="benchmark", help="Score methods on the public benchmark.")
+benchmark = App(
+    name="benchmark",
+    help="""Score methods on the public benchmark, and make a page of all scores.
+
+    Examples of use:
+
+        pcii benchmark run three-step --data out/bench -o submissions/three-step
+        pcii benchmark page submissions -o benchmark.html
+    """,
+)
 
 
 @benchmark.command
@@ -74,6 +83,28 @@ def score(folder: Path, *, data: Data, out: Out, half: Half = "test", executor: 
             folder, open_benchmark(data), out, half=half, executor=executor, report=report
         )
     _tell(out, result)
+
+
+@benchmark.command
+def page(folder: Path, *, out: Out) -> None:
+    """Make one page of all submissions in a folder: tables that can be sorted, and lines over light.
+
+    Example of use:
+
+        pcii benchmark page submissions -o benchmark.html
+
+    Parameters
+    ----------
+    folder
+        Folder of folders that `pcii benchmark run` or `score` have written.
+    out
+        The page to write, in a folder that exists.
+    """
+    from pcii.benchmark.benchmark_page import write_page
+
+    count = write_page(folder, out)
+    say(f"{out}: {count} submission{'' if count == 1 else 's'}")
+    say_next_page(out)
 
 
 def _tell(out: Path, result: dict[str, Any]) -> None:

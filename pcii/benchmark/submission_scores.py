@@ -35,7 +35,7 @@ from pcii.evaluation.method_names import (
     full_name,
     named_functions,
 )
-from pcii.evaluation.rows import all_rows
+from pcii.evaluation.rows import Row, all_rows
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tasks import Task, tasks_of
 from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
@@ -213,10 +213,15 @@ def _scored(
     )
     entry = {"benchmark": data.name, **said, "half": half, "peak_memory_mb": round(memory / 1024)}
     with all_rows(out) as rows, named_in_errors(out):
-        result = summarise([row | {"recipe": row["title"]} for row in rows]) | {"again": again}
+        result = summarise(by_scene(rows)) | {"again": again}
         write_json_safely(out / SUBMISSION, entry)
         write_evaluation(out, result, (SUBMISSION,))
     return result
+
+
+def by_scene(rows: Sequence[Row]) -> list[Row]:
+    """Rows whose datasets belong to one group if they are of one scene, whatever their light."""
+    return [row | {"recipe": row["title"]} for row in rows]
 
 
 def _takes(name: str, named: Mapping[str, Function | None], light: Budget) -> bool:

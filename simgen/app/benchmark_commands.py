@@ -12,7 +12,15 @@ from simgen.app.scene_commands import Out
 MOST_TOLD = 5
 """Datasets that could not be made, or are not the published ones, whose faults the last lines tell."""
 
-benchmark = App(name="benchmark", help="Make the public benchmark, and certify it.")
+benchmark = App(
+    name="benchmark",
+    help="""Make the public benchmark, and certify it.
+
+    Example of use:
+
+        simgen benchmark make -o out/bench
+    """,
+)
 
 
 @benchmark.command

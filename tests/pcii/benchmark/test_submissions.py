@@ -14,6 +14,7 @@ from pcii.app.commands import app
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.benchmark.benchmark_collection import open_benchmark
+from pcii.benchmark.benchmark_page import write_page
 from pcii.benchmark.submission_scores import SUBMISSION, run_method, score_submission
 from pcii.io.verification import verify
 from pcii.pictures.written_pixels import write_pfm, write_png
@@ -114,6 +115,24 @@ def test_a_function_of_ones_own_is_run(
         assert command_line.run(app, [*arguments[:2], wrong, *arguments[3:], "-o", "other"]) == 2
         assert wrong in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
+
+
+def test_one_page_has_all_submissions(small_benchmark: Path, submitted: Path, tmp_path: Path) -> None:
+    data, folder, out = open_benchmark(small_benchmark), tmp_path / "submissions", tmp_path / "page.html"
+    score_submission(submitted, data, folder / "theirs", half=HALF)
+    run_method("depth:variance-sweep", data, folder / "ours", half=HALF)
+    assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
+    text = out.read_text()
+    assert "small: methods compared" in text
+    for method in ("mine", "depth:mine", "depth:variance-sweep", "oracle (masks from the true depth)"):
+        assert f">{method}</td>" in text
+    assert "pcii benchmark score theirs --data BENCHMARK --half development -o OUT" in text
+    shutil.copytree(folder / "ours", folder / "again")
+    with pytest.raises(InputError, match="again and ours are both of 'depth:variance-sweep'"):
+        write_page(folder, out)
+    with pytest.raises(InputError, match=r"has no folder with submission\.json"):
+        write_page(tmp_path / "submissions" / "ours", out)
+    assert out.read_text() == text
 
 
 def rewritten(path: Path, **arrays: Any) -> None:
