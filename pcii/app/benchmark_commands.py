@@ -1,7 +1,7 @@
 """The command `pcii benchmark`."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from cyclopts import App, Parameter
 
@@ -9,11 +9,10 @@ from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
+from pcii.io.collection_layout import Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
-Half = Annotated[
-    Literal["development", "test"], Parameter(help="Methods are tuned on the one and reported on the other.")
-]
+OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
 Workers = Annotated[Executor, Parameter(name="*")]
 
 benchmark = App(
@@ -29,7 +28,7 @@ benchmark = App(
 
 
 @benchmark.command
-def run(method: str, *, data: Data, out: Out, half: Half = "test", executor: Workers = ALONE) -> None:
+def run(method: str, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = ALONE) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
     OUT is an evaluation with submission.json beside it.
@@ -58,7 +57,7 @@ def run(method: str, *, data: Data, out: Out, half: Half = "test", executor: Wor
 
 
 @benchmark.command
-def score(folder: Path, *, data: Data, out: Out, half: Half = "test", executor: Workers = ALONE) -> None:
+def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = ALONE) -> None:
     """Score maps of depth and masks that were made elsewhere, after checking all of them.
 
     FOLDER has submission.json, and for each dataset and light a folder such as ramp_photons_1/1000 with

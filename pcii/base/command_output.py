@@ -3,6 +3,7 @@
 import shlex
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,18 @@ def answer_json(value: Any) -> None:
 def complain(text: str) -> None:
     """Print what went wrong on standard error, with --quiet too."""
     print(in_terminal(text), file=sys.stderr, flush=True)
+
+
+MOST_COMPLAINTS = 5
+"""Largest number of faults that the last lines of a command name."""
+
+
+def complain_of(faults: Sequence[str], prefix: str = "", rest: str = "") -> None:
+    """Print the first few of many faults on standard error, and how many more there are."""
+    for fault in faults[:MOST_COMPLAINTS]:
+        complain(f"{prefix}{fault}")
+    if len(faults) > MOST_COMPLAINTS:
+        complain(f"and {len(faults) - MOST_COMPLAINTS} more{rest}")
 
 
 def say_next(*words: object) -> None:

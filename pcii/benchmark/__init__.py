@@ -1,6 +1,6 @@
 """The public benchmark: methods run on it by us, results that others send, and the scores of both.
 
-benchmark_collection  The datasets of a benchmark, which `simgen benchmark make` makes, by half and light.
+benchmark_collection  The datasets of a benchmark, which `simgen benchmark make` makes, by half.
 benchmark_page        One page of all submissions in a folder: ranks, lines over light, best and worst scenes,
                       and commands.
 submission_scores     Scores of a method, run here, or of maps that were made elsewhere.

@@ -1,6 +1,7 @@
 """One page of all submissions in a folder: ranks, lines over light, best and worst scenes, and commands."""
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,8 +162,8 @@ def _best_and_worst(
         of = cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"]
         order = sorted(of, key=lambda scene: -kind.sign * of[scene])
         best, worst = order[:SCENES_NAMED], order[::-1][:SCENES_NAMED]
-        told = (", ".join(f"{scene} {of[scene]:.2f}" for scene in scenes) for scenes in (best, worst))
-        rows.append((method, *told))
+        words = (", ".join(f"{scene} {of[scene]:.2f}" for scene in scenes) for scenes in (best, worst))
+        rows.append((method, *words))
     header = ("method", "best", "worst")
     return Table(f"Scenes at {TYPICAL_PHOTONS:g} photons per view", header, tuple(rows), words=3)
 
@@ -173,10 +174,10 @@ def _submissions(
     groups: Sequence[Mapping[str, Any]],
 ) -> Table:
     """Whose each method is, what it took, and the command that measures it again."""
-    datasets = {row["method"]: 0 for group in groups for row in group["results"]}
+    scores = Counter[str]()
     for group in groups:
         for row in group["results"]:
-            datasets[row["method"]] += row["seeds"]
+            scores[row["method"]] += row["seeds"]
     rows = []
     for method, folder in sorted(made_by.items()):
         said = said_of[folder]
@@ -188,7 +189,7 @@ def _submissions(
                 str(said.get("authors", "–")),
                 str(said.get("url", "–")),
                 f"{said['peak_memory_mb']} MB" if run else "–",
-                str(datasets.get(method, 0)),
+                str(scores[method]),
                 f"pcii benchmark {verb} {what} --data BENCHMARK --half {said['half']} -o OUT",
             )
         )

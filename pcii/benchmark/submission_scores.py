@@ -12,11 +12,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.benchmark.benchmark_collection import BenchmarkCollection, Half
+from pcii.benchmark.benchmark_collection import BenchmarkCollection
 from pcii.benchmark.submitted_maps import (
     has_depth,
     has_masks,
@@ -37,14 +39,18 @@ from pcii.evaluation.method_names import (
 )
 from pcii.evaluation.rows import Row, all_rows
 from pcii.evaluation.summary import summarise
-from pcii.evaluation.tasks import Task, tasks_of
+from pcii.evaluation.tasks import Task, lights_of, tasks_of
+from pcii.io.collection_layout import Half
 from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
-from pcii.io.dataset_layout import RADIANCE
+from pcii.io.suggested_depths import planes_of
+from pcii.sections.reconstruction import reconstruct
 from pcii.store.safe_files import named_in_errors, write_json_safely
 
 SUBMISSION = "submission.json"
 TEXTS = ("authors", "url", "description", "trained_on")
 """What may be said of a submission beside the name of its method."""
+MOST_FAULTS = 5
+"""Largest number of faults of a submission that one message names."""
 
 
 def run_method(
@@ -92,7 +98,7 @@ def score_submission(
     tasks, faults = _submitted(folder, data.datasets(half), said["method"])
     for number, task in enumerate(tasks, start=1):
         try:
-            given(folder, task)
+            given_maps(folder, task)
         except InputError as fault:
             faults.append(str(fault))
         report("checks", number, len(tasks))
@@ -104,10 +110,6 @@ def score_submission(
     return _scored(SubmissionJob(tasks, out.resolve(), folder), data, half, said, executor, report)
 
 
-MOST_FAULTS = 5
-"""Faults of a submission that are told at a time."""
-
-
 class SubmissionJob(EvaluationJob):
     """The job of scoring maps in a folder: each task reads what there is instead of calling a method."""
 
@@ -115,25 +117,20 @@ class SubmissionJob(EvaluationJob):
         super().__init__(tasks, out)
         self.folder = folder
 
-    def estimated(self, task: Task) -> tuple[float | None, Segmented | DepthMap]:
+    def estimated(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
         """The result of a task, of which nobody measured the time."""
-        return None, given(self.folder, task)
+        given = given_maps(self.folder, task)
+        if isinstance(given, DepthMap):
+            return None, given
+        return None, Segmented(given, task.method, reconstruct(data.counts, planes_of(data, ())))
 
 
-def given(folder: Path, task: Task) -> Segmented | DepthMap:
-    """The result of a task as a submission gives it; `InputError`, naming the file, for one with a fault."""
+def given_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
+    """Depth, or masks (Z, H, W) bool, of a task in a submission; `InputError`, naming the file."""
     inside = folder / task.dataset.name / light_folder(task.budget)
     if estimator_of(task.method) is not None:
         return submitted_depth(inside, task.dataset)
-    return submitted_masks(inside, task.dataset, task.data.counts, task.method)
-
-
-def lights_of(dataset: Dataset) -> list[Budget]:
-    """Photon budgets of a dataset, and full light if it has radiance."""
-    found: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
-    if dataset.has(RADIANCE):
-        found.append(FULL_LIGHT)
-    return found
+    return submitted_masks(inside, task.dataset)
 
 
 def read_submission(folder: Path, data: BenchmarkCollection) -> dict[str, Any]:

@@ -16,12 +16,10 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.core.photon_counts import PhotonCounts
+from pcii.core.estimates import DepthMap
 from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
 from pcii.io.suggested_depths import planes_of
 from pcii.pictures.picture_files import decode, picture_of
-from pcii.sections.reconstruction import reconstruct
 
 DEPTH_FILES = ("depth.npz", "depth.pfm", "depth.exr")
 CONFIDENCE_FILES = ("confidence.pfm", "confidence.exr")
@@ -74,10 +72,9 @@ def submitted_depth(folder: Path, dataset: Dataset) -> DepthMap:
     return DepthMap(z_mm, np.where(answered, confidence, 0.0).astype(np.float64))
 
 
-def submitted_masks(folder: Path, dataset: Dataset, counts: PhotonCounts, method: str) -> Segmented:
-    """The masks in a folder of results; `InputError`, naming the file, for those that are none."""
-    planes = planes_of(dataset, ())
-    shape, z_mm = dataset.grid.shape_HW, planes.z_mm.tolist()
+def submitted_masks(folder: Path, dataset: Dataset) -> np.ndarray:
+    """The masks (Z, H, W) bool in a folder of results; `InputError`, naming the file, for others."""
+    shape, z_mm = dataset.grid.shape_HW, planes_of(dataset, ()).z_mm.tolist()
     pictures = sorted(folder.glob("mask_*.png"))
     if (folder / MASKS).is_file():
         if pictures:
@@ -85,17 +82,16 @@ def submitted_masks(folder: Path, dataset: Dataset, counts: PhotonCounts, method
         masks = _arrays(folder / MASKS, {"in_focus": (len(z_mm), *shape)})["in_focus"]
         if not np.isin(masks, (0, 1)).all():
             raise InputError(f"{folder / MASKS}: in_focus: expected 0 and 1, or bool")
-        in_focus = masks.astype(bool)
-    else:
-        expected = [folder / f"mask_{z:g}.png" for z in z_mm]
-        for file in expected:
-            if not file.is_file():
-                raise InputError(f"{file}: is missing; the depths are {', '.join(f'{z:g}' for z in z_mm)} mm")
-        for file in pictures:
-            if file not in expected:
-                raise InputError(f"{file}: the depths are {', '.join(f'{z:g}' for z in z_mm)} mm")
-        in_focus = np.stack([_picture(file, shape) > 0 for file in expected])
-    return Segmented(in_focus, method, reconstruct(counts, planes))
+        return masks.astype(bool)
+    expected = [folder / f"mask_{z:g}.png" for z in z_mm]
+    depths = f"the depths are {', '.join(f'{z:g}' for z in z_mm)} mm"
+    for file in expected:
+        if not file.is_file():
+            raise InputError(f"{file}: is missing; {depths}")
+    for file in pictures:
+        if file not in expected:
+            raise InputError(f"{file}: {depths}")
+    return np.stack([_picture(file, shape) > 0 for file in expected])
 
 
 def _picture(file: Path, shape: tuple[int, int]) -> np.ndarray:

@@ -103,15 +103,18 @@ def measure(job: "EvaluationJob", executor: Executor, report: Report) -> list[di
         made_by = {key_of(row): row.get("software") for row in rows}
     tasks = job.tasks
     software = {task.method: _software(task) for task in {task.method: task for task in tasks}.values()}
-    remaining = [task for task in tasks if task.function or made_by.get(task.key) != software[task.method]]
+    remaining = [
+        number
+        for number, task in enumerate(tasks)
+        if task.function or made_by.get(task.key) != software[task.method]
+    ]
     if len(remaining) < len(tasks):
         kept = len(tasks) - len(remaining)
         report("scores of an earlier run", kept, kept)
-    again = _again(remaining, made_by, software)
+    again = _again([tasks[number] for number in remaining], made_by, software)
     for entry in again:
         report(f"scores to make again, since {entry['why']}", entry["rows"], entry["rows"])
-    job.tasks = remaining
-    with closing(executor.run(job, range(len(remaining)), report)) as work:
+    with closing(executor.run(job, remaining, report)) as work:
         for finished, done in enumerate(work, start=1):
             if done.fault:
                 raise InputError(done.fault)
@@ -208,10 +211,9 @@ class EvaluationJob:
 
         compiled_loops.use_threads(count)
 
-    def estimated(self, task: Task) -> tuple[float | None, Segmented | DepthMap]:
-        """Seconds and result of a task; the first call of a method at a budget is a warm-up."""
-        data, estimator = task.data, estimator_of(task.method)
-        seen = data.counts_or_views
+    def estimated(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
+        """Seconds and result of a task on its `data`; the first call of a method at a budget is a warm-up."""
+        estimator, seen = estimator_of(task.method), data.counts_or_views
 
         def work() -> Any:
             if estimator is not None:
@@ -229,9 +231,9 @@ class EvaluationJob:
         """The row of a task."""
         if task.method not in self.software:  # that of this process, which may be on another machine
             self.software[task.method] = _software(task)
-        seconds, estimate = self.estimated(task)
         data = task.data
         seen = data.counts_or_views
+        seconds, estimate = self.estimated(task, data)
         photons = seen.total / seen.grid.view_count if isinstance(seen, PhotonCounts) else None
         row = described(data, task.z_mm) | {
             "budget": task.budget,

@@ -78,11 +78,17 @@ def tasks_of(
     return [task for each in tasks.values() for task in each]
 
 
+def lights_of(dataset: Dataset) -> list[Budget]:
+    """Photon budgets of a dataset, and full light if it has radiance."""
+    found: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
+    if dataset.has(RADIANCE):
+        found.append(FULL_LIGHT)
+    return found
+
+
 def _lights(dataset: Dataset, budgets: Sequence[float | str]) -> list[Budget]:
     """The budgets to score at, with `FULL_LIGHT` for the radiance; `InputError` for one that is not there."""
-    own: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
-    if dataset.has(RADIANCE):
-        own.append(FULL_LIGHT)
+    own = lights_of(dataset)
     if not own:
         raise InputError(f"{dataset.path}: has neither photon counts nor radiance to score methods on")
     chosen: list[Budget] = []

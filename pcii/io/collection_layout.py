@@ -32,6 +32,10 @@ COLLECTION_FOLDER = FolderKind(
     marks=frozenset({COLLECTION}),
 )
 Split = Literal["train", "validation", "test"]
+Half = Literal["development", "test"]
+"""Of a benchmark: methods are made on the one, and what is reported is of the other."""
+BENCHMARK_FIELDS = ("name", "kind", "half", "light", "seed")
+"""What distinguishes the datasets of a benchmark, which is a collection of many recipes."""
 
 
 def split_of(scene_number: int) -> Split:

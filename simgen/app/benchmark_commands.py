@@ -1,16 +1,14 @@
 """The command `simgen benchmark`."""
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from cyclopts import App, Parameter
 
-from pcii.base.command_output import complain, say, say_next
+from pcii.base.command_output import complain_of, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
+from pcii.io.collection_layout import Half
 from simgen.app.scene_commands import Out
-
-MOST_TOLD = 5
-"""Datasets that could not be made, or are not the published ones, whose faults the last lines tell."""
 
 benchmark = App(
     name="benchmark",
@@ -28,7 +26,7 @@ def make(
     name: str = "pcii-bench-1",
     *,
     out: Out,
-    half: Literal["development", "test"] | None = None,
+    half: Half | None = None,
     scene: tuple[str, ...] = (),
     executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> int:
@@ -66,10 +64,7 @@ def make(
         )
         verdict = None if faults else certify(definition, file, out, report)
     problems = faults if verdict is None else verdict.problems
-    for fault in problems[:MOST_TOLD]:
-        complain(fault if verdict is not None else f"not made: {fault}")
-    if len(problems) > MOST_TOLD:
-        complain(f"and {len(problems) - MOST_TOLD} more")
+    complain_of(problems, "" if verdict is not None else "not made: ")
     if verdict is not None:
         say(f"{out / CERTIFICATE}: {verdict.sentence()}")
         say_next("pcii", "benchmark", "run", "likelihood", "--data", out, "-o", out.parent / "submission")

@@ -1,13 +1,12 @@
 """The `simgen` command."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from cyclopts import Parameter
 
 from pcii.base import command_line
-from pcii.base.command_output import answer, answer_json, complain, results_folder, say, say_next
+from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
 from simgen.app.authoring_commands import draw, import_scene, new_recipe, new_scene
@@ -17,9 +16,6 @@ from simgen.app.scene_commands import Json, Out, Overrides, check, preview, reci
 app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
-
-MOST_TOLD = 5
-"""Faults of datasets that a collection's last lines tell."""
 
 for command in (
     scenes,
@@ -136,15 +132,8 @@ def generate(
     if not faults:
         say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
         return 0
-    _complain_of(faults)
+    complain_of(faults, "not made: ", " were not made")
     return 1
-
-
-def _complain_of(faults: Sequence[str]) -> None:
-    for fault in faults[:MOST_TOLD]:
-        complain(f"not made: {fault}")
-    if len(faults) > MOST_TOLD:
-        complain(f"and {len(faults) - MOST_TOLD} more were not made")
 
 
 def _made(folder: Path, manifest: dict[str, Any]) -> str:

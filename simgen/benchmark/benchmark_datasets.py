@@ -6,11 +6,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
+from pcii.io.collection_layout import BENCHMARK_FIELDS
 from simgen.benchmark.definition import Definition, Scene
 from simgen.spec.recipe import Recipe, load_recipe
 
 Light = Literal["photons", "frames", "full-light"]
-FIELDS = ("name", "kind", "half", "light", "seed")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class BenchmarkDatasets:
     @property
     def fields(self) -> tuple[str, ...]:
         """Names of what distinguishes the datasets."""
-        return FIELDS
+        return BENCHMARK_FIELDS
 
     @property
     def base(self) -> dict[str, Any]:
@@ -52,7 +52,7 @@ class BenchmarkDatasets:
     def values(self, number: int) -> Mapping[str, Any]:
         """What distinguishes a dataset from the others."""
         scene, light, seed = self.pieces[number]
-        return dict(zip(FIELDS, (scene.name, scene.kind, scene.half, light, seed), strict=True))
+        return dict(zip(BENCHMARK_FIELDS, (scene.name, scene.kind, scene.half, light, seed), strict=True))
 
     def folder(self, number: int) -> str:
         """Name of a dataset's folder."""

@@ -6,15 +6,13 @@ compared in tiles of the film: with a and b photons in a tile the sum of (a - b)
 distribution, with as many degrees of freedom as there are tiles with photons.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pcii.io.collection_layout import check_manifest, read_index
-from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset import Dataset
 from pcii.store.hashes import hash_json
 
 TILE_PX = 64
@@ -27,13 +25,8 @@ Content = Mapping[str, Any]
 """Of a dataset: a hash of its files, and what its photons or its radiance are in brief."""
 
 
-def contents_of(out: Path) -> Iterator[tuple[str, Content]]:
-    """Name and content of each dataset of a collection that is finished, in the order of its index."""
-    for row in read_index(out):
-        yield row["path"], _content(open_dataset(check_manifest(out, row)))
-
-
-def _content(dataset: Dataset) -> dict[str, Any]:
+def content_of(dataset: Dataset) -> Content:
+    """What a dataset is compared by."""
     files = {name: entry["sha256"] for name, entry in dataset.manifest["files"].items()}
     found: dict[str, Any] = {"sha256": hash_json(files)}
     if dataset.has_counts:

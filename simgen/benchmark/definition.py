@@ -11,11 +11,11 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from pcii.base.errors import InputError
+from pcii.io.collection_layout import Half
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import Strict, read_toml, suggestion, validate
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]
-Half = Literal["development", "test"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=40)]
 Photons = Annotated[float, Field(gt=0)]
 

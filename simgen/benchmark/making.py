@@ -8,13 +8,14 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
-from pcii.io.collection_layout import read_index
+from pcii.io.collection import open_collection
+from pcii.io.collection_layout import Half
 from pcii.store.hashes import hash_json
 from pcii.store.safe_files import write_json_safely
 from simgen.base.strict_models import suggestion
 from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
-from simgen.benchmark.certificate import Content, Verdict, compare, contents_of
-from simgen.benchmark.definition import Definition, Half
+from simgen.benchmark.certificate import Content, Verdict, compare, content_of
+from simgen.benchmark.definition import Definition
 from simgen.collection.whole_collection import generate_collection
 from simgen.dataset.software import versions
 from simgen.renderer import backend
@@ -57,10 +58,10 @@ def make_benchmark(
 def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
     """Compare all datasets in `out` with the published ones, and write the certificate there."""
     own: dict[str, Content] = {}
-    total = len(read_index(out))
-    for name, content in contents_of(out):
-        own[name] = content
-        report("certificate", len(own), total)
+    collection = open_collection(out)
+    for row, dataset in zip(collection.rows, collection, strict=True):
+        own[row["path"]] = content_of(dataset)
+        report("certificate", len(own), len(collection))
     published = published_contents(file)
     verdict = compare(own, published)
     document = {

@@ -7,6 +7,7 @@ import numpy as np
 from simgen.cameras.rig import Camera
 
 LEAST_STEP_PX = 8
+"""Sides of windows are multiples of this at least: smaller steps would save no time that can be measured."""
 
 Window = tuple[slice, slice]
 """Rows and columns of a film."""
