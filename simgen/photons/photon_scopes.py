@@ -22,10 +22,6 @@ class PhotonScopes:
     wanted: np.ndarray
 
     def __post_init__(self) -> None:
-        self.start()
-
-    def start(self) -> None:
-        """Forget what was drawn."""
         self.got = np.zeros(self.view.size, dtype=np.int64)
         self.tried = np.zeros(self.view.size, dtype=np.int64)
 

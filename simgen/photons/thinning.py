@@ -13,13 +13,15 @@ that are kept are the photons.
 Where a path exceeds the majorant (L > M) it gives floor(L / M) photons and one more with the remaining
 probability: the mean stays exact, but these photons come in clumps. Each round lifts the majorant where it
 was exceeded, for the rounds after it: a kept photon has the density L / E whatever majorant it was drawn
-from. Clumps are counted, and if a test of the counts could see them (`pairs_allowed`) everything is drawn
-anew from the majorant as it is by then.
+from. Photons are drawn in parts: all of some views, or a part of the exposure. Clumps are counted, and if a
+test of the counts could see those of all parts so far (`pairs_allowed`) the last part is drawn again from
+the majorant as it is by then.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,13 +36,16 @@ from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
 ATTEMPTS = 8
-"""Draws at most; of the least that exploration accepts, one in four within the rule, eight fail in 10 %."""
+"""Draws of a part at most; of the least that exploration accepts, one in four within the rule, eight fail
+in 10 % of cases."""
+
+Part = Callable[[int], Iterator[PhotonTable]]
+"""Rounds of a part, given which attempt it is."""
 
 
 @dataclass
 class _Tally:
     candidates: int = 0
-    paths: int = 0
     followed: int = 0
     kept: int = 0
     overshoot: int = 0
@@ -91,22 +96,12 @@ class _Drawing:
         self.tally = _Tally()
         self.explored, self.share = explored, explored.share
         self.majorant = None if explored.majorant is None else explored.majorant.copy()
-        self.attempt = 0
+        self.attempts, self.paths = 1, explored.paths
 
     def run(self, keeps_origins: bool) -> tuple[PhotonTable, dict[str, Any]]:
-        """Draw, anew if too many photons came in clumps."""
-        paths, drawn, allowed = self.explored.paths, no_photons(), 0.0
-        while self.majorant is not None:
-            drawn = no_photons()  # before as many are drawn again
-            self.scopes.start()
-            self.tally = _Tally()
-            rounds = self._exposed() if self.gain is not None else self._budgeted()
-            drawn = joined([no_photons(), *rounds]) if keeps_origins else self._summed(rounds)
-            paths += self.tally.paths
-            self.attempt += 1
-            allowed = pairs_allowed(self.tally.kept, math.prod(self.setup.grid.shape_KLHW))
-            if self.tally.pairs <= allowed or self.attempt == ATTEMPTS:
-                break
+        """Draw all parts, each again while too many photons come in clumps."""
+        parts = () if self.majorant is None else self._parts()
+        drawn = joined([no_photons(), *parts]) if keeps_origins else self._summed(parts)
         tally, scopes = self.tally, self.scopes
         log = {
             "method": "thinning",
@@ -116,12 +111,38 @@ class _Drawing:
             "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
             "overshoot_photons": tally.overshoot,
             "clump_pairs": tally.pairs,
-            "clump_pairs_allowed": allowed,
-            "attempts": self.attempt,
-            "paths": paths,
+            "clump_pairs_allowed": self._pairs_allowed(),
+            "attempts": self.attempts,
+            "paths": self.paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
         return drawn.by_pixel(self.setup.grid), log
+
+    def _parts(self) -> Iterator[PhotonTable]:
+        """All parts; where one remains beyond the rule it is the last."""
+        for part in self._exposed() if self.gain is not None else self._budgeted():
+            yield self._drawn(part)
+            if not self._is_within_rule():
+                return
+
+    def _drawn(self, part: Part) -> PhotonTable:
+        """A part, drawn again until it is within the rule, `ATTEMPTS` times at most."""
+        scopes, tally, attempt = self.scopes, self.tally, 0
+        got, tried = scopes.got, scopes.tried
+        while True:
+            scopes.got, scopes.tried, self.tally = got.copy(), tried.copy(), replace(tally)
+            photons = joined([no_photons(), *part(attempt)])
+            attempt += 1
+            self.attempts = max(self.attempts, attempt)
+            if self._is_within_rule() or attempt == ATTEMPTS:
+                return photons
+
+    def _is_within_rule(self) -> bool:
+        return self.tally.pairs <= self._pairs_allowed()
+
+    def _pairs_allowed(self) -> float:
+        """How many pairs of the photons so far may come from one path."""
+        return pairs_allowed(self.tally.kept, math.prod(self.setup.grid.shape_KLHW))
 
     def _summed(self, rounds: Iterable[PhotonTable]) -> PhotonTable:
         """A row for each pixel that caught photons, in all of these rounds."""
@@ -137,35 +158,39 @@ class _Drawing:
         assert self.majorant is not None
         return sampler_for(self.setup, self.majorant, self.groups, self.explored.ambient)
 
-    def _budgeted(self) -> Iterator[PhotonTable]:
-        """Rounds of candidates until every scope has its photons, or is dark."""
-        most_dark = self.explored.max_dark_candidates
-        for part, block in enumerate(self.scopes.blocks()):
+    def _budgeted(self) -> Iterator[Part]:
+        """Blocks of scopes, each in rounds of candidates until all have their photons, or are dark."""
+        most_dark, shown = self.explored.max_dark_candidates, 0
+
+        def block_of(part: int, block: np.ndarray, attempt: int) -> Iterator[PhotonTable]:
+            nonlocal shown
             round_number = 0
             while (wanting := np.intersect1d(self.scopes.open(most_dark), block)).size:
                 missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
                 candidates = candidates_needed(missing, round_number, self.share)
-                yield self._round(wanting, candidates, self._sampler(), part, round_number)
+                yield self._round(wanting, candidates, self._sampler(), part, attempt, round_number)
                 round_number += 1
-                got, wanted = int(self.scopes.got.sum()), int(self.scopes.wanted.sum())
-                self.report(self._stage("photons"), got, wanted)
+                shown = max(shown, int(self.scopes.got.sum()))  # never less, if a block is drawn again
+                self.report("photons", shown, int(self.scopes.wanted.sum()))
 
-    def _exposed(self) -> Iterator[PhotonTable]:
+        for part, block in enumerate(self.scopes.blocks()):
+            yield partial(block_of, part, block)
+
+    def _exposed(self) -> Iterator[Part]:
         """The exposure in as many equal parts as make its candidates fit a wavefront each."""
         assert self.gain is not None
-        views = np.arange(self.setup.grid.view_count)
-        parts = int(np.ceil(self.gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
-        for part in range(parts):
-            sampler = self._sampler()
-            rng = seeds.generator(self.seed, stage="exposure candidates", part=part, attempt=self.attempt)
-            candidates = rng.poisson(self.gain / parts * sampler.mass[0], views.size)
-            yield self._round(views, candidates, sampler, part)
-            self.report(self._stage("parts of the exposure"), part + 1, parts)
+        gain, views = self.gain, np.arange(self.setup.grid.view_count)
+        parts = int(np.ceil(gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
 
-    def _stage(self, what: str) -> str:
-        """Name of a stage in reports of progress; of another attempt it says why everything begins again."""
-        again = f", drawn again with a higher bound (attempt {self.attempt + 1})"
-        return what + again * (self.attempt > 0)
+        def exposed(part: int, attempt: int) -> Iterator[PhotonTable]:
+            sampler = self._sampler()
+            rng = seeds.generator(self.seed, stage="exposure candidates", part=part, attempt=attempt)
+            candidates = rng.poisson(gain / parts * sampler.mass[0], views.size)
+            yield self._round(views, candidates, sampler, part, attempt)
+            self.report("parts of the exposure", part + 1, parts)
+
+        for part in range(parts):
+            yield partial(exposed, part)
 
     def _round(
         self,
@@ -173,17 +198,18 @@ class _Drawing:
         candidates: np.ndarray,
         sampler: CandidateSampler,
         part: int,
+        attempt: int,
         round_number: int = 0,
     ) -> PhotonTable:
         """Photons of one round of a part of the work: so many candidates for each of these scopes."""
         owner = scopes.repeat(candidates)
         views = None if self.photons.scope == "scene" else self.scopes.view[owner]
         path_seed = seeds.integer(
-            self.seed, stage="candidate paths", part=part, attempt=self.attempt, round_number=round_number
+            self.seed, stage="candidate paths", part=part, attempt=attempt, round_number=round_number
         )
         found = sampler.try_candidates(self.scopes.group[owner], views, path_seed)
         # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
-        sampler.majorant.lift(found.over, reach=1 + self.attempt)
+        sampler.majorant.lift(found.over, reach=1 + attempt)
         path = np.arange(found.candidate.size).repeat(found.photons.n)
         scope = owner[found.candidate[path]]
         rank = places(scope) + self.scopes.got[scope]
@@ -193,7 +219,7 @@ class _Drawing:
         self.scopes.tried[scopes] += candidates
         self.tally.candidates += owner.size
         self.tally.followed += found.ratio.size
-        self.tally.paths += paths_of(sampler, owner.size, found.ratio.size)
+        self.paths += paths_of(sampler, owner.size, found.ratio.size)
         self.tally.kept += path.size
         of_path = np.bincount(path)
         self.tally.overshoot += int(np.maximum(of_path - 1, 0).sum())

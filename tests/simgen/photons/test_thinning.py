@@ -13,6 +13,7 @@ from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import as_rig
 from simgen.dataset.prepared import prepare
+from simgen.photons import thinning
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, plan
 from simgen.photons.exploration import Exploration, explore, pairs_allowed
@@ -375,26 +376,46 @@ def test_a_black_scene_gives_no_photons() -> None:
 
 
 @pytest.mark.parametrize("light", [{"budget": 300}, {"scope": "exposure"}])
-def test_each_attempt_is_a_stage_that_says_why_it_begins_again(
+def test_progress_never_runs_backwards_where_photons_are_drawn_again(
     scene: RenderScene, light: dict, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("simgen.photons.thinning.pairs_allowed", lambda *_: -1.0)  # never enough
     monkeypatch.setattr("simgen.photons.thinning.ATTEMPTS", 3)
-    told: list[tuple[str, int, int]] = []
+    reported: list[tuple[str, int, int]] = []
     setup, gain = Setup(scene, GRID, "GRBG", DEPTH), 0.01 if "scope" in light else None
-    thin_photons(
+    log = thin_photons(
         setup,
         Photons.model_validate(light),
         seed=1,
         photons_per_radiance=gain,
-        report=lambda *stage: told.append(stage),
-    )
-    what = "photons" if gain is None else "parts of the exposure"
-    again = [f"{what}, drawn again with a higher bound (attempt {number})" for number in (2, 3)]
-    assert list(dict.fromkeys(stage for stage, _, _ in told)) == [what, *again]
-    for name in (what, *again):
-        done = [count for stage, count, _ in told if stage == name]
-        assert done == sorted(done)  # a bar never runs backwards
+        report=lambda *stage: reported.append(stage),
+    )[1]
+    assert log["attempts"] == 3
+    assert {stage for stage, _, _ in reported} == {"photons" if gain is None else "parts of the exposure"}
+    done = [count for _, count, _ in reported]
+    assert done == sorted(done)
+
+
+def test_only_the_part_that_came_in_clumps_is_drawn_again(
+    scene: RenderScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("simgen.photons.photon_scopes.WAVEFRONT", 4000)  # one view in each part
+    monkeypatch.setattr("simgen.photons.thinning.pairs_allowed", lambda *_: 1e6)
+    setup, light = Setup(scene, GRID, "GRBG", DEPTH), Photons(budget=1000, statistics="multinomial")
+    drawn, parts = thinning._Drawing._round, []
+
+    def with_clumps(self: Any, *arguments: Any) -> PhotonTable:
+        parts.append(arguments[3:5])
+        photons = drawn(self, *arguments)
+        self.tally.pairs += 2_000_000 * (parts[-1] == (1, 0))
+        return photons
+
+    monkeypatch.setattr("simgen.photons.thinning._Drawing._round", with_clumps)
+    photons, log = thin_photons(setup, light, seed=1)
+    assert list(dict.fromkeys(parts)) == [(0, 0), (1, 0), (1, 1), (2, 0), (3, 0)]
+    assert log["attempts"] == 2
+    assert log["kept"] == 1000 * GRID.view_count
+    assert np.bincount(photons.k * GRID.cols + photons.l).tolist() == [1000] * GRID.view_count
 
 
 def test_clumps_of_the_allowed_share_are_one_standard_deviation_of_the_best_test() -> None:
