@@ -4,23 +4,16 @@ Run the script without arguments: it writes set_table.glb, scene.toml, meshes an
 the file lengths are metres and Y is up; the camera looks along -Z, tilted down.
 """
 
-import io
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from gltf_draft import QUAD, QUAD_FACES, QUAD_UV, GltfDraft
+from gltf_parts import Lathe, box, lathe, picture, surface, turn, write_scene
 
-import simgen
-from simgen.base.toml_layout import toml_text
-
-SECTORS = 32
 TILT_DEG = 14.0
 TITLE = "A set table, imported from glTF"
 DESCRIPTION = """
@@ -29,34 +22,6 @@ one is mirrored, on a mat of lace that an image cuts out. A panel out of view, a
 shine on them. Made as glTF by build_assets.py, which imports it as `simgen import-scene` does.
 """
 PLANES_MM = (560.0, 600.0, 710.0, 760.0, 815.0)
-
-Lathe = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-def lathe(profile: list[tuple[float, float]]) -> Lathe:
-    """A profile of (radius, height), outer side first, turned about Y: positions, faces, uv, normals."""
-    points = np.array(profile)
-    along = np.gradient(points, axis=0)
-    outwards = np.stack([along[:, 1], -along[:, 0]], axis=-1)
-    outwards /= np.linalg.norm(outwards, axis=-1, keepdims=True)
-    angle = np.linspace(0, 2 * np.pi, SECTORS + 1)
-    ring = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
-
-    def turned(radial: np.ndarray, height: np.ndarray) -> np.ndarray:
-        x, z = radial[:, None] * ring[:, 0], radial[:, None] * ring[:, 1]
-        return np.stack([x, np.broadcast_to(height[:, None], x.shape), z], axis=-1).reshape(-1, 3)
-
-    v = np.linspace(1, 0, len(points))
-    uv = np.stack(np.meshgrid(np.linspace(0, 1, SECTORS + 1), v), axis=-1).reshape(-1, 2)
-    corner = np.arange(uv.shape[0]).reshape(len(points), SECTORS + 1)
-    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
-    return (
-        turned(points[:, 0], points[:, 1]).astype("<f4"),
-        faces.ravel().astype("<u2"),
-        uv.astype("<f4"),
-        turned(outwards[:, 0], outwards[:, 1]).astype("<f4"),
-    )
 
 
 def with_handle(cup: Lathe) -> Lathe:
@@ -81,21 +46,6 @@ def with_handle(cup: Lathe) -> Lathe:
     )
 
 
-def box(x: float, y: float, z: float) -> Lathe:
-    """A box about its middle, each side with the whole picture."""
-    parts = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            normal = np.roll([sign, 0.0, 0.0], axis)
-            right = np.roll([0.0, 1.0, 0.0], axis)
-            up = np.cross(normal, right)
-            corners = normal + QUAD[:, :1] * right + QUAD[:, 1:2] * up
-            parts.append((corners * np.array([x, y, z]) / 2, np.repeat(normal[None], 4, axis=0)))
-    positions, normals = (np.concatenate(kind).astype("<f4") for kind in zip(*parts, strict=True))
-    faces = (4 * np.arange(6)[:, None] + QUAD_FACES).ravel().astype("<u2")
-    return positions, faces, np.tile(QUAD_UV, (6, 1)), normals
-
-
 PLATE = [(0, 0), (0.035, 0), (0.04, 0.002), (0.064, 0.009), (0.065, 0.011), (0.062, 0.0105)]
 PLATE += [(0.041, 0.0045), (0.036, 0.003), (0, 0.003)]
 BOWL = [(0, 0), (0.018, 0), (0.02, 0.003), (0.034, 0.014), (0.04, 0.03), (0.0385, 0.031), (0.036, 0.028)]
@@ -109,13 +59,6 @@ LANTERN = [(0, 0), (0.012, 0.001), (0.022, 0.01), (0.026, 0.026), (0.022, 0.042)
 SPOON = [(0, -0.02), (0.008, -0.017), (0.013, -0.007), (0.0125, 0.006), (0.007, 0.018), (0.003, 0.026)]
 SPOON += [(0.0025, 0.08), (0.004, 0.098), (0, 0.1)]
 NAPKIN = [(0.03, 0), (0.024, 0.02), (0.012, 0.045), (0.001, 0.07)]
-
-
-def picture(draft: GltfDraft, pixels: np.ndarray, **sampler: int) -> int:
-    """Pixels as a texture of the file."""
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "png", optimize=True)
-    return draft.texture(file.getvalue(), **sampler)
 
 
 def wallpaper() -> np.ndarray:
@@ -159,24 +102,6 @@ def stripes() -> np.ndarray:
         .repeat(16, axis=0)
         .astype(np.uint8)
     )
-
-
-def surface(name: str, roughness: float, **more: Any) -> dict[str, Any]:
-    """A material that is no metal unless it says so."""
-    numbers = {"metallicFactor": 0.0, "roughnessFactor": roughness, **more.pop("pbr", {})}
-    return {"name": name, "pbrMetallicRoughness": numbers, **more}
-
-
-def turn(x_deg: float = 0.0, y_deg: float = 0.0, z_deg: float = 0.0) -> list[float]:
-    """The quaternion of turns about Z, then X, then Y."""
-    result = np.array([0.0, 0.0, 0.0, 1.0])
-    for axis, degrees in ((1, y_deg), (0, x_deg), (2, z_deg)):
-        half = np.radians(degrees) / 2
-        other = np.zeros(4)
-        other[axis], other[3] = np.sin(half), np.cos(half)
-        xyz = result[3] * other[:3] + other[3] * result[:3] + np.cross(result[:3], other[:3])
-        result = np.array([*xyz, result[3] * other[3] - result[:3] @ other[:3]])
-    return result.tolist()
 
 
 def table() -> GltfDraft:
@@ -262,15 +187,8 @@ def table() -> GltfDraft:
 
 def main(folder: Path) -> None:
     """Write the file and the scene."""
-    (folder / "set_table.glb").write_bytes(table().glb())
-    with tempfile.TemporaryDirectory() as near:
-        said = simgen.import_scene(folder / "set_table.glb", Path(near) / "scene")
-        for file in said.folder.iterdir():
-            shutil.copyfile(file, folder / file.name)
     fields = {"title": TITLE, "description": DESCRIPTION.strip(), "planes_mm": PLANES_MM}
-    scene = simgen.load_scene(folder).change(**fields)
-    comments = ["Written by build_assets.py, which imports set_table.glb; lengths in mm."]
-    (folder / "scene.toml").write_text(toml_text(scene, comments), encoding="utf-8")
+    write_scene(folder / "set_table.glb", table(), **fields)
 
 
 if __name__ == "__main__":

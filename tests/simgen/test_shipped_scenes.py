@@ -33,6 +33,7 @@ SCRIPTS = sorted(
 )  # the bird takes its time
 GRID = coarser(Grid().camera_grid(), 128)
 BEYOND_THE_FILM = {
+    "chess": {"board", "rug", "curtain"},
     "cornell_box": {"floor", "ceiling", "left-wall", "right-wall"},
     "desk": {"desk", "wall"},
     "drawn_solids": {"desk", "wall"},
@@ -41,7 +42,7 @@ BEYOND_THE_FILM = {
     "set_table": {"table", "wall"},
     "shelf": {"board", "wall"},
 }
-HIDDEN = {"drawn_foliage": {"leaf-11"}, "set_table": {"lamp"}}
+HIDDEN = {"chess": {"lamp"}, "drawn_foliage": {"leaf-11"}, "set_table": {"lamp"}}
 """In a heap that is drawn one may lie behind another; a lamp may hang out of view."""
 MOST_PICTURE_BYTES, MOST_ASSET_BYTES = 60_000, 130_000
 
