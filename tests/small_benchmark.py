@@ -12,7 +12,7 @@ SCENE = {"kind": "separate", "half": "development", "recipe": "plain_pair"}
 DEFINITION: dict[str, Any] = {
     "name": "small",
     "title": "two scenes",
-    "photons_per_view": [30, 400],
+    "photons_per_view": [30, 1000],
     "brighter_photons_per_view": [3000],
     "seeds": [1, 2, 3],
     "frames": 200,

@@ -28,7 +28,15 @@ benchmark = App(
 
 
 @benchmark.command
-def run(method: str, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = ALONE) -> None:
+def run(
+    method: str,
+    *,
+    data: Data,
+    out: Out,
+    half: OfHalf = "test",
+    budget: tuple[str, ...] = (),
+    executor: Workers = ALONE,
+) -> None:
     """Run a method on the datasets of a benchmark and score it; run again to resume.
 
     OUT is an evaluation with submission.json beside it.
@@ -47,12 +55,22 @@ def run(method: str, *, data: Data, out: Out, half: OfHalf = "test", executor: W
         depth:module:function.
     out
         Folder for the scores: new, empty, or those of an earlier run, which is extended.
+    budget
+        Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
     from pcii.benchmark.benchmark_collection import open_benchmark
     from pcii.benchmark.submission_scores import run_method
 
     with Stages() as report:
-        result = run_method(method, open_benchmark(data), out, half=half, executor=executor, report=report)
+        result = run_method(
+            method,
+            open_benchmark(data),
+            out,
+            half=half,
+            budgets=budget,
+            executor=executor,
+            report=report,
+        )
     _tell(out, result)
 
 

@@ -1,7 +1,9 @@
 """The datasets of a benchmark, which `simgen benchmark make` makes, by half."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.io.collection import Collection, open_collection
@@ -18,12 +20,34 @@ class BenchmarkCollection:
 
     def datasets(self, half: Half) -> list[Dataset]:
         """The datasets of one half, opened; `InputError` if one is damaged, or there is none."""
+        return list(self._of(half))
+
+    def full_light(self, half: Half) -> dict[str, Dataset]:
+        """By the name of each dataset of one half: that in full light of the same scene, if it is there."""
+        chosen = self._of(half)
+        lit = chosen.where(lambda row: row["values"]["light"] == "full-light")
+        by_scene = {_scene(row): dataset for row, dataset in zip(lit.rows, lit, strict=True)}
+        return {row["path"]: by_scene[_scene(row)] for row in chosen.rows if _scene(row) in by_scene}
+
+    def first_draws(self, half: Half) -> dict[str, str]:
+        """Names of the datasets of one half that are the first draw of a scene's photons, and its name."""
+        found: dict[str, str] = {}
+        for row in self._of(half).rows:
+            if row["values"]["light"] == "photons":
+                found.setdefault(_scene(row), row["path"])
+        return {path: scene for scene, path in found.items()}
+
+    def _of(self, half: Half) -> Collection:
         chosen = self.collection.where(lambda row: row["values"]["half"] == half)
         if not len(chosen):
             raise InputError(
                 f"{chosen.path}: has no dataset of the {half} half; `simgen benchmark make` makes it"
             )
-        return list(chosen)
+        return chosen
+
+
+def _scene(row: Mapping[str, Any]) -> str:
+    return row["values"]["name"]
 
 
 def open_benchmark(path: Path) -> BenchmarkCollection:

@@ -1,6 +1,7 @@
 """One page of all submissions in a folder: ranks, lines over light, best and worst scenes, and commands."""
 
 import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
+from pcii.benchmark.submission_pictures import TYPICAL_PHOTONS, picture_name
 from pcii.benchmark.submission_scores import SUBMISSION, by_scene
 from pcii.evaluation.pages import page
 from pcii.evaluation.paired_tests import mean_interval, positive_mean_interval
@@ -16,25 +18,39 @@ from pcii.evaluation.pooling import pooled_tables
 from pcii.evaluation.rows import Row, all_rows, by_light
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import Table, budget_name, with_interval
+from pcii.figures.pictures import uri_of
 from pcii.io.evaluation_layout import read_evaluation
 from pcii.store.safe_files import write_bytes_safely
 
-ORACLE = "oracle (masks from the true depth)"
 SCENES_NAMED = 3
-"""So many of the best and of the worst scenes of each method are named."""
-TYPICAL_PHOTONS = 1000.0
-"""Photons per view at which scenes and times are compared: those of the paper."""
+"""So many of the best and of the worst scenes of each method are shown."""
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What methods of one kind are compared by: the part of a result, and the sign that makes more better."""
+    """What methods are compared by: the part of a result and a measure in it, and the bound on that.
+
+    `sign` makes more better. Only those that are `pictured` show their best and worst scenes.
+    """
 
     title: str
     part: str
     measure: str
     words: str
     sign: int
+    bound: str = ""
+    limits: tuple[float, float] = (0.0, 1.0)
+    pictured: bool = True
+
+    def bound_of(self, result: Mapping[str, Any]) -> float | None:
+        """The bound at the light of a result, if there is one and the result has it."""
+        if self.part == "object":
+            oracle = result["object"].get("iou_oracle")
+            return None if oracle is None else oracle["mean"]
+        if not self.bound:
+            return None
+        objects = result.get("bounds", {}).get("objects", ())
+        return _mean([entry["depth_sigma_px"]["mean"] for entry in objects if entry["depth_sigma_px"]])
 
 
 KINDS = (
@@ -42,10 +58,22 @@ KINDS = (
         "Removal of defocused points",
         "object",
         "iou",
-        "IoU with the objects of each plane: more is better",
+        "IoU with the objects of each plane: more is better. The oracle knows the true depth of each pixel",
         1,
+        "oracle (masks from the true depth)",
     ),
-    Kind("Depth", "depth", "bad_1px", "share of pixels off by more than 1 px: less is better", -1),
+    Kind("Depth", "depth", "bad_1px", "Share of pixels off by more than 1 px: less is better", -1),
+    Kind(
+        "Error of depth",
+        "depth",
+        "median_px",
+        "Median error of the pixels with an answer: less is better. The Cramér-Rao bound is the least "
+        "standard deviation of the depth of an object as a whole, given its photons and its texture",
+        -1,
+        "bound for whole objects (Cramér-Rao)",
+        (0.0, math.inf),
+        pictured=False,
+    ),
 )
 
 
@@ -70,12 +98,14 @@ def write_page(folder: Path, out: Path) -> int:
             made_by[method] = said["folder"]
     evaluation = summarise([row for _, rows in submissions for row in by_scene(rows)])
     said_of = {said["folder"]: said for said, _ in submissions}
-    kinds = [part for kind in KINDS if (part := _kind(kind, evaluation["groups"])) is not None]
+    folder_of = {method: folder / name for method, name in made_by.items()}
+    kinds = [part for kind in KINDS if (part := _kind(kind, evaluation["groups"], folder_of)) is not None]
     content = {
         "benchmark": submissions[0][0]["benchmark"],
         "half": submissions[0][0]["half"],
         "scenes": len({group["title"] for group in evaluation["groups"]}),
         "kinds": kinds,
+        "typical": f"{TYPICAL_PHOTONS:g}",
         "ranks": pooled_tables(evaluation),
         "submissions": _submissions(made_by, said_of, evaluation["groups"]),
     }
@@ -96,22 +126,25 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[Row]]:
         return said, rows
 
 
-def _kind(kind: Kind, groups: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
-    """What the page says of methods of one kind; None if there are none."""
+def _kind(
+    kind: Kind, groups: Sequence[Mapping[str, Any]], folder_of: Mapping[str, Path]
+) -> dict[str, Any] | None:
+    """What the page says of methods by one measure; None if there are none."""
     cells: dict[tuple[str, Any], dict[str, Any]] = {}
     for group in groups:
         for row in group["results"]:
             scores = row.get(kind.part, {})
             if scores.get(kind.measure) is None:
                 continue
-            cell = cells.setdefault((row["method"], row["budget"]), {"photons": [], "seconds": [], "of": {}})
-            cell["of"][group["title"]] = scores[kind.measure]["mean"]
-            cell["photons"] += [] if row["photons_per_view"] is None else [row["photons_per_view"]]
-            cell["seconds"] += [] if row["seconds"] is None else [row["seconds"]["mean"]]
-            if kind.part == "object" and row["pixel"].get("iou_oracle") is not None:
-                oracle = cells.setdefault((ORACLE, row["budget"]), {"photons": [], "seconds": [], "of": {}})
-                oracle["of"][group["title"]] = row["pixel"]["iou_oracle"]["mean"]
-                oracle["photons"] = cell["photons"]
+            found = {row["method"]: scores[kind.measure]["mean"]}
+            if (bound := kind.bound_of(row)) is not None:
+                found[kind.bound] = bound
+            for name, value in found.items():
+                cell = cells.setdefault((name, row["budget"]), {"photons": [], "seconds": [], "of": {}})
+                cell["of"][group["title"]] = value
+                cell["photons"] += [] if row["photons_per_view"] is None else [row["photons_per_view"]]
+                if name != kind.bound and row["seconds"] is not None:
+                    cell["seconds"].append(row["seconds"]["mean"])
     if not cells:
         return None
     results = [
@@ -120,18 +153,21 @@ def _kind(kind: Kind, groups: Sequence[Mapping[str, Any]]) -> dict[str, Any] | N
             "budget": budget,
             "photons_per_view": _mean(cell["photons"]),
             "seconds": positive_mean_interval(cell["seconds"]).figures() if cell["seconds"] else None,
-            kind.part: {kind.measure: mean_interval([*cell["of"].values()], (0.0, 1.0)).figures()},
+            kind.part: {kind.measure: mean_interval([*cell["of"].values()], kind.limits).figures()},
         }
         for (method, budget), cell in sorted(cells.items(), key=lambda item: by_light(item[0][1]))
     ]
-    methods = sorted({method for method, _ in cells} - {ORACLE})
-    drawn = [*methods, ORACLE] if any(method == ORACLE for method, _ in cells) else methods
+    methods = sorted({method for method, _ in cells} - {kind.bound})
+    drawn = [*methods, kind.bound] if any(method == kind.bound for method, _ in cells) else methods
     return {
         "title": kind.title,
         "words": kind.words,
         "plot": accuracy_plots({"results": results}, drawn, kind.measure),
         "table": _over_light(kind, results, drawn),
-        "scenes": _best_and_worst(kind, cells, methods),
+        "by_scene": _by_scene(cells, drawn),
+        "scenes": [_best_and_worst(kind, cells, method, folder_of[method]) for method in methods]
+        if kind.pictured
+        else [],
     }
 
 
@@ -153,19 +189,29 @@ def _over_light(kind: Kind, results: Sequence[Mapping[str, Any]], methods: Seque
     return Table("By photons per view", header, tuple(rows))
 
 
+def _by_scene(cells: Mapping[tuple[str, Any], Mapping[str, Any]], methods: Sequence[str]) -> Table:
+    """The measure of each method on each scene at `TYPICAL_PHOTONS`, means over seeds."""
+    of = {method: cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"] for method in methods}
+    scenes = dict.fromkeys(scene for own in of.values() for scene in own)
+    rows = [
+        (scene, *(f"{own[scene]:.3f}" if scene in own else "–" for own in of.values())) for scene in scenes
+    ]
+    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *methods), tuple(rows))
+
+
 def _best_and_worst(
-    kind: Kind, cells: Mapping[tuple[str, Any], Mapping[str, Any]], methods: Sequence[str]
-) -> Table:
-    """Scenes that each method does best and worst at `TYPICAL_PHOTONS`, with their scores."""
-    rows = []
-    for method in methods:
-        of = cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"]
-        order = sorted(of, key=lambda scene: -kind.sign * of[scene])
-        best, worst = order[:SCENES_NAMED], order[::-1][:SCENES_NAMED]
-        words = (", ".join(f"{scene} {of[scene]:.2f}" for scene in scenes) for scenes in (best, worst))
-        rows.append((method, *words))
-    header = ("method", "best", "worst")
-    return Table(f"Scenes at {TYPICAL_PHOTONS:g} photons per view", header, tuple(rows), words=3)
+    kind: Kind, cells: Mapping[tuple[str, Any], Mapping[str, Any]], method: str, folder: Path
+) -> dict[str, Any]:
+    """Scenes that a method does best and worst at `TYPICAL_PHOTONS`, each with its score and picture."""
+    of = cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"]
+    order = sorted(of, key=lambda scene: -kind.sign * of[scene])
+    shown = order if len(order) <= 2 * SCENES_NAMED else [*order[:SCENES_NAMED], *order[-SCENES_NAMED:]]
+    scenes = []
+    for scene in shown:
+        file = folder / picture_name(kind.part, scene)
+        picture = uri_of("webp", file.read_bytes()) if file.is_file() else None
+        scenes.append({"name": scene, "score": f"{of[scene]:.2f}", "picture": picture})
+    return {"method": method, "scenes": scenes}
 
 
 def _submissions(

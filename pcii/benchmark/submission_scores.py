@@ -12,22 +12,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.benchmark.benchmark_collection import BenchmarkCollection
-from pcii.benchmark.submitted_maps import (
-    has_depth,
-    has_masks,
-    light_folder,
-    submitted_depth,
-    submitted_masks,
-)
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.evaluation.comparison import EvaluationJob, measure
+from pcii.benchmark.benchmark_jobs import BenchmarkJob, SubmissionJob, given_maps
+from pcii.benchmark.submission_pictures import PICTURES
+from pcii.benchmark.submitted_maps import has_depth, has_masks, light_folder
+from pcii.evaluation.comparison import measure
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import (
     Function,
@@ -37,13 +30,12 @@ from pcii.evaluation.method_names import (
     full_name,
     named_functions,
 )
-from pcii.evaluation.rows import Row, all_rows
+from pcii.evaluation.rows import Row, all_rows, by_light
 from pcii.evaluation.summary import summarise
+from pcii.evaluation.tables import budget_name
 from pcii.evaluation.tasks import Task, lights_of, tasks_of
 from pcii.io.collection_layout import Half
-from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
-from pcii.io.suggested_depths import planes_of
-from pcii.sections.reconstruction import reconstruct
+from pcii.io.dataset import FULL_LIGHT, Budget, Dataset, budget_of
 from pcii.store.safe_files import named_in_errors, write_json_safely
 
 SUBMISSION = "submission.json"
@@ -59,25 +51,36 @@ def run_method(
     out: Path,
     *,
     half: Half = "test",
+    budgets: Sequence[float | str] = (),
     executor: Executor = ALONE,
     report: Report = silent,
 ) -> dict[str, Any]:
     """Score a method on one half of a benchmark, in the folder `out`; the figures of `summarise`.
 
     `method` is a name, as of `pcii.evaluate`, or "module:function" for a removal of one's own, and
-    "depth:module:function" for depth. Rows that are in the folder already are kept, as by `evaluate`. Raises
-    `InputError` for a method that is not there, and as `evaluate` does.
+    "depth:module:function" for depth. Without `budgets` it is scored at all light that there is. Rows that
+    are in the folder already are kept, as by `evaluate`. Raises `InputError` for a method that is not there,
+    for budgets that no dataset has, and as `evaluate` does.
     """
     named = named_functions([_method(method)])
     (name,) = named
+    chosen: set[Budget] = {budget_of(each) if isinstance(each, str) else each for each in budgets}
     tasks: list[Task] = []
     for dataset in data.datasets(half):
-        lights = [each for each in lights_of(dataset) if each is not None and _takes(name, named, each)]
+        lights = [
+            each
+            for each in lights_of(dataset)
+            if each is not None and each in (chosen or {each}) and _takes(name, named, each)
+        ]
         if lights:
             tasks += tasks_of([dataset], named, lights)
+    if not tasks and chosen:
+        words = ", ".join(budget_name(each) for each in sorted(chosen, key=by_light))
+        raise InputError(f"budget: no dataset of the {half} half that {name!r} can take has {words}")
     # Of the last dataset's tasks the full name: "depth" is the default method of depth.
     said = {"method": tasks[-1].method if tasks else name, "made": "run by pcii benchmark run"}
-    return _scored(EvaluationJob(tasks, out.resolve()), data, half, said, executor, report)
+    job = BenchmarkJob(tasks, out.resolve(), data.full_light(half), data.first_draws(half))
+    return _scored(job, data, half, said, executor, report)
 
 
 def score_submission(
@@ -107,30 +110,8 @@ def score_submission(
     if faults:
         more = f"; and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
         raise InputError("; ".join(faults[:MOST_FAULTS]) + more)
-    return _scored(SubmissionJob(tasks, out.resolve(), folder), data, half, said, executor, report)
-
-
-class SubmissionJob(EvaluationJob):
-    """The job of scoring maps in a folder: each task reads what there is instead of calling a method."""
-
-    def __init__(self, tasks: Sequence[Task], out: Path, folder: Path) -> None:
-        super().__init__(tasks, out)
-        self.folder = folder
-
-    def estimated(self, task: Task, data: Dataset) -> tuple[float | None, Segmented | DepthMap]:
-        """The result of a task, of which nobody measured the time."""
-        given = given_maps(self.folder, task)
-        if isinstance(given, DepthMap):
-            return None, given
-        return None, Segmented(given, task.method, reconstruct(data.counts, planes_of(data, ())))
-
-
-def given_maps(folder: Path, task: Task) -> np.ndarray | DepthMap:
-    """Depth, or masks (Z, H, W) bool, of a task in a submission; `InputError`, naming the file."""
-    inside = folder / task.dataset.name / light_folder(task.budget)
-    if estimator_of(task.method) is not None:
-        return submitted_depth(inside, task.dataset)
-    return submitted_masks(inside, task.dataset)
+    job = SubmissionJob(tasks, out.resolve(), data.full_light(half), data.first_draws(half), folder)
+    return _scored(job, data, half, said, executor, report)
 
 
 def read_submission(folder: Path, data: BenchmarkCollection) -> dict[str, Any]:
@@ -196,7 +177,7 @@ def _submitted(folder: Path, datasets: Sequence[Dataset], method: str) -> tuple[
 
 
 def _scored(
-    job: EvaluationJob,
+    job: BenchmarkJob,
     data: BenchmarkCollection,
     half: Half,
     said: Mapping[str, Any],
@@ -212,7 +193,7 @@ def _scored(
     with all_rows(out) as rows, named_in_errors(out):
         result = summarise(by_scene(rows)) | {"again": again}
         write_json_safely(out / SUBMISSION, entry)
-        write_evaluation(out, result, (SUBMISSION,))
+        write_evaluation(out, result, (SUBMISSION, PICTURES))
     return result
 
 

@@ -246,7 +246,7 @@ class EvaluationJob:
         }
         if isinstance(estimate, DepthMap):
             depth = dict(score(None, estimate, data.truth, grid=data.grid).depth)
-            return row | {"depth": depth} | self._bounds(data, seen, task.z_mm)
+            return row | {"depth": depth} | self._bounds(task, data, seen)
         result = score(estimate, None, data.truth)
         planes = [
             {name: value for name, value in (bound | plane).items() if name != "method"}
@@ -254,13 +254,18 @@ class EvaluationJob:
         ]
         return row | {"planes": planes, "objects": [dict(entry) for entry in result.objects]}
 
-    def _bounds(self, data: Dataset, seen: PhotonCounts | Views, z_mm: Sequence[float]) -> Row:
+    def full_light_of(self, task: Task) -> Dataset:
+        """The dataset from whose radiance the texture of a task's objects is known, if it has any."""
+        return task.dataset
+
+    def _bounds(self, task: Task, data: Dataset, seen: PhotonCounts | Views) -> Row:
         """`bounds` of the depth of objects from these photons, if there is radiance to know textures from."""
-        views, truth = data.views, data.truth
+        lit, truth, z_mm = self.full_light_of(task), data.truth, task.z_mm
+        views = lit.views
         if not isinstance(seen, PhotonCounts) or views is None or not (z_mm or data.analysis.get("z_mm")):
             return {}
         assert truth is not None
-        planes, identity = planes_of(data, z_mm), identity_of(data.manifest)
+        planes, identity = planes_of(data, z_mm), identity_of(lit.manifest)
         if self.full_light is None or self.full_light[0] != identity:
             self.full_light = identity, reconstruct(views, planes)
         # By their origin where that is known, so no sections are needed to count photons.

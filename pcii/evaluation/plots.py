@@ -17,8 +17,11 @@ if TYPE_CHECKING:
 MEASURES = {
     "iou": ("object", "IoU, mean over planes"),
     "bad_1px": ("depth", "share of errors of depth above 1 px"),
+    "median_px": ("depth", "median error of depth, px of total disparity"),
 }
 """What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
+NO_SHARES = {"median_px"}
+"""Those that are no shares from 0 to 1; their axes are logarithmic."""
 PANELS = 4
 """Panels of the calibration plots, side by side."""
 
@@ -53,7 +56,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     photons = [row["photons_per_view"] for row in group["results"] if row["photons_per_view"] is not None]
     for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
         axes.set_xlabel(name)
-        _frame(axes)
+        _frame(axes, is_share=measure not in NO_SHARES)
         if axes is by_seconds or (photons and min(photons) > 0):
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -126,9 +129,13 @@ def _style(number: int) -> dict[str, Any]:
     }
 
 
-def _frame(axes: "Axes") -> None:
-    """A vertical axis of shares, and a grid without a box."""
-    axes.set_ylim(-0.02, 1.02)
+def _frame(axes: "Axes", *, is_share: bool = True) -> None:
+    """A vertical axis of shares or of logarithms, and a grid without a box."""
+    if is_share:
+        axes.set_ylim(-0.02, 1.02)
+    else:
+        axes.set_yscale("log")
+        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.grid(True, color="#d9dde5", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
 

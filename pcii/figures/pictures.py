@@ -120,10 +120,10 @@ def uri_of(kind: str, content: bytes) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-def photo_uri(image: np.ndarray) -> str:
-    """An 8-bit RGB image, of which the eye would not miss the finest noise, as a data URI of a WebP picture.
+def photo_bytes(image: np.ndarray) -> bytes:
+    """An 8-bit RGB image, of which the eye would not miss the finest noise, as WebP.
 
-    It takes about a fifth of the bytes of `data_uri`. Small images keep every bit.
+    It takes about a fifth of the bytes of `png_bytes`. Small images keep every bit.
     """
     from PIL import Image
 
@@ -132,7 +132,12 @@ def photo_uri(image: np.ndarray) -> str:
     Image.fromarray(np.ascontiguousarray(image)).save(
         buffer, format="WEBP", quality=PHOTO_QUALITY, method=4, lossless=lossless
     )
-    return uri_of("webp", buffer.getvalue())
+    return buffer.getvalue()
+
+
+def photo_uri(image: np.ndarray) -> str:
+    """`photo_bytes` as a data URI."""
+    return uri_of("webp", photo_bytes(image))
 
 
 def write_png(path: Path, image: np.ndarray) -> None:

@@ -152,12 +152,15 @@ def _texture(
 
     if plane is None:
         return None
-    blur = blur_half_extent_px(full_light.grid, truth.z_mm, full_light.z_mm[plane])
-    sharp = (truth.object_id == number) & (blur <= FOCUS_TOLERANCE_PX)
+    rows, cols = (np.flatnonzero((truth.object_id == number).any(axis=axis)) for axis in (1, 0))
+    # Its box is enough: what is away from edges is farther from them than the smoothing reaches.
+    box = np.s_[rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+    blur = blur_half_extent_px(full_light.grid, truth.z_mm[box], full_light.z_mm[plane])
+    sharp = (truth.object_id[box] == number) & (blur <= FOCUS_TOLERANCE_PX)
     inside = binary_erosion(sharp, iterations=AWAY_FROM_EDGES_PX)
     if not inside.any():
         return None
-    return log_gradient_squared(full_light.counts[plane], full_light.coverage[plane], inside)
+    return log_gradient_squared(full_light.counts[plane][box], full_light.coverage[plane][box], inside)
 
 
 def _iou(claimed: np.ndarray, true: np.ndarray) -> float:

@@ -33,13 +33,14 @@ def make(
     """Make the datasets of a benchmark, and compare them with the published ones; run again to resume.
 
     OUT is a collection with a folder for each dataset, and certificate.json, which says whether they have the
-    published bytes or, on another kind of machine, are draws of the same light.
+    published bytes or, on another kind of machine, are draws of the same light, on which a simple method has
+    the published scores.
 
     Examples of use:
 
         simgen benchmark make -o out/bench
         simgen benchmark make -o out/bench --half development --workers 2
-        simgen benchmark make -o out/bench --scene ball-and-bird --scene leaves
+        simgen benchmark make -o out/bench --scene ball-and-bird --scene foliage
 
     Parameters
     ----------

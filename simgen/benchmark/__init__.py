@@ -8,4 +8,5 @@ definition          What a benchmark is: its scenes, each of a kind and in one h
                     its seeds.
 making              Making a benchmark: all of its datasets as one collection, and the certificate of what
                     they are.
+reference_method    Scores of a simple method: whether photons of other bytes are as hard as those published.
 """

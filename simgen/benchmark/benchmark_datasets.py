@@ -63,7 +63,7 @@ class BenchmarkDatasets:
         """The recipe of a dataset; `InputError` if the definition makes none."""
         scene, light, seed = self.pieces[number]
         first = self.definition.seeds[0]
-        brighter = self.definition.brighter_photons_per_view if seed == first else ()
+        brighter = self.definition.brighter_photons_per_view if seed == first and scene.brighter else ()
         *fewer, most = *self.definition.photons_per_view, *brighter
         settings = [
             *self.definition.set,

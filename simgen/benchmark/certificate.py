@@ -90,7 +90,8 @@ def compare(own: Mapping[str, Content], published: Mapping[str, Content]) -> Ver
         if lights[0].shape != lights[1].shape or not np.allclose(*lights, rtol=LIGHT_TOLERANCE):
             problems.append(f"{name}: its views have other light than the published ones")
     least_p = min([1.0, *(p * len(tests) for p in tests.values())])
-    return Verdict(len(own), len(own) - len(others), least_p, tuple(problems))
+    same_bytes = len(own.keys() & published.keys()) - len(others)
+    return Verdict(len(own), same_bytes, least_p, tuple(problems))
 
 
 def _photons_p(ours: Content, theirs: Content) -> float:

@@ -35,6 +35,8 @@ class Scene(Strict):
     """Values that differ from the recipe's, as `--set` takes them."""
     frames: bool = False
     """Whether its photons are given as binary frames too."""
+    brighter: bool = True
+    """Whether its first draw has the brighter light too."""
 
 
 class Definition(Strict):

@@ -1,7 +1,7 @@
 """Making a benchmark: all of its datasets as one collection, and the certificate of what they are."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from simgen.base.strict_models import suggestion
 from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
 from simgen.benchmark.certificate import Content, Verdict, compare, content_of
 from simgen.benchmark.definition import Definition
+from simgen.benchmark.reference_method import Scores, differing_scores, reference_scores
 from simgen.collection.whole_collection import generate_collection
 from simgen.dataset.software import versions
 from simgen.renderer import backend
@@ -56,14 +57,22 @@ def make_benchmark(
 
 
 def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
-    """Compare all datasets in `out` with the published ones, and write the certificate there."""
+    """Compare all datasets in `out` with the published ones, and write the certificate there.
+
+    Only where their bytes differ, or where nothing is published, a simple method is scored on them too.
+    """
     own: dict[str, Content] = {}
     collection = open_collection(out)
     for row, dataset in zip(collection.rows, collection, strict=True):
         own[row["path"]] = content_of(dataset)
         report("certificate", len(own), len(collection))
-    published = published_contents(file)
-    verdict = compare(own, published)
+    published = published_certificate(file)
+    verdict = compare(own, published.get("datasets", {}))
+    scores: Scores = {}
+    if verdict.same_bytes < verdict.compared:
+        scores = reference_scores(out, dict.fromkeys(row["values"]["half"] for row in collection.rows))
+        problems = differing_scores(scores, published.get("reference_scores", {}))
+        verdict = replace(verdict, problems=(*verdict.problems, *problems))
     document = {
         "benchmark": definition.name,
         "definition_sha256": hash_json(definition.model_dump(mode="json")),
@@ -71,15 +80,14 @@ def certify(definition: Definition, file: Path, out: Path, report: Report = sile
         "backend": backend.describe(),
         "versions": versions(),
         **asdict(verdict),
+        "reference_scores": scores,
         "datasets": own,
     }
     write_json_safely(out / CERTIFICATE, document)
     return verdict
 
 
-def published_contents(file: Path) -> dict[str, Any]:
-    """Contents of the published datasets by name, from the file beside that of the definition."""
+def published_certificate(file: Path) -> dict[str, Any]:
+    """The certificate of the published datasets: a file beside that of the definition; empty without one."""
     published = file.with_suffix(f".{CERTIFICATE}")
-    if not published.is_file():
-        return {}
-    return json.loads(published.read_text())["datasets"]
+    return json.loads(published.read_text()) if published.is_file() else {}

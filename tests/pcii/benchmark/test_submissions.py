@@ -1,6 +1,7 @@
 """Methods run on a small benchmark, maps made elsewhere, and submissions with faults."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +15,7 @@ from pcii.app.commands import app
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.benchmark.benchmark_collection import open_benchmark
-from pcii.benchmark.benchmark_page import write_page
+from pcii.benchmark.benchmark_page import KINDS, write_page
 from pcii.benchmark.submission_scores import SUBMISSION, run_method, score_submission
 from pcii.io.verification import verify
 from pcii.pictures.written_pixels import write_pfm, write_png
@@ -88,13 +89,18 @@ def test_maps_made_elsewhere_score_as_the_method_that_made_them(
             assert one.keys() == other.keys()
             # Of single precision in PFM.
             np.testing.assert_allclose([*one.values()], [*other.values()], rtol=1e-4, atol=2e-4)
-    assert {budget for _, budget in found} == {30.0, 400.0, 3000.0, "full-light"}
-    assert found["pair", 400.0]["seeds"] == 3
+    assert {budget for _, budget in found} == {30.0, 1000.0, 3000.0, "full-light"}
+    assert found["pair", 1000.0]["seeds"] == 3
     assert found["pair", 3000.0]["seeds"] == 1
     said = json.loads((tmp_path / "given" / SUBMISSION).read_text())
     assert (said["method"], said["authors"], said["half"]) == ("mine", "A. N.", HALF)
     assert said["peak_memory_mb"] > 0
     verify(tmp_path / "given")
+    few, many = (
+        [entry["depth_sigma_px"]["mean"] for entry in found["pair", photons]["bounds"]["objects"]]
+        for photons in (30.0, 3000.0)
+    )
+    assert few == pytest.approx([10 * sigma for sigma in many], rel=0.2)  # as the root of the photons
 
 
 def test_a_function_of_ones_own_is_run(
@@ -120,15 +126,24 @@ def test_a_function_of_ones_own_is_run(
 def test_one_page_has_all_submissions(small_benchmark: Path, submitted: Path, tmp_path: Path) -> None:
     data, folder, out = open_benchmark(small_benchmark), tmp_path / "submissions", tmp_path / "page.html"
     score_submission(submitted, data, folder / "theirs", half=HALF)
-    run_method("depth:variance-sweep", data, folder / "ours", half=HALF)
+    run_method("depth:posterior", data, folder / "ours", half=HALF)
     assert command_line.run(app, ["benchmark", "page", str(folder), "-o", str(out)]) == 0
     text = out.read_text()
     assert "small: methods compared" in text
-    for method in ("mine", "depth:mine", "depth:variance-sweep", "oracle (masks from the true depth)"):
+    for method in (
+        "mine",
+        "depth:mine",
+        "depth:posterior",
+        *(kind.bound for kind in KINDS if kind.bound),
+    ):
         assert f">{method}</td>" in text
+    # One scene of each, with its picture.
+    assert re.findall(r'<img src="data:image/webp[^>]*alt="([^"]*)"', text) == [
+        f"Truth and result of {method}: pair" for method in ("mine", "depth:mine", "depth:posterior")
+    ]
     assert "pcii benchmark score theirs --data BENCHMARK --half development -o OUT" in text
     shutil.copytree(folder / "ours", folder / "again")
-    with pytest.raises(InputError, match="again and ours are both of 'depth:variance-sweep'"):
+    with pytest.raises(InputError, match="again and ours are both of 'depth:posterior'"):
         write_page(folder, out)
     with pytest.raises(InputError, match=r"has no folder with submission\.json"):
         write_page(tmp_path / "submissions" / "ours", out)
@@ -157,52 +172,52 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "light that is not there": (
         lambda f: (f / "pair_photons_1" / "500").mkdir(),
-        "500: expected a folder for each light, 30, 400, 3000",
+        "500: expected a folder for each light, 30, 1000, 3000",
     ),
     "an empty folder": (
-        lambda f: [each.unlink() for each in (f / "pair_photons_1" / "400").iterdir()],
-        "400: has neither a depth map nor masks",
+        lambda f: [each.unlink() for each in (f / "pair_photons_1" / "1000").iterdir()],
+        "1000: has neither a depth map nor masks",
     ),
     "missing pieces": (
-        lambda f: shutil.rmtree(f / "pair_photons_2" / "400"),
-        "pair_photons_2/400: has no masks",
+        lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
+        "pair_photons_2/1000: has no masks",
     ),
     "a map of another size": (
-        lambda f: rewritten(f / "pair_photons_1" / "400" / "depth.npz", z_mm=np.ones((130, 14))),
+        lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.ones((130, 14))),
         r"depth.npz: z_mm: expected numbers \(130, 140\), got float64 \(130, 14\)",
     ),
     "depths below 0": (
-        lambda f: rewritten(f / "pair_photons_1" / "400" / "depth.npz", z_mm=-np.ones(SHAPE)),
+        lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=-np.ones(SHAPE)),
         "depth.npz: z_mm: depths are above 0 mm",
     ),
     "confidence above 1": (
         lambda f: rewritten(
-            f / "pair_photons_1" / "400" / "depth.npz", z_mm=np.ones(SHAPE), confidence=2 * np.ones(SHAPE)
+            f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.ones(SHAPE), confidence=2 * np.ones(SHAPE)
         ),
         "confidence: expected numbers from 0 to 1",
     ),
     "other arrays": (
-        lambda f: rewritten(f / "pair_photons_1" / "400" / "depth.npz", disparity=np.ones(SHAPE)),
+        lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", disparity=np.ones(SHAPE)),
         "depth.npz: expected the arrays z_mm, confidence, got disparity",
     ),
     "objects": (
-        lambda f: rewritten(f / "pair_photons_1" / "400" / "depth.npz", z_mm=np.full(SHAPE, None)),
+        lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.full(SHAPE, None)),
         "depth.npz: damaged, or no .npz file of plain numbers",
     ),
     "a file that is none": (
-        lambda f: (f / "pair_photons_1" / "400" / "masks.npz").write_bytes(b"PK"),
+        lambda f: (f / "pair_photons_1" / "1000" / "masks.npz").write_bytes(b"PK"),
         "masks.npz: damaged, or no .npz file",
     ),
     "masks of shares": (
-        lambda f: rewritten(f / "pair_photons_1" / "400" / "masks.npz", in_focus=np.full((2, *SHAPE), 0.5)),
+        lambda f: rewritten(f / "pair_photons_1" / "1000" / "masks.npz", in_focus=np.full((2, *SHAPE), 0.5)),
         "in_focus: expected 0 and 1",
     ),
     "a mask of another depth": (
-        lambda f: (f / "pair_photons_2" / "400").joinpath("mask_7.png").write_bytes(b""),
+        lambda f: (f / "pair_photons_2" / "1000").joinpath("mask_7.png").write_bytes(b""),
         "mask_7.png: the depths are",
     ),
     "two depth maps": (
-        lambda f: write_pfm(f / "pair_photons_1" / "400" / "depth.pfm", np.ones(SHAPE)),
+        lambda f: write_pfm(f / "pair_photons_1" / "1000" / "depth.pfm", np.ones(SHAPE)),
         "depth.pfm: depth.npz is there too",
     ),
 }

@@ -18,6 +18,7 @@ from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
 from simgen.benchmark.certificate import compare
 from simgen.benchmark.definition import Definition, benchmark_files, load_definition
 from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
+from simgen.benchmark.reference_method import differing_scores
 
 pytestmark = pytest.mark.renders
 
@@ -47,8 +48,8 @@ def test_it_is_a_collection_of_photons_frames_and_full_light(made: tuple[Definit
     ]
     assert len(collection.where(half="test")) == 4
     photons, frames, bright = collection[0], collection[3], collection[4]
-    assert photons.budgets == (30, 400, 3000)
-    assert collection[1].budgets == (30, 400)
+    assert photons.budgets == (30, 1000, 3000)
+    assert collection[1].budgets == (30, 1000)
     assert frames.counts.readout.frames == 200
     assert frames.counts.readout.bits == 1
     assert bright.views is not None
@@ -121,5 +122,20 @@ def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves()
     assert len(datasets) == 24 * 4 + 4
     for number in range(len(datasets)):
         recipe = datasets.recipe(number)
-        assert recipe.photons.budget == (100_000 if recipe.seed == 1 else 10_000)
+        is_brighter = recipe.seed == 1 and recipe.scene not in ("glass", "drawn_shiny")
+        assert recipe.photons.budget == (100_000 if is_brighter else 10_000)
         assert recipe.grid.height == recipe.grid.width == 1024
+
+
+def test_scores_of_the_reference_method_are_compared_by_their_intervals(
+    made: tuple[Definition, Path, Path],
+) -> None:
+    published = json.loads(made[1].with_suffix(f".{CERTIFICATE}").read_text())["reference_scores"]
+    pair = published["pair"]
+    assert pair["interval"][0] <= pair["mean"] <= pair["interval"][1]
+    assert differing_scores(published, published) == []
+    width = pair["interval"][1] - pair["interval"][0]
+    other = published | {"pair": {"mean": 0.0, "interval": [end + 1.1 * width for end in pair["interval"]]}}
+    (problem,) = differing_scores(other, published)
+    assert problem.startswith("pair: the method 'brightness' has an IoU of 0.000 instead of ")
+    assert differing_scores({}, published) == []
