@@ -21,6 +21,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from pcii.benchmark.benchmark_page import write_page
 from pcii.benchmark.submission_scores import SUBMISSION
 from pcii.figures.palette import COLOURS, MARKERS
+from pcii.io.collection_layout import IN_FRAMES
 from pcii.io.evaluation_layout import read_evaluation
 from simgen.benchmark.definition import load_definition
 
@@ -68,7 +69,7 @@ def results(submissions: Path) -> Results:
     for file in sorted(submissions.glob(f"*/{SUBMISSION}")):
         for group in read_evaluation(file.parent)["groups"]:
             rows = [row for row in group["results"] if row.get("object", {}).get("iou")]
-            if rows and "," not in group["title"]:
+            if rows and not group["title"].endswith(IN_FRAMES):
                 found[group["title"]] += sorted(rows, key=lambda row: row["budget"])
     return found
 

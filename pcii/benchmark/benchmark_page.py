@@ -19,6 +19,7 @@ from pcii.evaluation.rows import Row, all_rows, by_light
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import Table, budget_name, with_interval
 from pcii.figures.pictures import uri_of
+from pcii.io.collection_layout import IN_FRAMES
 from pcii.io.evaluation_layout import read_evaluation
 from pcii.store.safe_files import write_bytes_safely
 
@@ -96,18 +97,22 @@ def write_page(folder: Path, out: Path) -> int:
             if method in made_by:
                 raise InputError(f"{folder}: {made_by[method]} and {said['folder']} are both of {method!r}")
             made_by[method] = said["folder"]
-    evaluation = summarise([row for _, rows in submissions for row in by_scene(rows)])
+    rows = [row for _, rows in submissions for row in by_scene(rows)]
+    # Binary frames of a scene are the same photons: they would count it twice.
+    in_frames = [row for row in rows if row["title"].endswith(IN_FRAMES)]
+    evaluation = summarise([row for row in rows if not row["title"].endswith(IN_FRAMES)])
+    groups, of_frames = evaluation["groups"], summarise(in_frames)["groups"]
     said_of = {said["folder"]: said for said, _ in submissions}
     folder_of = {method: folder / name for method, name in made_by.items()}
-    kinds = [part for kind in KINDS if (part := _kind(kind, evaluation["groups"], folder_of)) is not None]
+    kinds = [part for kind in KINDS if (part := _kind(kind, groups, of_frames, folder_of)) is not None]
     content = {
         "benchmark": submissions[0][0]["benchmark"],
         "half": submissions[0][0]["half"],
-        "scenes": len({group["title"] for group in evaluation["groups"]}),
+        "scenes": len(groups),
         "kinds": kinds,
         "typical": f"{TYPICAL_PHOTONS:g}",
         "ranks": pooled_tables(evaluation),
-        "submissions": _submissions(made_by, said_of, evaluation["groups"]),
+        "submissions": _submissions(made_by, said_of, [*groups, *of_frames]),
     }
     write_bytes_safely(out, page("benchmark.html.j2", content, "benchmark.js"))
     return len(submissions)
@@ -126,10 +131,8 @@ def _read(folder: Path) -> tuple[dict[str, Any], list[Row]]:
         return said, rows
 
 
-def _kind(
-    kind: Kind, groups: Sequence[Mapping[str, Any]], folder_of: Mapping[str, Path]
-) -> dict[str, Any] | None:
-    """What the page says of methods by one measure; None if there are none."""
+def _cells(kind: Kind, groups: Sequence[Mapping[str, Any]]) -> dict[tuple[str, Any], dict[str, Any]]:
+    """By method (or bound) and budget: its measure of each scene, and photons and seconds of all."""
     cells: dict[tuple[str, Any], dict[str, Any]] = {}
     for group in groups:
         for row in group["results"]:
@@ -145,6 +148,20 @@ def _kind(
                 cell["photons"] += [] if row["photons_per_view"] is None else [row["photons_per_view"]]
                 if name != kind.bound and row["seconds"] is not None:
                     cell["seconds"].append(row["seconds"]["mean"])
+    return cells
+
+
+def _kind(
+    kind: Kind,
+    groups: Sequence[Mapping[str, Any]],
+    of_frames: Sequence[Mapping[str, Any]],
+    folder_of: Mapping[str, Path],
+) -> dict[str, Any] | None:
+    """What the page says of methods by one measure; None if there are none.
+
+    Results of binary frames (`of_frames`) are shown scene by scene only.
+    """
+    cells = _cells(kind, groups)
     if not cells:
         return None
     results = [
@@ -164,7 +181,7 @@ def _kind(
         "words": kind.words,
         "plot": accuracy_plots({"results": results}, drawn, kind.measure),
         "table": _over_light(kind, results, drawn),
-        "by_scene": _by_scene(cells, drawn),
+        "by_scene": _by_scene(_cells(kind, [*groups, *of_frames]), drawn),
         "scenes": [_best_and_worst(kind, cells, method, folder_of[method]) for method in methods]
         if kind.pictured
         else [],

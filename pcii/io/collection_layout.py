@@ -36,6 +36,8 @@ Half = Literal["development", "test"]
 """Of a benchmark: methods are made on the one, and what is reported is of the other."""
 BENCHMARK_FIELDS = ("name", "kind", "half", "light", "seed")
 """What distinguishes the datasets of a benchmark, which is a collection of many recipes."""
+IN_FRAMES = ", binary frames"
+"""What follows the name of the scene in the title of a benchmark's dataset that is binary frames."""
 
 
 def split_of(scene_number: int) -> Split:

@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from pcii.io.collection_layout import BENCHMARK_FIELDS
+from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES
 from simgen.benchmark.definition import Definition, Scene
 from simgen.spec.recipe import Recipe, load_recipe
 
@@ -68,7 +68,7 @@ class BenchmarkDatasets:
         settings = [
             *self.definition.set,
             *scene.set,
-            f"title={scene.name}{', binary frames' * (light == 'frames')}",
+            f"title={scene.name}{IN_FRAMES * (light == 'frames')}",
             f"seed={seed}",
             "photons.scope=view",
             f"photons.budget={most}",
