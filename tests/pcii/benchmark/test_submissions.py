@@ -114,12 +114,14 @@ def test_a_function_of_ones_own_is_run(
     )
     monkeypatch.chdir(tmp_path)
     arguments = ["benchmark", "run", "a_method_of_mine:everything", "--data", str(small_benchmark)]
-    assert command_line.run(app, [*arguments, "-o", "out", "--half", HALF]) == 0
+    assert command_line.run(app, [*arguments, "-o", "out", "--half", HALF, "--budget", "30"]) == 0
     result = json.loads((tmp_path / "out" / "evaluation.json").read_text())
     assert figures(result, "everything")["pair", 30.0]["object"]["recall"]["mean"] == 1
     for wrong in ("a_method_of_mine:nothing", "no_such_module:everything", "no-such-method"):
         assert command_line.run(app, [*arguments[:2], wrong, *arguments[3:], "-o", "other"]) == 2
         assert wrong in capsys.readouterr().err
+    assert command_line.run(app, [*arguments, "-o", "other", "--half", HALF, "--budget", "77"]) == 2
+    assert "no dataset of the development half that 'everything' can take has 77" in capsys.readouterr().err
     assert not (tmp_path / "other").exists()
 
 
