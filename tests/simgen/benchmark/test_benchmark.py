@@ -13,11 +13,12 @@ import pcii
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
 from pcii.io.verification import verify
+from pcii.store.hashes import hash_json
 from simgen.app.commands import app
 from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
 from simgen.benchmark.certificate import compare
 from simgen.benchmark.definition import Definition, benchmark_files, load_definition
-from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
+from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark, published_certificate
 from simgen.benchmark.reference_method import differing_scores
 
 pytestmark = pytest.mark.renders
@@ -120,6 +121,9 @@ def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves()
     assert sum(scene.frames for scene in definition.scene) == 4
     datasets = BenchmarkDatasets(definition, file.parent.parent)
     assert len(datasets) == 24 * 4 + 4
+    published = published_certificate(file)
+    assert published["definition_sha256"] == hash_json(definition.model_dump(mode="json"))  # it never changes
+    assert [datasets.folder(number) for number in range(len(datasets))] == [*published["datasets"]]
     for number in range(len(datasets)):
         recipe = datasets.recipe(number)
         is_brighter = recipe.seed == 1 and recipe.scene not in ("glass", "drawn_shiny")
