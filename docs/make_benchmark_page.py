@@ -19,7 +19,7 @@ from matplotlib import pyplot as plt
 from matplotlib.ticker import LogLocator, NullLocator
 
 from pcii.benchmark.benchmark_page import write_page
-from pcii.benchmark.submission_scores import SUBMISSION
+from pcii.benchmark.submission_checks import SUBMISSION
 from pcii.figures.palette import COLOURS, MARKERS
 from pcii.io.collection_layout import IN_FRAMES
 from pcii.io.evaluation_layout import read_evaluation

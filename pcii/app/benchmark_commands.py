@@ -9,7 +9,7 @@ from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from pcii.io.collection_layout import Half
+from pcii.io.collection_layout import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
@@ -125,6 +125,8 @@ def page(folder: Path, *, out: Out) -> None:
 
 
 def _tell(out: Path, result: dict[str, Any]) -> None:
-    scenes, rows = len(result["groups"]), sum(group["datasets"] for group in result["groups"])
-    say(f"{out}: scores of {rows} datasets of {scenes} scenes")
+    groups = result["groups"]
+    scenes = {group["title"].removesuffix(IN_FRAMES) for group in groups}
+    rows = sum(group["datasets"] for group in groups)
+    say(f"{out}: scores of {rows} datasets of {len(scenes)} scene{'' if len(scenes) == 1 else 's'}")
     say_next_page(out / "evaluation.html")

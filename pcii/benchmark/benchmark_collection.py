@@ -7,7 +7,7 @@ from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.io.collection import Collection, open_collection
-from pcii.io.collection_layout import BENCHMARK_FIELDS, Half, read_collection
+from pcii.io.collection_layout import BENCHMARK_FIELDS, Half, is_collection, read_collection
 from pcii.io.dataset import Dataset
 
 
@@ -52,6 +52,8 @@ def _scene(row: Mapping[str, Any]) -> str:
 
 def open_benchmark(path: Path) -> BenchmarkCollection:
     """Open the collection of a benchmark; `InputError` for a folder that is none."""
+    if not is_collection(path):
+        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     collection = open_collection(path)
     if {*collection.fields} != {*BENCHMARK_FIELDS}:
         raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")

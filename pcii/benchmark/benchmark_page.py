@@ -6,11 +6,13 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from pcii.base.errors import InputError
+from pcii.benchmark.submission_checks import SUBMISSION
 from pcii.benchmark.submission_pictures import TYPICAL_PHOTONS, picture_name
-from pcii.benchmark.submission_scores import SUBMISSION, by_scene
+from pcii.benchmark.submission_scores import by_scene
 from pcii.evaluation.pages import page
 from pcii.evaluation.paired_tests import mean_interval, positive_mean_interval
 from pcii.evaluation.plots import accuracy_plots
@@ -25,6 +27,8 @@ from pcii.store.safe_files import write_bytes_safely
 
 SCENES_NAMED = 3
 """So many of the best and of the worst scenes of each method are shown."""
+LEAST_PX = 1e-3
+"""Smaller errors of depth count as this one where they are averaged as logarithms."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,16 @@ class Kind:
     words: str
     sign: int
     bound: str = ""
-    limits: tuple[float, float] = (0.0, 1.0)
+    is_share: bool = True
     pictured: bool = True
+
+    def over_scenes(self, values: Sequence[float]) -> dict[str, Any]:
+        """The mean over scenes and its interval: of shares, or the geometric one of errors in px."""
+        if self.is_share:
+            return mean_interval(values, (0.0, 1.0)).figures()
+        logs = mean_interval([math.log(max(value, LEAST_PX)) for value in values])
+        ends = None if logs.low is None or logs.high is None else [math.exp(logs.low), math.exp(logs.high)]
+        return {"n": logs.n, "mean": math.exp(logs.mean), "interval": ends}
 
     def bound_of(self, result: Mapping[str, Any]) -> float | None:
         """The bound at the light of a result, if there is one and the result has it."""
@@ -51,7 +63,8 @@ class Kind:
         if not self.bound:
             return None
         objects = result.get("bounds", {}).get("objects", ())
-        return _mean([entry["depth_sigma_px"]["mean"] for entry in objects if entry["depth_sigma_px"]])
+        known = [entry["depth_sigma_px"]["mean"] for entry in objects if entry["depth_sigma_px"]]
+        return median(known) if known else None
 
 
 KINDS = (
@@ -68,11 +81,12 @@ KINDS = (
         "Error of depth",
         "depth",
         "median_px",
-        "Median error of the pixels with an answer: less is better. The Cramér-Rao bound is the least "
-        "standard deviation of the depth of an object as a whole, given its photons and its texture",
+        "Median error of the pixels with an answer, geometric mean over scenes: less is better. The "
+        "Cramér-Rao bound is the least standard deviation of the depth of an object as a whole, given its "
+        "photons and its texture; median over the objects of a scene",
         -1,
         "bound for whole objects (Cramér-Rao)",
-        (0.0, math.inf),
+        is_share=False,
         pictured=False,
     ),
 )
@@ -85,6 +99,8 @@ def write_page(folder: Path, out: Path) -> int:
     method, and submissions of several benchmarks.
     """
     submissions = [_read(file.parent) for file in sorted(folder.glob(f"*/{SUBMISSION}"))]
+    if (folder / SUBMISSION).is_file():
+        raise InputError(f"{folder}: is a submission; name the folder that it is in")
     if not submissions:
         raise InputError(f"{folder}: has no folder with {SUBMISSION}; `pcii benchmark run` makes one")
     for what in ("benchmark", "half"):
@@ -170,7 +186,7 @@ def _kind(
             "budget": budget,
             "photons_per_view": _mean(cell["photons"]),
             "seconds": positive_mean_interval(cell["seconds"]).figures() if cell["seconds"] else None,
-            kind.part: {kind.measure: mean_interval([*cell["of"].values()], kind.limits).figures()},
+            kind.part: {kind.measure: kind.over_scenes([*cell["of"].values()])},
         }
         for (method, budget), cell in sorted(cells.items(), key=lambda item: by_light(item[0][1]))
     ]
@@ -245,7 +261,7 @@ def _submissions(
     for method, folder in sorted(made_by.items()):
         said = said_of[folder]
         run = said["made"].startswith("run")
-        verb, what = ("run", method) if run else ("score", folder)
+        verb, what = ("run", method) if run else ("score", "MAPS")
         rows.append(
             (
                 method,

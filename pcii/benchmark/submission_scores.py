@@ -5,7 +5,6 @@ Photons, frames and full light of a scene are one scene in it, whatever their re
 """
 
 import importlib
-import json
 import resource
 import sys
 from collections.abc import Mapping, Sequence
@@ -18,8 +17,8 @@ from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.benchmark.benchmark_collection import BenchmarkCollection
 from pcii.benchmark.benchmark_jobs import BenchmarkJob, SubmissionJob, given_maps
+from pcii.benchmark.submission_checks import SUBMISSION, read_submission, submitted_tasks
 from pcii.benchmark.submission_pictures import PICTURES
-from pcii.benchmark.submitted_maps import has_depth, has_masks, light_folder
 from pcii.evaluation.comparison import measure
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import (
@@ -35,12 +34,10 @@ from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import budget_name
 from pcii.evaluation.tasks import Task, lights_of, tasks_of
 from pcii.io.collection_layout import Half
-from pcii.io.dataset import FULL_LIGHT, Budget, Dataset, budget_of
+from pcii.io.dataset import FULL_LIGHT, Budget, budget_of
+from pcii.io.evaluation_layout import ROWS
 from pcii.store.safe_files import named_in_errors, write_json_safely
 
-SUBMISSION = "submission.json"
-TEXTS = ("authors", "url", "description", "trained_on")
-"""What may be said of a submission beside the name of its method."""
 MOST_FAULTS = 5
 """Largest number of faults of a submission that one message names."""
 
@@ -97,8 +94,8 @@ def score_submission(
     submission.json there names the method. Raises `InputError` for a submission with any fault, before
     anything is scored: it says which, the first few of them.
     """
-    said = read_submission(folder, data)
-    tasks, faults = _submitted(folder, data.datasets(half), said["method"])
+    said = read_submission(folder, data.name) | {"made": "scored from maps by pcii benchmark score"}
+    tasks, faults = submitted_tasks(folder, data.datasets(half), said["method"])
     for number, task in enumerate(tasks, start=1):
         try:
             given_maps(folder, task)
@@ -114,68 +111,6 @@ def score_submission(
     return _scored(job, data, half, said, executor, report)
 
 
-def read_submission(folder: Path, data: BenchmarkCollection) -> dict[str, Any]:
-    """What submission.json says; `InputError` if it is missing, or of another benchmark."""
-    file = folder / SUBMISSION
-    form = f'expected {{"benchmark": "{data.name}", "method": NAME}}, and if you like {", ".join(TEXTS)}'
-    try:
-        said = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{file}: is missing; {form}") from None
-    except (OSError, ValueError):
-        raise InputError(f"{file}: is no JSON; {form}") from None
-    known = {"benchmark", "method", *TEXTS}
-    if (
-        not isinstance(said, dict)
-        or not {"benchmark", "method"} <= said.keys() <= known
-        or not all(isinstance(value, str) and value for value in said.values())
-    ):
-        raise InputError(f"{file}: {form}, all of them text")
-    if said["benchmark"] != data.name:
-        raise InputError(f"{file}: benchmark: is {visible(said['benchmark'])!r}, and the data {data.name!r}")
-    try:
-        named_functions([(said["method"], _given_as_maps)])
-    except InputError as fault:
-        raise InputError(f"{file}: method: {fault}") from None
-    return said | {"made": "scored from maps by pcii benchmark score"}
-
-
-def _given_as_maps(*_: Any) -> Any:
-    raise AssertionError("maps are read, not computed")
-
-
-def _submitted(folder: Path, datasets: Sequence[Dataset], method: str) -> tuple[list[Task], list[str]]:
-    """The tasks that a submission has results of, and a sentence for each of its faults.
-
-    Whatever light it has results of, it has them of all datasets that have this light.
-    """
-    by_name, faults = {dataset.name: dataset for dataset in datasets}, list[str]()
-    for entry in sorted(folder.iterdir()):
-        if entry.is_dir() and entry.name not in by_name:
-            faults.append(f"{entry}: there is no such dataset in this half")
-    tasks: list[Task] = []
-    found: dict[tuple[str, Budget], list[Dataset]] = {}
-    for dataset in datasets:
-        lights: dict[str, Budget] = {light_folder(light): light for light in lights_of(dataset)}
-        for entry in sorted((folder / dataset.name).glob("*/")):
-            if entry.name not in lights:
-                faults.append(f"{entry}: expected a folder for each light, {', '.join(lights)}")
-                continue
-            light: Budget = lights[entry.name]
-            for has, name in ((has_masks(entry), method), (has_depth(entry), depth_name(method))):
-                if has and (light != FULL_LIGHT or estimator_of(name) is not None):
-                    tasks.append(Task(dataset, light, name, _given_as_maps, ()))
-                    found.setdefault((name, light), []).append(dataset)
-            if not has_masks(entry) and not has_depth(entry):
-                faults.append(f"{entry}: has neither a depth map nor masks")
-    for (name, light), own in found.items():
-        what = "depth" if estimator_of(name) is not None else "masks"
-        for dataset in datasets:
-            if light in lights_of(dataset) and dataset not in own:
-                faults.append(f"{folder / dataset.name / light_folder(light)}: has no {what}")
-    return tasks, faults
-
-
 def _scored(
     job: BenchmarkJob,
     data: BenchmarkCollection,
@@ -184,12 +119,19 @@ def _scored(
     executor: Executor,
     report: Report,
 ) -> dict[str, Any]:
-    out = job.out
+    out, own = job.out, {task.method for task in job.tasks}
+    if (out / ROWS).is_file():
+        with all_rows(out) as rows:
+            others = {row["method"] for row in rows} - own - {depth_name(said["method"]), said["method"]}
+        if others:
+            raise InputError(f"{out}: holds scores of {sorted(others)[0]!r}; name another folder")
     again = measure(job, executor, report)
-    memory = max(
-        resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    )
-    entry = {"benchmark": data.name, **said, "half": half, "peak_memory_mb": round(memory / 1024)}
+    entry = {"benchmark": data.name, **said, "half": half}
+    if not isinstance(job, SubmissionJob):
+        memory = max(
+            resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        )
+        entry["peak_memory_mb"] = round(memory / 1024)
     with all_rows(out) as rows, named_in_errors(out):
         result = summarise(by_scene(rows)) | {"again": again}
         write_json_safely(out / SUBMISSION, entry)

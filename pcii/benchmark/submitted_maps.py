@@ -9,7 +9,7 @@
 The first folder is that of the dataset; the second says from how many photons per view, or "full-light".
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile
 
@@ -68,7 +68,7 @@ def submitted_depth(folder: Path, dataset: Dataset) -> DepthMap:
     if confidence is None:
         return DepthMap(z_mm, answered.astype(np.float64))
     if not ((confidence >= 0) & (confidence <= 1)).all():
-        raise InputError(f"{file}: confidence: expected numbers from 0 to 1")
+        raise InputError(f"{file}: confidence: expected numbers from 0 to 1, also where there is no depth")
     return DepthMap(z_mm, np.where(answered, confidence, 0.0).astype(np.float64))
 
 
@@ -116,11 +116,12 @@ def _arrays(
         missing = shapes.keys() - sizes.keys() - (optional or set())
         if unknown or missing:
             raise InputError(
-                f"{file}: expected the arrays {', '.join(shapes)}, got {', '.join(sorted(sizes)) or 'none'}"
+                f"{file}: expected the arrays {_listed(shapes, optional)}, got "
+                f"{', '.join(sorted(sizes)) or 'none'}"
             )
         for name, size in sizes.items():  # before anything is unpacked
             if size > 8 * np.prod(shapes[name], dtype=np.int64) + (1 << 16):
-                raise InputError(f"{file}: {name}: expected {shapes[name]}, got {size} bytes")
+                raise InputError(f"{file}: {name}: expected numbers {shapes[name]}, got {size} bytes")
         with np.load(file, allow_pickle=False) as loaded:
             arrays = {name: loaded[name] for name in sizes}
     except InputError:
@@ -133,3 +134,7 @@ def _arrays(
                 f"{file}: {name}: expected numbers {shapes[name]}, got {values.dtype} {values.shape}"
             )
     return arrays
+
+
+def _listed(names: Iterable[str], optional: set[str] | None) -> str:
+    return ", ".join(f"{name} (if known)" if name in (optional or ()) else name for name in names)

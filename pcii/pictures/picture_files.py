@@ -101,7 +101,7 @@ def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS)
         raise InputError(f"{path}: cannot be read ({fault.strerror})") from None
     if kind is None or kind not in kinds:
         names = " or ".join(filter(None, [", ".join(kinds[:-1]), kinds[-1]]))
-        raise InputError(f"{path}: not a {names} picture")
+        raise InputError(f"{path}: not a{'n' * names.startswith('E')} {names} picture")
     try:
         read = {"TIFF": tiff_header, "EXR": exr_header}.get(kind, partial(_pillow_header, kind))
         picture = Picture(path, kind, **read(path))

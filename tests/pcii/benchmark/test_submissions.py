@@ -16,7 +16,8 @@ from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.benchmark.benchmark_collection import open_benchmark
 from pcii.benchmark.benchmark_page import KINDS, write_page
-from pcii.benchmark.submission_scores import SUBMISSION, run_method, score_submission
+from pcii.benchmark.submission_checks import SUBMISSION
+from pcii.benchmark.submission_scores import run_method, score_submission
 from pcii.io.verification import verify
 from pcii.pictures.written_pixels import write_pfm, write_png
 
@@ -94,7 +95,8 @@ def test_maps_made_elsewhere_score_as_the_method_that_made_them(
     assert found["pair", 3000.0]["seeds"] == 1
     said = json.loads((tmp_path / "given" / SUBMISSION).read_text())
     assert (said["method"], said["authors"], said["half"]) == ("mine", "A. N.", HALF)
-    assert said["peak_memory_mb"] > 0
+    assert "peak_memory_mb" not in said  # which is that of others
+    assert json.loads((tmp_path / "variance" / SUBMISSION).read_text())["peak_memory_mb"] > 0
     verify(tmp_path / "given")
     few, many = (
         [entry["depth_sigma_px"]["mean"] for entry in found["pair", photons]["bounds"]["objects"]]
@@ -143,12 +145,14 @@ def test_one_page_has_all_submissions(small_benchmark: Path, submitted: Path, tm
     assert re.findall(r'<img src="data:image/webp[^>]*alt="([^"]*)"', text) == [
         f"Truth and result of {method}: pair" for method in ("mine", "depth:mine", "depth:posterior")
     ]
-    assert "pcii benchmark score theirs --data BENCHMARK --half development -o OUT" in text
+    assert "pcii benchmark score MAPS --data BENCHMARK --half development -o OUT" in text
     shutil.copytree(folder / "ours", folder / "again")
     with pytest.raises(InputError, match="again and ours are both of 'depth:posterior'"):
         write_page(folder, out)
-    with pytest.raises(InputError, match=r"has no folder with submission\.json"):
-        write_page(tmp_path / "submissions" / "ours", out)
+    with pytest.raises(InputError, match="is a submission; name the folder that it is in"):
+        write_page(folder / "ours", out)
+    with pytest.raises(InputError, match="theirs: holds scores of 'depth:mine'; name another folder"):
+        run_method("variance", data, folder / "theirs", half=HALF)
     assert out.read_text() == text
 
 
@@ -162,7 +166,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     "no submission.json": (lambda f: (f / SUBMISSION).unlink(), "submission.json: is missing; expected"),
     "another benchmark": (
         lambda f: (f / SUBMISSION).write_text('{"benchmark": "large", "method": "mine"}'),
-        "benchmark: is 'large', and the data 'small'",
+        "benchmark: is 'large', but the data are of 'small'",
     ),
     "a method's name that is taken": (
         lambda f: (f / SUBMISSION).write_text('{"benchmark": "small", "method": "likelihood"}'),
@@ -174,15 +178,23 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "light that is not there": (
         lambda f: (f / "pair_photons_1" / "500").mkdir(),
-        "500: expected a folder for each light, 30, 1000, 3000",
+        "500: is no light of this dataset, of which there are 30, 1000, 3000",
     ),
     "an empty folder": (
         lambda f: [each.unlink() for each in (f / "pair_photons_1" / "1000").iterdir()],
-        "1000: has neither a depth map nor masks",
+        "1000: has neither a depth map",
     ),
     "missing pieces": (
         lambda f: shutil.rmtree(f / "pair_photons_2" / "1000"),
-        "pair_photons_2/1000: has no masks",
+        "pair_photons_2/1000: is missing, and of this light it is needed of all datasets$",
+    ),
+    "masks of all datasets but one": (
+        lambda f: (f / "pair_photons_1" / "1000" / "masks.npz").unlink(),
+        r"pair_photons_1/1000: has no masks\.npz, and of this light it is needed of all datasets",
+    ),
+    "a field that is not known": (
+        lambda f: (f / SUBMISSION).write_text('{"benchmark": "small", "method": "mine", "author": "A. N."}'),
+        "submission.json: author: is not known; expected",
     ),
     "a map of another size": (
         lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.ones((130, 14))),
@@ -200,7 +212,7 @@ FAULTS: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "other arrays": (
         lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", disparity=np.ones(SHAPE)),
-        "depth.npz: expected the arrays z_mm, confidence, got disparity",
+        r"depth.npz: expected the arrays z_mm, confidence \(if known\), got disparity",
     ),
     "objects": (
         lambda f: rewritten(f / "pair_photons_1" / "1000" / "depth.npz", z_mm=np.full(SHAPE, None)),
@@ -239,7 +251,7 @@ def test_submissions_with_faults_are_answered_in_a_sentence(
 
 
 def test_a_collection_that_is_no_benchmark_is_refused(tmp_path: Path, small_benchmark: Path) -> None:
-    with pytest.raises(InputError, match="not a collection"):
+    with pytest.raises(InputError, match="is no benchmark; make one with `simgen benchmark make`"):
         open_benchmark(tmp_path)
     folder = tmp_path / "empty"
     folder.mkdir()
