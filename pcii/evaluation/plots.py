@@ -30,7 +30,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     """One of `MEASURES` against photons per view, and against seconds, as a PNG in a data URI.
 
     Each of `methods` has its colour and marker in all groups, also in those without it; bars are intervals.
-    Full light is at no number of photons. Empty if none of them has the measure.
+    Full light is at no number of photons. Empty if none of them has the measure, or neither is known.
     """
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -38,39 +38,44 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     has_measure = {row["method"] for row in group["results"] if row.get(part, {}).get(measure)}
     if has_measure.isdisjoint(methods):
         return ""
-    figure = new_figure(10.5, 3.9, "constrained")
-    by_photons, by_seconds = figure.subplots(1, 2, sharey=True)
-    for number, method in enumerate(methods):
-        rows = [row for row in group["results"] if row["method"] == method and row[part].get(measure)]
-        style = _style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
-        lit = [row for row in rows if row["photons_per_view"] is not None]
-        timed = [row for row in rows if row["seconds"] is not None]
-        for axes, own, places in (
-            (by_photons, lit, [row["photons_per_view"] for row in lit]),
-            (by_seconds, timed, [row["seconds"]["mean"] for row in timed]),
-        ):
-            if own:
-                means = [row[part][measure] for row in own]
-                heights = [mean["mean"] for mean in means]
-                axes.errorbar(places, heights, yerr=_bars(means), label=plot_label(method), **style)
-    photons = [row["photons_per_view"] for row in group["results"] if row["photons_per_view"] is not None]
-    for axes, name in ((by_photons, "photons per view"), (by_seconds, "seconds per dataset")):
+    rows = [row for row in group["results"] if row.get(part, {}).get(measure) and row["method"] in methods]
+    wanted = (("photons per view", _photons), ("seconds per dataset", _seconds))
+    shown = [(name, place) for name, place in wanted if any(place(row) is not None for row in rows)]
+    if not shown:
+        return ""
+    figure = new_figure(0.3 + 5.1 * len(shown), 4.2, "constrained")
+    panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+    handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the two
+    for axes, (name, place) in zip(panels, shown, strict=True):
+        for number, method in enumerate(methods):
+            own = [row for row in rows if row["method"] == method and place(row) is not None]
+            if not own:
+                continue
+            means = [row[part][measure] for row in own]
+            style = _style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
+            places, heights = [place(row) for row in own], [mean["mean"] for mean in means]
+            line = axes.errorbar(places, heights, yerr=_bars(means), **style)
+            handles.setdefault(plot_label(method), line)
         axes.set_xlabel(name)
         _frame(axes, is_share=measure not in NO_SHARES)
-        if axes is by_seconds or (photons and min(photons) > 0):
+        if all(found > 0 for row in rows if (found := place(row)) is not None):
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.xaxis.set_minor_locator(NullLocator())
-    by_photons.set_ylabel(label)
-    # By name, since methods of full light alone are in one of the two.
-    handles = {
-        name: line
-        for axes in (by_seconds, by_photons)
-        for line, name in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
-    by_photons.legend([handles[name] for name in sorted(handles)], sorted(handles), frameon=False, fontsize=9)
+    panels[0].set_ylabel(label)
+    names = sorted(handles)
+    lines = [handles[name] for name in names]
+    figure.legend(lines, names, loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     return _data_uri(figure)
+
+
+def _photons(row: Mapping[str, Any]) -> float | None:
+    return row["photons_per_view"]
+
+
+def _seconds(row: Mapping[str, Any]) -> float | None:
+    return None if row["seconds"] is None else row["seconds"]["mean"]
 
 
 def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:

@@ -80,7 +80,7 @@ def tasks_of(
 
 def lights_of(dataset: Dataset) -> list[Budget]:
     """Photon budgets of a dataset, and full light if it has radiance."""
-    found: list[Budget] = [*dataset.budgets] if dataset.has_counts else []
+    found: list[Budget] = [*dataset.budgets]
     if dataset.has(RADIANCE):
         found.append(FULL_LIGHT)
     return found

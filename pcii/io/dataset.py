@@ -69,7 +69,7 @@ class Dataset(ShortForm):
             "name": self.name,
             "shape": times(self.grid.shape_KLHW),
             "cfa": self.cfa,
-            "budgets": budgets if self.has(COUNTS) else None,
+            "budgets": budgets if self.budgets else None,
             "z_mm": listed(self.analysis.get("z_mm") or ()),
             "has": listed([name for name, part in parts.items() if self.has(part)]),
         }
@@ -79,7 +79,10 @@ class Dataset(ShortForm):
         """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure.
 
         They are those of the recipe; a dataset without one, as of images by others, may have a budget too.
+        Without counts there are none.
         """
+        if not self.has(COUNTS):
+            return ()
         photons = self.manifest.get("recipe", {}).get("photons", {})
         largest = None if photons.get("scope") == "exposure" else photons.get("budget")
         return (*sorted(photons.get("nested") or []), self.manifest.get("photon_budget") or largest)
@@ -100,7 +103,7 @@ class Dataset(ShortForm):
             if not self.has(RADIANCE):
                 raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
             return replace(self, budget=FULL_LIGHT)
-        *nested, largest = self.budgets
+        *nested, largest = self.budgets or (None,)
         if budget == largest:
             return replace(self, budget=None)
         if budget is None or budget not in nested:
