@@ -196,7 +196,7 @@ def _kind(
         "title": kind.title,
         "words": kind.words,
         "plot": accuracy_plots({"results": results}, drawn, kind.measure),
-        "table": _over_light(kind, results, drawn),
+        "table": _over_light(kind, results, drawn, len(groups)),
         "by_scene": _by_scene(_cells(kind, [*groups, *of_frames]), drawn),
         "scenes": [_best_and_worst(kind, cells, method, folder_of[method]) for method in methods]
         if kind.pictured
@@ -208,14 +208,23 @@ def _mean(values: Sequence[float]) -> float | None:
     return sum(values) / len(values) if values else None
 
 
-def _over_light(kind: Kind, results: Sequence[Mapping[str, Any]], methods: Sequence[str]) -> Table:
-    """The measure of each method at each light, the mean over scenes with its interval, and its time."""
+def _over_light(
+    kind: Kind, results: Sequence[Mapping[str, Any]], methods: Sequence[str], scenes: int
+) -> Table:
+    """The measure of each method at each light, the mean over scenes with its interval, and its time.
+
+    Where it has the measure of fewer than all `scenes` their number is said.
+    """
     found = {(row["method"], row["budget"]): row for row in results}
     budgets = sorted({budget for _, budget in found}, key=by_light)
     rows = []
     for method in methods:
         cells = [found.get((method, budget)) for budget in budgets]
-        shown = ["–" if row is None else with_interval(row[kind.part][kind.measure]) for row in cells]
+        means = [None if row is None else row[kind.part][kind.measure] for row in cells]
+        shown = [
+            with_interval(mean) + (f" of {mean['n']} scenes" if mean and mean["n"] < scenes else "")
+            for mean in means
+        ]
         timed = found.get((method, TYPICAL_PHOTONS), {}).get("seconds")
         rows.append((method, *shown, with_interval(timed, 2)))
     header = ("method", *map(budget_name, budgets), f"seconds at {TYPICAL_PHOTONS:g}")
