@@ -41,7 +41,8 @@ times are of {machine}.
 ![IoU against photons and against time](removal_scores.jpg)
 
 *Mean IoU with the objects of each plane over the scenes of a kind, each the mean of its draws of photons.
-What leans or is a wall belongs to no one plane: there even the oracle's masks have 0.04 to 0.51, and depth tells more.*
+What leans or is a wall belongs to no one plane: there even the oracle's masks have 0.04 to 0.51, and depth
+tells more.*
 
 ## Where the likelihood method's IoU falls with more photons
 

@@ -198,9 +198,11 @@ def _kind(
         "plot": accuracy_plots({"results": results}, drawn, kind.measure),
         "table": _over_light(kind, results, drawn, len(groups)),
         "by_scene": _by_scene(_cells(kind, [*groups, *of_frames]), drawn),
-        "scenes": [_best_and_worst(kind, cells, method, folder_of[method]) for method in methods]
-        if kind.pictured
-        else [],
+        "scenes": [
+            _best_and_worst(kind, cells, method, folder_of[method])
+            for method in methods
+            if kind.pictured and (method, TYPICAL_PHOTONS) in cells
+        ],
     }
 
 
@@ -233,19 +235,20 @@ def _over_light(
 
 def _by_scene(cells: Mapping[tuple[str, Any], Mapping[str, Any]], methods: Sequence[str]) -> Table:
     """The measure of each method on each scene at `TYPICAL_PHOTONS`, means over seeds."""
-    of = {method: cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"] for method in methods}
+    known = [method for method in methods if (method, TYPICAL_PHOTONS) in cells]
+    of = {method: cells[method, TYPICAL_PHOTONS]["of"] for method in known}
     scenes = dict.fromkeys(scene for own in of.values() for scene in own)
     rows = [
         (scene, *(f"{own[scene]:.3f}" if scene in own else "–" for own in of.values())) for scene in scenes
     ]
-    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *methods), tuple(rows))
+    return Table(f"By scene, at {TYPICAL_PHOTONS:g} photons per view", ("scene", *known), tuple(rows))
 
 
 def _best_and_worst(
     kind: Kind, cells: Mapping[tuple[str, Any], Mapping[str, Any]], method: str, folder: Path
 ) -> dict[str, Any]:
     """Scenes that a method does best and worst at `TYPICAL_PHOTONS`, each with its score and picture."""
-    of = cells.get((method, TYPICAL_PHOTONS), {"of": {}})["of"]
+    of = cells[method, TYPICAL_PHOTONS]["of"]
     order = sorted(of, key=lambda scene: -kind.sign * of[scene])
     shown = order if len(order) <= 2 * SCENES_NAMED else [*order[:SCENES_NAMED], *order[-SCENES_NAMED:]]
     scenes = []
