@@ -33,7 +33,7 @@ def complain(text: str) -> None:
 
 
 MOST_COMPLAINTS = 5
-"""Largest number of faults that the last lines of a command name."""
+"""Largest number of faults that the last lines of a command, or one message, name."""
 
 
 def complain_of(faults: Sequence[str], prefix: str = "", rest: str = "") -> None:

@@ -15,6 +15,7 @@ TYPICAL_PHOTONS = 1000.0
 PICTURES = "pictures"
 """Folder of the pictures in that of a submission."""
 LONGEST_PX = 176
+"""Of one map: six pairs stand side by side on the page, and two on a phone."""
 GAP_PX = 4
 """Between the truth and the result."""
 

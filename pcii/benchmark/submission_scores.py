@@ -11,12 +11,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pcii.base.command_output import MOST_COMPLAINTS
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.benchmark.benchmark_collection import BenchmarkCollection
-from pcii.benchmark.benchmark_jobs import BenchmarkJob, SubmissionJob, given_maps
+from pcii.benchmark.benchmark_jobs import BenchmarkJob, given_maps
 from pcii.benchmark.submission_checks import SUBMISSION, read_submission, submitted_tasks
 from pcii.benchmark.submission_pictures import PICTURES
 from pcii.evaluation.comparison import measure
@@ -37,9 +38,6 @@ from pcii.io.collection_layout import Half
 from pcii.io.dataset import FULL_LIGHT, Budget, budget_of
 from pcii.io.evaluation_layout import ROWS
 from pcii.store.safe_files import named_in_errors, write_json_safely
-
-MOST_FAULTS = 5
-"""Largest number of faults of a submission that one message names."""
 
 
 def run_method(
@@ -76,8 +74,7 @@ def run_method(
         raise InputError(f"budget: no dataset of the {half} half that {name!r} can take has {words}")
     # Of the last dataset's tasks the full name: "depth" is the default method of depth.
     said = {"method": tasks[-1].method if tasks else name, "made": "run by pcii benchmark run"}
-    job = BenchmarkJob(tasks, out.resolve(), data.full_light(half), data.first_draws(half))
-    return _scored(job, data, half, said, executor, report)
+    return _scored(BenchmarkJob(tasks, out.resolve(), data, half), data, half, said, executor, report)
 
 
 def score_submission(
@@ -105,10 +102,9 @@ def score_submission(
     if not tasks and not faults:
         faults = [f"{folder}: has no results of a dataset of the {half} half"]
     if faults:
-        more = f"; and {len(faults) - MOST_FAULTS} more" if len(faults) > MOST_FAULTS else ""
-        raise InputError("; ".join(faults[:MOST_FAULTS]) + more)
-    job = SubmissionJob(tasks, out.resolve(), data.full_light(half), data.first_draws(half), folder)
-    return _scored(job, data, half, said, executor, report)
+        more = f"; and {len(faults) - MOST_COMPLAINTS} more" if len(faults) > MOST_COMPLAINTS else ""
+        raise InputError("; ".join(faults[:MOST_COMPLAINTS]) + more)
+    return _scored(BenchmarkJob(tasks, out.resolve(), data, half, folder), data, half, said, executor, report)
 
 
 def _scored(
@@ -127,7 +123,7 @@ def _scored(
             raise InputError(f"{out}: holds scores of {sorted(others)[0]!r}; name another folder")
     again = measure(job, executor, report)
     entry = {"benchmark": data.name, **said, "half": half}
-    if not isinstance(job, SubmissionJob):
+    if job.maps is None:
         memory = max(
             resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
         )

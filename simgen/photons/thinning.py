@@ -119,14 +119,14 @@ class _Drawing:
         return drawn.by_pixel(self.setup.grid), log
 
     def _parts(self) -> Iterator[PhotonTable]:
-        """All parts; where one remains beyond the rule it is the last."""
+        """The photons of all parts; one that keeps too many clumps is the last."""
         for part in self._exposed() if self.gain is not None else self._budgeted():
-            yield self._drawn(part)
-            if not self._is_within_rule():
+            yield self._photons_of(part)
+            if self._has_too_many_clumps():
                 return
 
-    def _drawn(self, part: Part) -> PhotonTable:
-        """A part, drawn again until it is within the rule, `ATTEMPTS` times at most."""
+    def _photons_of(self, part: Part) -> PhotonTable:
+        """The photons of a part, drawn again while too many come in clumps, `ATTEMPTS` times at most."""
         scopes, tally, attempt = self.scopes, self.tally, 0
         got, tried = scopes.got, scopes.tried
         while True:
@@ -134,11 +134,11 @@ class _Drawing:
             photons = joined([no_photons(), *part(attempt)])
             attempt += 1
             self.attempts = max(self.attempts, attempt)
-            if self._is_within_rule() or attempt == ATTEMPTS:
+            if not self._has_too_many_clumps() or attempt == ATTEMPTS:
                 return photons
 
-    def _is_within_rule(self) -> bool:
-        return self.tally.pairs <= self._pairs_allowed()
+    def _has_too_many_clumps(self) -> bool:
+        return self.tally.pairs > self._pairs_allowed()
 
     def _pairs_allowed(self) -> float:
         """How many pairs of the photons so far may come from one path."""
