@@ -1,19 +1,17 @@
 """One figure for each study, readable in print: values with their intervals against time or size."""
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import Measured, Parameter, Row, Study, Value, label
+from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
 
 DPI = 160
-SHORT_DECADES = 2.5
 Quantity = str | Callable[[Row], Value | Parameter]
 
 
@@ -67,7 +65,7 @@ def bars(
     axes.set_xlabel(unit, fontsize=9)
     if log:
         axes.set_xscale("log")
-        _few_ticks(axes.xaxis, axes.get_xlim())
+        few_ticks(axes.xaxis)
     _plain(axes)
 
 
@@ -78,30 +76,18 @@ def frame(axes: "Axes", x: str, y: str, title: str = "", *, log: str = "xy") -> 
     axes.set_title(title, fontsize=10)
     if "x" in log:
         axes.set_xscale("log")
-        _few_ticks(axes.xaxis, axes.get_xlim())
+        few_ticks(axes.xaxis)
     if "y" in log:
         axes.set_yscale("log")
-        _few_ticks(axes.yaxis, axes.get_ylim())
+        few_ticks(axes.yaxis)
     _plain(axes)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=7.5)
 
 
-def _few_ticks(axis: "Axis", ends: tuple[float, float]) -> None:
-    """Name whole powers of ten, and of short axes 2 and 5 between them."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    decades = math.log10(ends[1] / ends[0])
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < SHORT_DECADES else (1.0,)))
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
-    axis.set_minor_locator(NullLocator())
-
-
 def _plain(axes: "Axes") -> None:
-    axes.grid(True, color="#d9dde5", linewidth=0.5)
-    axes.set_axisbelow(True)
+    quiet_grid(axes)
     axes.tick_params(labelsize=8)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _value(row: Row, quantity: Quantity) -> Value | None:

@@ -16,11 +16,11 @@ import numpy as np
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
-from matplotlib.ticker import LogLocator, NullLocator
 
 from pcii.benchmark.benchmark_page import write_page
 from pcii.benchmark.submission_checks import SUBMISSION
 from pcii.evaluation.tables import with_interval
+from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS
 from pcii.io.collection_layout import IN_FRAMES
 from pcii.io.evaluation_layout import read_evaluation
@@ -108,12 +108,9 @@ def draw(of_scene: Results, kinds: Mapping[str, str], file: Path) -> None:
         axes[1, column].set(xlabel="seconds")
     for axis in axes.flat:
         axis.set(xscale="log", ylim=(-0.02, 1.02))
-        axis.grid(True, color="#d9dde5", linewidth=0.6)
-        axis.spines[["top", "right"]].set_visible(False)
+        quiet_grid(axis)
     for axis in axes[1]:
-        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
-        axis.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-        axis.xaxis.set_minor_locator(NullLocator())
+        few_ticks(axis.xaxis)
     for axis in axes[:, 0]:
         axis.set_ylabel("IoU")
     handles, names = axes[0, 0].get_legend_handles_labels()

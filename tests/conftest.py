@@ -48,7 +48,7 @@ def nested_dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """That of `small_benchmark`: two scenes of 2 x 2 views, with the certificate that publishes it."""
-    from small_benchmark import written
+    from small_benchmark import REFERENCE_SCORES, written
 
     from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
 
@@ -56,7 +56,7 @@ def small_benchmark(tmp_path_factory: pytest.TempPathFactory) -> Path:
     definition, file = written(folder)
     assert make_benchmark(definition, file, folder / "made") == []
     with pytest.MonkeyPatch.context() as without:
-        without.setattr("simgen.benchmark.making.reference_scores", lambda *_: {})  # which takes its time
+        without.setattr("simgen.benchmark.making.reference_scores", lambda *_: REFERENCE_SCORES)
         assert certify(definition, file, folder / "made").problems  # nothing is published yet
     (folder / "made" / CERTIFICATE).rename(file.with_suffix(f".{CERTIFICATE}"))
     return folder / "made"

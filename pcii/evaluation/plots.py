@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pcii.evaluation.tables import light_name
-from pcii.figures.charts import draw_diagonal, draw_reliability_diagram
+from pcii.figures.charts import draw_diagonal, draw_reliability_diagram, few_ticks, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS, plot_label
 from pcii.figures.panels import new_figure
 from pcii.figures.pictures import uri_of
@@ -32,8 +32,6 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
     Each of `methods` has its colour and marker in all groups, also in those without it; bars are intervals.
     Full light is at no number of photons. Empty if none of them has the measure, or neither is known.
     """
-    from matplotlib.ticker import LogLocator, NullLocator
-
     part, label = MEASURES[measure]
     has_measure = {row["method"] for row in group["results"] if row.get(part, {}).get(measure)}
     if has_measure.isdisjoint(methods):
@@ -60,9 +58,7 @@ def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: st
         _frame(axes, is_share=measure not in NO_SHARES)
         if all(found > 0 for row in rows if (found := place(row)) is not None):
             axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-            axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-            axes.xaxis.set_minor_locator(NullLocator())
+            few_ticks(axes.xaxis)
     panels[0].set_ylabel(label)
     names = sorted(handles)
     lines = [handles[name] for name in names]
@@ -140,9 +136,8 @@ def _frame(axes: "Axes", *, is_share: bool = True) -> None:
         axes.set_ylim(-0.02, 1.02)
     else:
         axes.set_yscale("log")
-        axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
-    axes.grid(True, color="#d9dde5", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
+        few_ticks(axes.yaxis)
+    quiet_grid(axes)
 
 
 def _data_uri(figure: "Figure") -> str:

@@ -1,5 +1,6 @@
 """Charts: camera positions, probability over depth, bars of shares, reliability of confidence."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,14 @@ from pcii.figures.panels import GRID_COLOUR, write_in_middle
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
 
 LEAST_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
 BAR = 0.8
 """Share of the place of a group of bars that they take."""
+SHORT_DECADES = 2.5
+"""Powers of ten of a logarithmic axis up to which there is room for ticks at 2 and 5 between them."""
 
 
 def quiet_grid(axes: "Axes") -> None:
@@ -22,6 +26,17 @@ def quiet_grid(axes: "Axes") -> None:
     axes.grid(True, color=GRID_COLOUR, linewidth=0.6, alpha=0.4)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
+
+
+def few_ticks(axis: "Axis") -> None:
+    """Name whole powers of ten of a logarithmic axis, and if it is short 2 and 5 between them."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
+    low, high = axis.get_view_interval()
+    is_short = math.log10(high / low) < SHORT_DECADES
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if is_short else (1.0,)))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def draw_cameras(axes: "Axes", x_mm: np.ndarray, y_mm: np.ndarray, title: str) -> None:

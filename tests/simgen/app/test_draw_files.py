@@ -87,6 +87,8 @@ def test_preview_and_check_ask_for_a_number_or_take_it(
     assert command_line.run(cli.app, ["check", "drawn_plain", "--scene", "3", "--json"]) in (0, 1)
     found = json.loads(capsys.readouterr().out)
     assert any("solid-0" in finding["text"] for finding in found)
+    assert command_line.run(cli.app, ["check", "drawn_plain"]) == 0
+    assert "draws 0 to 19" in capsys.readouterr().out
     assert "is one scene" in refusal(["check", "desk", "--scene", "3"], capsys)
     recipe = tmp_path / "recipe.toml"
     recipe.write_text('scene = "drawn_plain"\n')

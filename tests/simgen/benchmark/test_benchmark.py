@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_benchmark import SCENE, written
+from small_benchmark import REFERENCE_SCORES, SCENE, written
 
 import pcii
 from pcii.base.errors import InputError
@@ -134,6 +134,8 @@ def test_the_benchmark_that_ships_has_24_scenes_of_seven_kinds_in_equal_halves()
 def test_scores_of_the_reference_method_are_compared_by_their_intervals(
     made: tuple[Definition, Path, Path],
 ) -> None:
+    certificate = json.loads(made[1].with_suffix(f".{CERTIFICATE}").read_text())
+    assert certificate["reference_scores"] == REFERENCE_SCORES  # since its bytes were not the published ones
     published = reference_scores(made[2], ["development"])
     assert published.keys() == {"pair"}
     pair = published["pair"]
