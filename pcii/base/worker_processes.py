@@ -40,7 +40,8 @@ def run_in_processes(job: Job, pieces: Sequence[int], count: int) -> Generator[D
         while missing:
             for worker in workers:
                 _hand_out(worker, workers)
-            for pipe in wait([worker.pipe for worker in workers if worker.piece is not None]):
+            busy = [worker.pipe for worker in workers if worker.piece is not None]
+            for pipe in wait(busy, AGAIN_S):  # Ctrl-C that interrupts no wait is seen after it
                 worker = next(worker for worker in workers if worker.pipe is pipe)
                 reply, piece = _reply(worker), worker.piece
                 assert piece is not None

@@ -186,6 +186,24 @@ def test_ctrl_c_and_a_kill_end_all_processes_in_the_midst_of_pieces(
         time.sleep(0.05)
 
 
+def test_ctrl_c_that_another_thread_receives_ends_the_work(tmp_path: Path) -> None:
+    job, ended, ignored = Numbers(tmp_path, seconds=1000), threading.Event(), threading.Event()
+
+    def stop() -> None:
+        while not (tmp_path / "begun").exists() or len(job.begun()) < 2:
+            time.sleep(0.05)
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        if not ended.wait(30):
+            ignored.set()
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+
+    threading.Thread(target=stop, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        done_by(Executor(2), job, 2)
+    ended.set()
+    assert not ignored.is_set()
+
+
 def test_a_cluster_without_workers_is_waited_for_and_the_end_of_its_scheduler_told_in_one_line(
     started: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
