@@ -83,7 +83,7 @@ def _paper(side_px: int, repeats: int, dense_views: int) -> tuple[list[Row], lis
         if name in logs:
             kept = logs[name]["kept"]
             values["kept_percent"] = Value(100 * logs[name]["kept_share"])
-            values["overshoot_percent"] = Value(100 * logs[name]["overshoot_photons"] / max(kept, 1))
+            values["above_bound_percent"] = Value(100 * logs[name]["paths_above_bound"] / max(kept, 1))
         rows.append(Row(PAPER, name, {}, values))
     ratios = [
         ratio_of(
@@ -133,7 +133,7 @@ def _drawn(each: int, base_ms: float) -> list[Row]:
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         for kind in KINDS:
-            relative, kept, draws, fresh = [], [], [], []
+            relative, kept, raised, fresh = [], [], [], []
             for number in range(TUNING, TUNING + each):
                 recipe, recipe_folder = load_recipe(str(write_recipe(Path(folder), kind, number)))
                 start = time.perf_counter()
@@ -149,11 +149,11 @@ def _drawn(each: int, base_ms: float) -> list[Row]:
                 }
                 relative.append(1e3 * median(side_by_side(works)[kind]) / base_ms)
                 kept.append(100 * logs[-1]["kept_share"])
-                draws.append(float(logs[-1]["attempts"]))
+                raised.append(float(logs[-1]["bound_raised"]))
             values = {
                 "times_the_papers": relative,
                 "kept_percent": kept,
-                "draws": draws,
+                "raised": raised,
                 "new_dataset_s": fresh,
             }
             rows.append(Row(DRAWN, kind, {}, {name: mean_of(found) for name, found in values.items()}))

@@ -21,7 +21,7 @@ from simgen.dataset.prepared import Prepared, capture_of, needs_of, prepare_scen
 from simgen.dataset.rendered_views import exact_view
 from simgen.dataset.resources import available_bytes, check_resources, fits, in_bytes
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import plan, render_instead
+from simgen.photons.counting_plan import plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -79,9 +79,6 @@ def draw_photons(
     made = plan(capture, setup, kind, may_explore=fits(needs))
     check_resources(needs, made, Path())
     drawn = thin(capture, setup, made, report) if made.thins else None
-    if drawn is None and made.thins:
-        made = render_instead(capture, setup, kind)
-        check_resources(needs, made, Path())
 
     @cache
     def mosaic_of(k: int, l: int) -> np.ndarray:

@@ -72,9 +72,9 @@ def card_triangles(width: float, height: float) -> Triangles:
     return Triangles.checked(positions, np.array([(0, 1, 2), (0, 2, 3)]), None, corners)
 
 
-def globe(radius: float) -> Triangles:
+def globe(radius: float, rows: int = GLOBE_ROWS) -> Triangles:
     """A sphere; the picture goes once around, its middle in front, its upper border at the pole above."""
-    rows, columns = GLOBE_ROWS, 2 * GLOBE_ROWS
+    columns = 2 * rows
     along, up = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1))
     east, north = (2 * along - 1) * np.pi, (up - 0.5) * np.pi
     normals = np.stack([np.sin(east) * np.cos(north), -np.sin(north), -np.cos(east) * np.cos(north)], axis=-1)

@@ -29,6 +29,10 @@ Stage = Literal[
     "plan probe",
     "check probe",
     "frames",
+    "aimed pilot",
+    "emission candidates",
+    "candidate numbers",
+    "candidate times",
 ]
 _STAGES: tuple[Stage, ...] = get_args(Stage)
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")

@@ -29,7 +29,7 @@ from simgen.dataset.rendered_views import RENDERED, RenderedViews
 from simgen.dataset.resources import check_resources, fits
 from simgen.dataset.reuse import InCommon, Reuse, in_common
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan, plan, render_instead
+from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.photons.photon_counting import draw_from_views, thin, write_counts
 from simgen.renderer import backend
 from simgen.sensor.photon_table import PhotonTable
@@ -137,13 +137,7 @@ def _work(
             )
     if made is not None and made.thins:
         with clock.stage("photons"):
-            drawn = thin(capture, setup, made, report)
-            if drawn is None:
-                made = render_instead(capture, setup, backend.choose().kind, least_samples(recipe))
-                check_resources(needs_of(recipe), made, out)
-            else:
-                photons = write(*drawn)
-                del drawn
+            photons = write(*thin(capture, setup, made, report))
     renders = made is not None and photons is None
     views = RenderedViews(
         capture.rig,

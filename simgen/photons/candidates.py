@@ -6,16 +6,17 @@ other.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Cameras, Rig, as_rig
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.sensor.photon_table import PhotonTable, no_photons
 
 
@@ -46,7 +47,7 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """The `photons` that candidates gave: a row for each that gave any, n of them, and its first hit.
+    """The `photons` that candidates gave, a row for each that was kept, and its first hit.
 
     `candidate` (rows,) is the number of each. `ratio` (F,) is radiance by limit of all paths that were
     followed beyond their first hit, `over` those that exceeded it.
@@ -58,14 +59,25 @@ class Accepted:
     over: Samples
 
 
+class FilmPoints(NamedTuple):
+    """Points (N,) of films: view, and row and column from the film's corner in [0, H) and [0, W)."""
+
+    view: np.ndarray
+    row: np.ndarray
+    col: np.ndarray
+
+
 class CandidateSampler(Protocol):
     """A majorant as candidates are drawn from it.
 
     They come of groups of Bayer cells, each candidate of one. `mass` (G,) is the sum of the bounds of the
-    pixels of each group in one view, border tiles counted whole.
+    pixels of each group in one view, border tiles counted whole. With an earlier majorant `below`, of the
+    same tiles and nowhere higher, what lies between the two is drawn: of the tiles that have been raised
+    alone, and of each path the part of its radiance above the earlier bound.
     """
 
     majorant: Majorant
+    below: Majorant | None
     mass: np.ndarray
 
     @property
@@ -82,25 +94,24 @@ class CandidateSampler(Protocol):
         """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
 
         `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
-        Where a path exceeds its bound r times, it gives floor(r) photons and one more with the remaining
-        probability, which keeps the mean exact.
+        A path that exceeds its bound is kept, and is among those that are `over`. Raises `InputError` for
+        radiance that is not finite.
         """
         ...
 
-    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
-        """A pilot: about so many rays, evenly over the films, of which about `follow` are followed.
+    def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
+        """A pilot through these points of films, of which the first `follow` are followed.
 
-        Of a ray that is not followed `light` is NaN (see `Samples`); backends may leave such out.
+        Of a ray that is not followed `light` is NaN (see `Samples`); backends may leave such out. Raises
+        `InputError` for radiance that is not finite.
         """
         ...
 
 
-def even_film_points(
-    grid: CameraGrid, number: int, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """View, row and column (N,) of about `number` points: one in each cell of a lattice over the film.
+def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) -> FilmPoints:
+    """About `number` points: one in each cell of a lattice over the film.
 
-    Rows and columns are float64 in [0, H) and [0, W); views take turns. Points come in random order, so that
+    Views take turns. Points come in random order, so that
     the first of them are spread over the film as all are.
     """
     rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
@@ -111,7 +122,7 @@ def even_film_points(
     # Rounding must not move a point onto the next film.
     i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
     j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
-    return rng.permutation(cell.size) % grid.view_count, i, j
+    return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
 
 
 def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:
@@ -131,12 +142,22 @@ class Chances:
     cell: np.ndarray
 
 
-def chances(setup: Setup, majorant: Majorant, cells: np.ndarray) -> Chances:
-    """The chances of a group of cells under a majorant."""
+def chances(setup: Setup, majorant: Majorant, below: Majorant | None, cells: np.ndarray) -> Chances:
+    """The chances of a group of cells under a majorant; 0 on tiles that are as they were in `below`."""
     colours = colour_cells(setup.cfa).ravel()[cells]
     mass = majorant.bound[:, colours] * (majorant.side_px**2 / 4)[:, None]
+    if below is not None:
+        mass *= majorant.is_above(below)[:, None]
     entries = majorant.layer.size
     return Chances(np.cumsum(mass.ravel()), np.arange(entries).repeat(cells.size), np.tile(cells, entries))
+
+
+def require_finite(setup: Setup, light: np.ndarray, object_id: np.ndarray) -> None:
+    """`InputError` for radiance (N, ...) that is no finite number, with the object (N,) that was seen."""
+    is_finite = np.isfinite(light).reshape(len(light), -1).all(axis=1)
+    if not is_finite.all():
+        number = int(object_id[np.flatnonzero(~is_finite)[0]])
+        raise InputError(not_finite(setup.render_scene, number))
 
 
 def nothing(channels: int) -> Accepted:

@@ -93,13 +93,8 @@ def plan(
         return made
     explored = explore(setup, capture.photons, capture.photons_per_radiance)
     if not explored.is_bounded:
-        return render_instead(capture, setup, kind, least_samples)
+        return _cheaper_way(capture, setup, kind, least_samples, is_unbounded=True)
     return replace(made, explored=explored)
-
-
-def render_instead(capture: Capture, setup: Setup, kind: str, least_samples: int = 1) -> Plan:
-    """A plan that doesn't thin, for light that turned out to have no bound; else as `plan`."""
-    return _cheaper_way(capture, setup, kind, least_samples, is_unbounded=True)
 
 
 def _cheaper_way(

@@ -8,16 +8,17 @@ independence.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Accepted, CandidateSampler, Setup, paths_of
+from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.majorant import Majorant
 from simgen.photons.photon_scopes import cell_groups
-from simgen.photons.pilot import EXPLORATION_SEED, send_pilot
+from simgen.photons.pilot import AIMED_RAYS, EXPLORATION_SEED, send_pilot
 from simgen.photons.samplers import sampler_for
 from simgen.spec.recipe import Photons
 
@@ -25,14 +26,13 @@ WARM_UP_SHARE = 0.15
 """The warm-up's rounds aim for this share of the photons, but take so many candidates at least, at most."""
 WARM_UP_CANDIDATES = (1 << 13, 1 << 17)
 WARM_UP_ROUNDS = 2
-REHEARSALS = 8
+REHEARSALS = 16
 """Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
 REHEARSAL_PATHS = 1 << 18
-ENOUGH = 0.5
-"""A rehearsal with at most this share of the allowed pairs (`pairs_allowed`) is the last."""
-LEAST_PASSED = 2
-"""If there is none, so many rehearsals must be within the rule; if a draw in four is, eight all fail in 10 %
-of cases, and views are rendered then."""
+MEAN_OF = 4
+"""Rehearsals end if the first is within `excess_allowed`, or else the mean of this many is: of light in rare
+paths one of them may have met little by chance. If neither is so, views are rendered."""
+MOST_REACH = 4
 EXCESS_SHARE = 1e-5
 """Share of the light that the warm-up leaves above the majorant."""
 LIKELY_SHARE = 0.3
@@ -44,17 +44,20 @@ LEAST_SHARE = 1e-4
 class Exploration:
     """A majorant, ambient light (C,), the share of candidates that is kept, and the light paths it took.
 
-    `majorant` is None if there is no light at all; copy it before raising bounds. `is_bounded` is False if
-    paths exceed every majorant so often that photons come in clumps, several from one path: no thinning then.
+    `majorant` is None if there is no light but what comes straight from something that shines; copy it before
+    raising bounds. `is_bounded` is False if paths exceed every majorant too often: no thinning then.
     """
 
     majorant: Majorant | None
+    emission: EmissionSampler
     ambient: np.ndarray
     share: float
     paths: int
     max_dark_candidates: int
     """Where so many candidates of a scope find no light it has none."""
     is_bounded: bool = True
+    excess_share: float = 0.0
+    """Share of the light that lay above the bounds in the last rehearsal."""
 
 
 def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
@@ -71,16 +74,35 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
         pixels = grid.view_count * grid.height * grid.width
         return float(photons_per_radiance * mean[cells].mean() * pixels)
 
-    pilot = send_pilot(setup, expected)
-    if pilot.majorant is None:
-        return Exploration(None, pilot.ambient, LIKELY_SHARE, pilot.paths, pilot.max_dark_candidates)
-    warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean))
-    warmed.warm_up()
-    is_bounded = warmed.rehearse()
-    paths = pilot.paths + warmed.paths
-    return Exploration(
-        pilot.majorant, pilot.ambient, warmed.share, paths, pilot.max_dark_candidates, is_bounded
+    emission = EmissionSampler(setup)
+    pilot = send_pilot(setup, emission, expected)
+    found = Exploration(
+        pilot.majorant, emission, pilot.ambient, LIKELY_SHARE, pilot.paths, pilot.max_dark_candidates
     )
+    film_mass = 0.0
+    if pilot.majorant is not None:
+        warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean))
+        warmed.warm_up()
+        is_bounded = warmed.rehearse()
+        film_mass = float(warmed.sampler().mass.mean())
+        paths = pilot.paths + warmed.paths
+        found = replace(
+            found, share=warmed.share, paths=paths, is_bounded=is_bounded, excess_share=warmed.excess_share
+        )
+    if emission.mass:
+        share = (film_mass * found.share + emission.mass * _share_of(emission, setup)) / (
+            film_mass + emission.mass
+        )
+        found = replace(found, share=max(share, LEAST_SHARE))
+    return found
+
+
+def _share_of(emission: EmissionSampler, setup: Setup) -> float:
+    """The share of the candidates of what shines that are kept."""
+    view = np.arange(AIMED_RAYS) % setup.grid.view_count
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
+    kept = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
+    return kept.photons.k.size / AIMED_RAYS
 
 
 @dataclass
@@ -95,34 +117,35 @@ class _Warming:
     share: float = LIKELY_SHARE
     paths: int = 0
     rounds: int = 0
+    excess_share: float = 0.0
 
     def warm_up(self) -> None:
         """Bring all bounds to about what the light needs."""
         number = int(np.clip(WARM_UP_SHARE * self.photons / LIKELY_SHARE, *WARM_UP_CANDIDATES))
         for _ in range(WARM_UP_ROUNDS):
-            found = self._try(self._sampler(), number)
+            found = self._try(self.sampler(), number)
             factor = _factor(found.ratio)
             self.share = max(self.share / factor, LEAST_SHARE)
             self.majorant.scale(factor)
             self.majorant.lift(found.over)
 
     def rehearse(self) -> bool:
-        """Rehearse and lift until a draw would be within `pairs_allowed`; whether one in four will be."""
-        passed = 0
+        """Rehearse and lift until little enough light is above the bounds; whether that is so in the end."""
+        allowed, shares = excess_allowed(math.prod(self.setup.grid.shape_KLHW)), list[float]()
         for turn in range(REHEARSALS):
-            sampler = self._sampler()
+            sampler = self.sampler()
             most = REHEARSAL_PATHS // sampler.paths_each
             found = self._try(sampler, int(np.clip(self.photons / self.share, WARM_UP_CANDIDATES[0], most)))
-            # As in a draw: rare light shows on few tiles at a time, so tiles farther away are raised too.
-            self.majorant.lift(found.over, reach=1 + turn // 2)
-            pairs, photons = pairs_of(found.photons.n), int(found.photons.n.sum())
-            allowed = pairs_allowed(photons, math.prod(self.setup.grid.shape_KLHW))
-            if pairs <= ENOUGH * allowed:
+            # Rare light shows on few tiles at a time, so tiles farther away are raised too.
+            self.majorant.lift(found.over, reach=min(1 + turn // 2, MOST_REACH))
+            shares.append(excess(found.ratio) / max(float(found.ratio.sum(dtype=np.float64)), 1.0))
+            self.excess_share = float(np.mean(shares[-MEAN_OF:]))
+            if (turn == 0 or turn >= MEAN_OF - 1) and self.excess_share <= allowed:
                 return True
-            passed += pairs <= allowed
-        return passed >= LEAST_PASSED
+        return False
 
-    def _sampler(self) -> CandidateSampler:
+    def sampler(self) -> CandidateSampler:
+        """Candidates by the majorant as it is now."""
         return sampler_for(self.setup, self.majorant, self.groups, self.ambient)
 
     def _try(self, sampler: CandidateSampler, number: int) -> Accepted:
@@ -130,25 +153,23 @@ class _Warming:
         found = sampler.try_candidates(np.arange(number) % len(self.groups), None, path_seed)
         self.rounds += 1
         self.paths += paths_of(sampler, number, found.ratio.size)
-        self.share = max(found.photons.n.sum() / number, LEAST_SHARE)
+        self.share = max(found.photons.k.size / number, LEAST_SHARE)
         return found
 
 
-def pairs_of(photons: np.ndarray) -> int:
-    """Pairs of photons that one path gave, from the number of photons of each path."""
-    return int((photons * (photons - 1) // 2).sum())
+def excess(ratio: np.ndarray) -> float:
+    """Photons that paths of these ratios of radiance to bound should have given and did not."""
+    return float(np.maximum(ratio.astype(np.float64) - 1, 0).sum())
 
 
-def pairs_allowed(photons: int, pixels: int) -> float:
-    """How many pairs of photons that one path gave no test of the counts can tell from chance.
+def excess_allowed(pixels: int) -> float:
+    """The share of the light that may lie above the bounds of `pixels` of all views before photons are drawn.
 
-    Poisson counts with the rates r_x have r_x^2 / 2 pairs of photons in pixel x on average, and as much
-    variance; clumps add a share of r_x. A test that knows all rates weighs the pairs of each pixel by
-    1 / r_x: then chance has the variance P / 2 over P pixels, and a share of 1 / sqrt(2 P) of the photons is
-    one standard deviation. No other weights see clumps better. So much is allowed, P being all `pixels` of
-    all views.
+    If none of it were drawn, a share s of n photons would be missing, s sqrt(n) standard deviations of their
+    number; with s = 1 / sqrt(2 P) over P pixels that is less than one for up to two photons per pixel. What a
+    draw meets of it is drawn after all.
     """
-    return photons / float(np.sqrt(2 * pixels))
+    return 1 / float(np.sqrt(2 * pixels))
 
 
 def _factor(ratio: np.ndarray) -> float:

@@ -115,12 +115,39 @@ class Majorant:
         unlisted = _distinct(near[self.entry_of[near] < 0])
         nothing = np.zeros((unlisted.size, over.light.shape[1]))
         self.list_tiles(unlisted, nothing, nothing)
-        entry = self.entry_of[near]
+        self._raise_to(self.entry_of[around], over)
+
+    def raise_bounds(self, over: Samples, reach: int) -> None:
+        """Raise limits above the radiance of these paths, on their own tiles and those up to `reach` away.
+
+        No tile is listed, so that each path belongs to the same one as before and no limit of it falls.
+        """
+        owner, layers = self.owner_of(over), self.layers
+        coarse = owner < self.coarse_count
+        if coarse.any():
+            row, col = self.row[owner[coarse]], self.col[owner[coarse]]
+            near = np.argwhere(np.ones((2 * reach - 1, 2 * reach - 1))) - (reach - 1)
+            rows = np.clip(row[:, None] + near[:, 0], 0, self.row[self.coarse_count - 1])
+            entry = rows * self.coarse_cols + np.clip(col[:, None] + near[:, 1], 0, self.coarse_cols - 1)
+            self._raise_to(entry, over.take(coarse))
+        if not coarse.all():
+            entry = owner[~coarse]
+            tiles = layers.flat(self.layer[entry], self.row[entry], self.col[entry])
+            near = self.entry_of[layers.around(tiles, reach)]
+            self._raise_to(np.where(near < 0, entry[:, None], near), over.take(~coarse))
+
+    def _raise_to(self, entries: np.ndarray, over: Samples) -> None:
+        """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
         for levels, needed in (
             (self.bound, over.light),
             (self.radiance_ratio_bound, over.light / over.guess),
         ):
-            _raise(levels, entry, LIFT * needed.repeat(around.shape[1], axis=0))
+            _raise(levels, entries.ravel(), LIFT * needed.repeat(entries.shape[1], axis=0))
+
+    def is_above(self, below: "Majorant") -> np.ndarray:
+        """Which entries have been raised since `below` was copied, (E,) bool."""
+        raised = (self.bound > below.bound) | (self.radiance_ratio_bound > below.radiance_ratio_bound)
+        return np.asarray(raised.any(axis=1))
 
 
 def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.ndarray) -> Majorant:

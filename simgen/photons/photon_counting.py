@@ -31,11 +31,8 @@ def thin(
     setup: Setup,
     made: Plan,
     report: Report = silent,
-) -> tuple[PhotonTable, dict[str, Any]] | None:
-    """Photons of all views drawn one by one, and what the manifest says of them.
-
-    None if too many of them came in clumps, however often they were drawn: then views are to be rendered.
-    """
+) -> tuple[PhotonTable, dict[str, Any]]:
+    """Photons of all views drawn one by one, and what the manifest says of them; see `thin_photons`."""
     grid = capture.grid
     photons, log = thin_photons(
         setup,
@@ -46,8 +43,6 @@ def thin(
         keeps_origins=made.keeps_origins,
         report=report,
     )
-    if log["clump_pairs"] > log["clump_pairs_allowed"]:
-        return None
     return photons, log | {
         "dense_paths_instead": made.samples * grid.view_count * grid.height * grid.width,
         "normaliser_standard_error": 0.0,

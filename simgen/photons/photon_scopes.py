@@ -24,6 +24,8 @@ class PhotonScopes:
     def __post_init__(self) -> None:
         self.got = np.zeros(self.view.size, dtype=np.int64)
         self.tried = np.zeros(self.view.size, dtype=np.int64)
+        self.time = np.zeros(self.view.size)
+        """How long photons have been drawn, in candidates per unit of majorant."""
 
     def open(self, max_dark_candidates: int) -> np.ndarray:
         """Numbers of those that still want photons and are not dark.
@@ -32,6 +34,12 @@ class PhotonScopes:
         """
         dark = (self.got == 0) & (self.tried >= max_dark_candidates)
         return np.flatnonzero((self.got < self.wanted) & ~dark)
+
+    def part(self, number: int, parts: int) -> "PhotonScopes":
+        """Like scopes that want an equal share of the photons, the `number`-th of `parts`."""
+        share = self.wanted * (number + 1) // parts - self.wanted * number // parts
+        is_endless = self.wanted == np.iinfo(np.int64).max
+        return PhotonScopes(self.view, self.group, np.where(is_endless, self.wanted, share))
 
     def blocks(self) -> Iterator[np.ndarray]:
         """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""

@@ -6,10 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, Setup, paths_of
+from simgen.photons.candidates import CandidateSampler, FilmPoints, Setup, even_film_points, paths_of
 from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
+from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.samplers import sampler_for, surroundings
+from simgen.renderer.path_tracing import bright_directions
 
 EXPLORATION_SEED = 0
 """What is found before photons are drawn decides their cost, not where they fall: with one seed for all,
@@ -20,6 +22,9 @@ RAYS_PER_PHOTON = 2.5
 MOST_RAYS = RAYS_PER_TILE * TILES_ACROSS**2
 """The second pilot has so many rays for each photon that is wanted, until tiles are as fine as they get."""
 FOLLOWED_SHARE = 0.5
+AIMED_RAYS = 1 << 13
+"""Rays that are aimed at what shines, and as many at what is bright of the surroundings: where these are seen
+through glass or in a gap, rays that are spread over the films may miss them."""
 AMBIENT_SHARE = 3.0
 """Light that surfaces throw at each other is guessed to be so many times the mean radiance."""
 
@@ -28,7 +33,7 @@ AMBIENT_SHARE = 3.0
 class Pilot:
     """What a pilot found: a majorant, mean radiance (C,) of all views, ambient light, paths it took.
 
-    `majorant` is None if there is no light at all.
+    `majorant` is None if there is no light but what comes straight from something that shines.
     """
 
     majorant: Majorant | None
@@ -39,29 +44,33 @@ class Pilot:
     """Where so many candidates of a scope find no light it has none."""
 
 
-def send_pilot(setup: Setup, expected: Callable[[np.ndarray], float]) -> Pilot:
+def send_pilot(setup: Setup, emission: EmissionSampler, expected: Callable[[np.ndarray], float]) -> Pilot:
     """Find where there is light, and how much at most.
 
     `expected` says how many photons are wanted in all, given the mean radiance per colour: the effort
     is what they deserve.
 
     A first pilot of few rays measures the mean radiance. A second, also spread evenly, finds the surfaces;
-    tiles are so large that each holds several of its rays.
+    tiles are so large that each holds several of its rays. Others are aimed at what is known to be bright.
     """
     ambient = surroundings(setup)
     first, paths = _first_pilot(setup, ambient)
     mean = first.light.mean(axis=0)
     if not mean.any():
-        return Pilot(None, mean, ambient, paths, max_dark_candidates=0)
+        return Pilot(None, mean, ambient, paths, _sampler_of_films(setup, ambient).max_dark_candidates)
     ambient = ambient + AMBIENT_SHARE * mean.mean()
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
     sampler = _sampler_of_films(setup, ambient)
     rays = int(np.clip(RAYS_PER_PHOTON * expected(mean) / sampler.paths_each, FIRST_RAYS, MOST_RAYS))
     followed = int(FOLLOWED_SHARE * rays)
-    known = first.join(
-        sampler.trace_evenly(rays, followed, seeds.integer(EXPLORATION_SEED, stage="second pilot"))
-    )
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
+    known = first.join(sampler.trace(_evenly(setup, rays, path_seed), followed, path_seed))
+    aimed = aimed_film_points(setup, emission)
+    if aimed.view.size:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
+        known = known.join(sampler.trace(aimed, aimed.view.size, path_seed))
+        paths += paths_of(sampler, aimed.view.size, aimed.view.size)
     layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
     majorant = fit(setup.grid, layers, known, dim)
     paths += paths_of(sampler, rays, followed)
@@ -73,12 +82,42 @@ def _first_pilot(setup: Setup, ambient: np.ndarray) -> tuple[Samples, int]:
     round_number, rays, spent = 0, FIRST_RAYS, 0
     while True:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
-        found = sampler.trace_evenly(rays, rays, path_seed)
+        found = sampler.trace(_evenly(setup, rays, path_seed), rays, path_seed)
         found = found.take(found.followed)
         spent += paths_of(sampler, rays, rays)
         if found.light.any() or rays >= sampler.max_dark_candidates:
             return found, spent
         round_number, rays = round_number + 1, rays * 4
+
+
+def _evenly(setup: Setup, rays: int, seed: int) -> FilmPoints:
+    return even_film_points(setup.grid, rays, np.random.default_rng(seed))
+
+
+def aimed_film_points(setup: Setup, emission: EmissionSampler) -> FilmPoints:
+    """Where what shines, and what is bright of the surroundings, would be seen if nothing stood before it."""
+    rng, rig, grid = seeds.generator(EXPLORATION_SEED, stage="aimed pilot"), setup.rig, setup.grid
+    views, rows, columns = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0)]
+    if emission.mass:
+        view = np.arange(AIMED_RAYS) % grid.view_count
+        found = emission.film_points(view, rng)
+        views.append(view)
+        rows.append(found.row_px)
+        columns.append(found.col_px)
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=1)
+    direction = bright_directions(setup.render_scene, AIMED_RAYS, path_seed)
+    if len(direction):
+        view = np.arange(AIMED_RAYS) % grid.view_count
+        k, l = np.divmod(view, grid.cols)
+        x, y, z = np.einsum("nba,nb->an", rig.rotation[k, l], direction)
+        ahead = np.where(z > 0, z, np.nan)
+        scale_px, axis_px = grid.focal_mm / grid.pixel_mm, rig.axis_px[k, l]
+        views.append(view)
+        rows.append(y / ahead * scale_px + axis_px[:, 1])
+        columns.append(x / ahead * scale_px + axis_px[:, 0])
+    view, row, col = np.concatenate(views), np.concatenate(rows), np.concatenate(columns)
+    inside = (row >= -0.5) & (row < grid.height - 0.5) & (col >= -0.5) & (col < grid.width - 0.5)
+    return FilmPoints(view[inside], row[inside] + 0.5, col[inside] + 0.5)
 
 
 def _sampler_of_films(setup: Setup, ambient: np.ndarray) -> CandidateSampler:

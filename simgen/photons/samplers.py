@@ -14,12 +14,19 @@ from simgen.renderer.wavelengths import light_of
 
 
 def sampler_for(
-    setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
+    setup: Setup,
+    majorant: Majorant,
+    groups: Sequence[np.ndarray],
+    ambient: np.ndarray,
+    below: Majorant | None = None,
 ) -> CandidateSampler:
-    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around."""
+    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around.
+
+    With `below` those of what lies between the two majorants (see `CandidateSampler`).
+    """
     if is_scalar(setup.render_scene.mi):
-        return ScalarSampler(setup, majorant, groups)
-    return WavefrontSampler(setup, majorant, groups, ambient)
+        return ScalarSampler(setup, majorant, groups, below)
+    return WavefrontSampler(setup, majorant, groups, ambient, below)
 
 
 def surroundings(setup: Setup) -> np.ndarray:

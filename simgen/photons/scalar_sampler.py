@@ -12,7 +12,7 @@ import numpy as np
 
 from pcii.base.srgb import LUMINANCE
 from pcii.core.bayer import colour_cells
-from simgen.photons.candidates import Accepted, Setup, chances, even_film_points
+from simgen.photons.candidates import Accepted, FilmPoints, Setup, chances, require_finite
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
 from simgen.renderer.intersection import objects_by_shape, rows_of
@@ -51,9 +51,11 @@ class ScalarSampler:
 
     paths_each, max_dark_candidates = PATHS, 1 << 17
 
-    def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
-        self.setup, self.majorant = setup, majorant
-        self.groups = [chances(setup, majorant, cells) for cells in groups]
+    def __init__(
+        self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], below: Majorant | None
+    ) -> None:
+        self.setup, self.majorant, self.below = setup, majorant, below
+        self.groups = [chances(setup, majorant, below, cells) for cells in groups]
         self.mass = np.array([one.running[-1] for one in self.groups])
 
     def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
@@ -68,10 +70,15 @@ class ScalarSampler:
         candidate, chance = candidate[followed], chance[followed]
         object_id, z_mm = object_id[followed], z_mm[followed]
         light = self._follow(candidates, rng, seed)
-        at = np.arange(light.shape[0]), candidates.colour
-        ratio = light[at] / self.majorant.bound[candidates.entry, candidates.colour]
-        multiplicity = (ratio + chance).astype(np.int64)
-        kept, over = np.flatnonzero(multiplicity), np.flatnonzero(ratio > 1)
+        require_finite(self.setup, light, object_id)
+        own = light[np.arange(light.shape[0]), candidates.colour]
+        bound = self.majorant.bound[candidates.entry, candidates.colour]
+        floor = 0.0 if self.below is None else self.below.bound[candidates.entry, candidates.colour]
+        ratio = own / bound
+        kept, over = (
+            np.flatnonzero(chance * bound < np.minimum(own, bound) - floor),
+            np.flatnonzero(ratio > 1),
+        )
         photon = candidates.take(kept)
         return Accepted(
             photons=PhotonTable(
@@ -79,7 +86,7 @@ class ScalarSampler:
                 l=photon.l,
                 i=photon.row,
                 j=photon.col,
-                n=multiplicity[kept],
+                n=np.ones(kept.size, dtype=np.int64),
                 object_id=object_id[kept],
                 z_mm=z_mm[kept],
             ),
@@ -88,10 +95,10 @@ class ScalarSampler:
             over=self._samples(candidates.take(over), z_mm[over], light[over]),
         )
 
-    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
+    def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         """See `candidates`; only those that are followed are traced."""
         rng = np.random.default_rng(seed)
-        view, i, j = (part[:follow] for part in even_film_points(self.setup.grid, rays, rng))
+        view, i, j = (part[:follow] for part in points)
         k, l = np.divmod(view, self.setup.grid.cols)
         row, col = i.astype(np.int64), j.astype(np.int64)
         colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
@@ -99,7 +106,9 @@ class ScalarSampler:
         candidates = _Candidates(k, l, row, col, i - 0.5, j - 0.5, np.zeros_like(k), colour, *lens_point)
         turns = enumerate(self._in_colours(candidates))
         light = np.sum([self._follow(recoloured, rng, seed + turn) for turn, recoloured in turns], axis=0)
-        return self._samples(candidates, self._first_hits(candidates)[1], light)
+        object_id, z_mm = self._first_hits(candidates)
+        require_finite(self.setup, light, object_id)
+        return self._samples(candidates, z_mm, light)
 
     def _in_colours(self, candidates: _Candidates) -> Iterator[_Candidates]:
         """The candidates as often as they must be followed to show all colours."""
@@ -158,23 +167,34 @@ class ScalarSampler:
         return object_id, z_mm
 
     def _follow(self, candidates: _Candidates, rng: np.random.Generator, seed: int) -> np.ndarray:
-        """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0."""
+        """Radiance (N, C) of each, the mean of `PATHS` paths; in spectral mode of its own colour, else 0.
+
+        What the first hit shines itself is left out.
+        """
         render_scene = self.setup.render_scene
         sampler = render_scene.mi.load_dict({"type": "independent"})
         sampler.seed(seed, 1)
-        sample, scene = render_scene.scene.integrator().sample, render_scene.scene
+        integrate, scene = render_scene.scene.integrator().sample, render_scene.scene
+
+        def paths(ray: Any) -> np.ndarray:
+            """Mean of all paths, less what shines at the first hit; no less than 0 for rounding."""
+            total = np.array(sum(integrate(scene, sampler, ray)[0] for _ in range(PATHS))) / PATHS
+            if not render_scene.shining:
+                return total
+            hit = scene.ray_intersect(ray)
+            lamp = hit.emitter(scene) if hit.is_valid() else None
+            return total if lamp is None else np.maximum(total - np.array(lamp.eval(hit)), 0)
+
         if render_scene.filters is None:
             rgb = np.empty((candidates.k.size, 3))
             for number, ray in enumerate(self._traced(candidates)):
-                rgb[number] = sum(sample(scene, sampler, ray)[0] for _ in range(PATHS))
-            rgb /= PATHS
+                rgb[number] = paths(ray)
             return rgb if self.setup.cfa is not None else (rgb @ LUMINANCE)[:, None]
         chosen_nm, weight = render_scene.filters.draw(candidates.colour, rng.random(candidates.k.size))
         light = np.zeros((candidates.k.size, self.setup.channels))
         for number, ray in enumerate(self._traced(candidates)):
             ray.wavelengths = chosen_nm[number].tolist()
-            radiance = np.array(sum(sample(scene, sampler, ray)[0] for _ in range(PATHS)))
-            light[number, candidates.colour[number]] = weight[number] @ radiance / PATHS
+            light[number, candidates.colour[number]] = weight[number] @ paths(ray)
         return light
 
     def _traced(self, candidates: _Candidates) -> Iterator[Any]:

@@ -1,56 +1,50 @@
 """Photons, not pixels: photon-limited images by thinning, in the time that their photons take.
 
-A Poisson process of rate n L / E on the films, L the radiance in the pixel's colour and E its sum over
-the scope that the budget n is counted over, is a Poisson number of independent photons with the density
-L / E. So the number is drawn first, and then each photon by rejection: a candidate pixel from a majorant
-M, ONE light path through it in its own colour, kept with probability L(path) / M. The path's radiance is
-an unbiased estimate, so the kept pixel has exactly the density L / E, and E never needs to be known: the
-normaliser has no error, since nothing is normalised. No pixel is rendered and no rendering noise enters
-the counts (the marking and thinning theorems for Poisson processes; Lewis and Shedler 1979). With scope
-`exposure` the rate is absolute, g L: then the number of candidates is Poisson with mean g M, and those
-that are kept are the photons.
+The photons of a film are a Poisson process in time and place whose rate is the radiance L in the pixel's
+colour. It is drawn from candidates of a known higher rate M, the majorant: ONE light path through each in its
+own colour, kept with probability L(path) / M. The path's radiance is an unbiased estimate, so the kept ones
+have exactly the rate L, whatever M is: no pixel is rendered and no rendering noise enters the counts (the
+marking and thinning theorems for Poisson processes; Lewis and Shedler 1979). Light that comes straight from
+something that shines is drawn on its surface instead (`emission_sampler`). For scope `exposure` the time is
+given; for a budget it goes on until each scope has its photons, of which the first are kept, so the sum of
+the light is never needed and has no error.
 
-Where a path exceeds the majorant (L > M) it gives floor(L / M) photons and one more with the remaining
-probability: the mean stays exact, but these photons come in clumps. Each round lifts the majorant where it
-was exceeded, for the rounds after it: a kept photon has the density L / E whatever majorant it was drawn
-from. Photons are drawn in parts: all of some views, or a part of the exposure. Clumps are counted, and if a
-test of the counts could see those of all parts so far (`pairs_allowed`) the last part is drawn again from
-the majorant as it is by then.
+Where a path exceeds the majorant it was drawn from, the draw goes on: the majorant is raised there, and what
+lies between the old one and the new one is drawn for all the time that has passed, until no path exceeds.
+Nothing is drawn again and nothing discarded, so the result does not depend on what was met, and no two
+photons come of one path. docs/theory.md has the proof.
 """
 
-import math
-from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import CandidateSampler, Setup, paths_of
-from simgen.photons.exploration import LEAST_SHARE, Exploration, explore, pairs_allowed, pairs_of
-from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, cell_groups, places, scopes_for
+from simgen.photons.disparity_layers import Samples
+from simgen.photons.exploration import LEAST_SHARE, Exploration, explore
+from simgen.photons.photon_scopes import (
+    WAVEFRONT,
+    PhotonScopes,
+    candidates_needed,
+    cell_groups,
+    places,
+    scopes_for,
+)
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
-ATTEMPTS = 8
-"""Draws of a part at most; of the least that exploration accepts, one in four within the rule, eight fail
-in 10 % of cases."""
-
-Part = Callable[[int], Iterator[PhotonTable]]
-"""Rounds of a part, given which attempt it is."""
-
-
-@dataclass
-class _Tally:
-    candidates: int = 0
-    followed: int = 0
-    kept: int = 0
-    overshoot: int = 0
-    pairs: int = 0
-    """Of photons that one path gave."""
+MOST_RAISES = 64
+"""How often the majorant is raised in one draw at most; light that exceeds every bound is refused then."""
+MOST_EXTRA = 256
+"""Candidates above a raised majorant, as a multiple of all before them (or of a wavefront, if that is more):
+what would take longer is refused."""
+MOST_AT_ONCE = 1 << 25
+"""Photons of more than this are drawn in parts, of which only the counts are kept."""
 
 
 def thin_photons(
@@ -66,15 +60,29 @@ def thin_photons(
     """All photons of all views, ordered by view and pixel, and a log of how they came about.
 
     One row for each photon, with scope, rank and first hit; the same for the same setup, settings and seed.
-    Without `keeps_origins` the same photons, a row for each pixel that caught any: of more than memory holds.
+    Without `keeps_origins` a row for each pixel that caught any: of more photons than memory holds.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
-    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it.
+    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it;
+    `InputError` for radiance that is not finite, and for light that exceeds every bound.
     """
     if explored is None:
         explored = explore(setup, photons, photons_per_radiance)
-    return _Drawing(setup, photons, seed, photons_per_radiance, explored, report).run(keeps_origins)
+    draw = _Drawing(setup, photons, seed, photons_per_radiance, explored, report)
+    drawn = draw.all_photons() if keeps_origins else draw.counts()
+    return drawn.by_pixel(setup.grid), draw.log()
+
+
+@dataclass
+class _Tally:
+    candidates: int = 0
+    followed: int = 0
+    kept: int = 0
+    paths: int = 0
+    raises: int = 0
+    above_bound: int = 0
+    """Paths that exceeded the majorant that they were drawn from."""
 
 
 class _Drawing:
@@ -90,140 +98,231 @@ class _Drawing:
         report: Report,
     ) -> None:
         self.setup, self.photons, self.seed, self.report = setup, photons, seed, report
-        self.gain = photons_per_radiance
+        self.gain, self.explored, self.share = photons_per_radiance, explored, explored.share
         self.groups = cell_groups(photons.scope, setup.cfa)
         self.scopes = scopes_for(photons, setup.grid.view_count, len(self.groups), seed)
-        self.tally = _Tally()
-        self.explored, self.share = explored, explored.share
         self.majorant = None if explored.majorant is None else explored.majorant.copy()
-        self.attempts, self.paths = 1, explored.paths
+        self.tally = _Tally(paths=explored.paths)
+        self.stream = 0
+        """Number of the next round's random numbers."""
 
-    def run(self, keeps_origins: bool) -> tuple[PhotonTable, dict[str, Any]]:
-        """Draw all parts, each again while too many photons come in clumps."""
-        parts = () if self.majorant is None else self._parts()
-        drawn = joined([no_photons(), *parts]) if keeps_origins else self._summed(parts)
+    def all_photons(self) -> PhotonTable:
+        """Every photon one by one."""
+        return self._part(self.scopes, self.gain)
+
+    def counts(self) -> PhotonTable:
+        """A row for each pixel that caught photons, drawn in parts that memory holds.
+
+        Each part is a draw of its own for a share of the budgets or of the exposure. What one part has
+        learned of the light the next ones know; the parts before it are not gone back to.
+        """
+        grid = self.setup.grid
+        shape, total = grid.shape_KLHW, np.zeros(int(np.prod(grid.shape_KLHW)), dtype=np.int64)
+        parts = int(np.ceil(self._expected() / (MOST_AT_ONCE / 4)))
+        for part in range(parts):
+            scopes = self.scopes.part(part, parts)
+            photons = self._part(scopes, None if self.gain is None else self.gain / parts)
+            np.add.at(total, photons.flat_pixels(grid), 1)
+            self.scopes.got += scopes.got
+            self.scopes.tried += scopes.tried
+            self.report("parts of the photons", part + 1, parts)
+        pixel = np.flatnonzero(total)
+        k, l, i, j = np.unravel_index(pixel, shape)
+        return PhotonTable(k, l, i, j, total[pixel])
+
+    def log(self) -> dict[str, Any]:
+        """What the manifest says of the draw."""
         tally, scopes = self.tally, self.scopes
-        log = {
+        return {
             "method": "thinning",
             "candidates": tally.candidates,
             "followed": tally.followed,
             "kept": tally.kept,
             "kept_share": round(tally.kept / max(tally.candidates, 1), 4),
-            "overshoot_photons": tally.overshoot,
-            "clump_pairs": tally.pairs,
-            "clump_pairs_allowed": self._pairs_allowed(),
-            "attempts": self.attempts,
-            "paths": self.paths,
+            "paths_above_bound": tally.above_bound,
+            "bound_raised": tally.raises,
+            "share_above_bound_before": float(f"{self.explored.excess_share:.3g}"),
+            "paths": tally.paths,
             "scopes_without_light": int(((scopes.got == 0) & (scopes.wanted > 0)).sum()),
         }
-        return drawn.by_pixel(self.setup.grid), log
 
-    def _parts(self) -> Iterator[PhotonTable]:
-        """The photons of all parts; one that keeps too many clumps is the last."""
-        for part in self._exposed() if self.gain is not None else self._budgeted():
-            yield self._photons_of(part)
-            if self._has_too_many_clumps():
-                return
+    def _expected(self) -> float:
+        """Photons of all scopes, about."""
+        if self.gain is None:
+            return float(self.scopes.wanted.sum())
+        return float(self.gain * self._mass(self._film_sampler()).sum() * self.scopes.view.size * self.share)
 
-    def _photons_of(self, part: Part) -> PhotonTable:
-        """The photons of a part, drawn again while too many come in clumps, `ATTEMPTS` times at most."""
-        scopes, tally, attempt = self.scopes, self.tally, 0
-        got, tried = scopes.got, scopes.tried
-        while True:
-            scopes.got, scopes.tried, self.tally = got.copy(), tried.copy(), replace(tally)
-            photons = joined([no_photons(), *part(attempt)])
-            attempt += 1
-            self.attempts = max(self.attempts, attempt)
-            if not self._has_too_many_clumps() or attempt == ATTEMPTS:
-                return photons
+    def _part(self, scopes: PhotonScopes, gain: float | None) -> PhotonTable:
+        """All photons of these scopes: of the exposure `gain`, or as many as each wants."""
+        found = _Found()
+        if self.majorant is not None or self.explored.emission.mass:
+            if gain is None:
+                self._fill_budgets(scopes, found)
+            else:
+                self._expose(scopes, gain, found)
+            self._draw_above(scopes, found)
+        return self._first_of_each(scopes, found)
 
-    def _has_too_many_clumps(self) -> bool:
-        return self.tally.pairs > self._pairs_allowed()
-
-    def _pairs_allowed(self) -> float:
-        """How many pairs of the photons so far may come from one path."""
-        return pairs_allowed(self.tally.kept, math.prod(self.setup.grid.shape_KLHW))
-
-    def _summed(self, rounds: Iterable[PhotonTable]) -> PhotonTable:
-        """A row for each pixel that caught photons, in all of these rounds."""
-        grid = self.setup.grid
-        counts = np.zeros(math.prod(grid.shape_KLHW), dtype=np.int64)
-        for photons in rounds:
-            np.add.at(counts, photons.flat_pixels(grid), 1)
-        pixel = np.flatnonzero(counts)
-        k, l, i, j = np.unravel_index(pixel, grid.shape_KLHW)
-        return PhotonTable(k, l, i, j, counts[pixel])
-
-    def _sampler(self) -> CandidateSampler:
-        assert self.majorant is not None
-        return sampler_for(self.setup, self.majorant, self.groups, self.explored.ambient)
-
-    def _budgeted(self) -> Iterator[Part]:
+    def _fill_budgets(self, scopes: PhotonScopes, found: "_Found") -> None:
         """Blocks of scopes, each in rounds of candidates until all have their photons, or are dark."""
-        most_dark, shown = self.explored.max_dark_candidates, 0
-
-        def block_of(part: int, block: np.ndarray, attempt: int) -> Iterator[PhotonTable]:
-            nonlocal shown
+        sampler, wanted = self._film_sampler(), int(scopes.wanted.sum())
+        most_dark = self.explored.max_dark_candidates
+        for block in scopes.blocks():
             round_number = 0
-            while (wanting := np.intersect1d(self.scopes.open(most_dark), block)).size:
-                missing = self.scopes.wanted[wanting] - self.scopes.got[wanting]
+            while (wanting := np.intersect1d(scopes.open(most_dark), block)).size:
+                missing = scopes.wanted[wanting] - scopes.got[wanting]
                 candidates = candidates_needed(missing, round_number, self.share)
-                yield self._round(wanting, candidates, self._sampler(), part, attempt, round_number)
+                time = candidates / self._mass(sampler)[scopes.group[wanting]]
+                self._round(sampler, scopes, wanting, scopes.time[wanting], time, found, emits=True)
+                scopes.time[wanting] += time
                 round_number += 1
-                shown = max(shown, int(self.scopes.got.sum()))  # never less, if a block is drawn again
-                self.report("photons", shown, int(self.scopes.wanted.sum()))
+                self.report("photons", int(np.minimum(scopes.got, scopes.wanted).sum()), wanted)
 
-        for part, block in enumerate(self.scopes.blocks()):
-            yield partial(block_of, part, block)
-
-    def _exposed(self) -> Iterator[Part]:
-        """The exposure in as many equal parts as make its candidates fit a wavefront each."""
-        assert self.gain is not None
-        gain, views = self.gain, np.arange(self.setup.grid.view_count)
-        parts = int(np.ceil(gain * self._sampler().mass[0] * views.size / (WAVEFRONT / 2)))
-
-        def exposed(part: int, attempt: int) -> Iterator[PhotonTable]:
-            sampler = self._sampler()
-            rng = seeds.generator(self.seed, stage="exposure candidates", part=part, attempt=attempt)
-            candidates = rng.poisson(gain / parts * sampler.mass[0], views.size)
-            yield self._round(views, candidates, sampler, part, attempt)
+    def _expose(self, scopes: PhotonScopes, gain: float, found: "_Found") -> None:
+        """The exposure in as many equal parts as make their candidates fit a wavefront each."""
+        sampler, everything = self._film_sampler(), np.arange(scopes.view.size)
+        parts = int(np.ceil(gain * self._mass(sampler).max() * everything.size / (WAVEFRONT / 2)))
+        for part in range(parts):
+            time = np.full(everything.size, gain / parts)
+            self._round(sampler, scopes, everything, scopes.time, time, found, emits=True)
+            scopes.time += time
             self.report("parts of the exposure", part + 1, parts)
 
-        for part in range(parts):
-            yield partial(exposed, part)
+    def _draw_above(self, scopes: PhotonScopes, found: "_Found") -> None:
+        """Raise the majorant where paths exceeded it, and draw what lies between, until none exceeds."""
+        for raised in range(1, MOST_RAISES + 1):
+            over = found.take_over()
+            if over is None:
+                return
+            assert self.majorant is not None
+            self.tally.raises += 1
+            self.tally.above_bound += over.k.size
+            below, before = self.majorant.copy(), max(self.tally.candidates, WAVEFRONT)
+            self.majorant.raise_bounds(over, reach=raised)
+            sampler = sampler_for(self.setup, self.majorant, self.groups, self.explored.ambient, below)
+            expected = scopes.time * sampler.mass[scopes.group]
+            if expected.sum() > MOST_EXTRA * before:
+                break
+            every = np.flatnonzero(expected)
+            for some in np.split(
+                every, np.flatnonzero(np.diff(expected[every].cumsum() // (WAVEFRONT / 2))) + 1
+            ):
+                self._round(sampler, scopes, some, np.zeros(some.size), scopes.time[some], found)
+            self.report(f"photons above the bound, raised {raised} times", raised, raised)
+        else:
+            if found.take_over() is None:
+                return
+        raise InputError(
+            "photons: some light paths are so much brighter than all that were met before that single "
+            "photons of them cannot be drawn; make lamps larger, metals rougher, or openings wider"
+        )
+
+    def _first_of_each(self, scopes: PhotonScopes, found: "_Found") -> PhotonTable:
+        """The photons in order of time, of each scope as many as it wants."""
+        photons, scope, time = found.photons()
+        order = np.lexsort((time, scope))
+        scope = scope[order]
+        rank = places(scope)
+        taken = rank < scopes.wanted[scope]
+        order, scope, rank = order[taken], scope[taken], rank[taken]
+        scopes.got[:] = np.bincount(scope, minlength=scopes.got.size)
+        self.tally.kept += order.size
+        return replace(photons.take(order), scope=scope, rank=rank)
+
+    def _film_sampler(self) -> CandidateSampler | None:
+        if self.majorant is None:
+            return None
+        return sampler_for(self.setup, self.majorant, self.groups, self.explored.ambient)
+
+    def _mass(self, sampler: CandidateSampler | None) -> np.ndarray:
+        """Candidates of each group (G,) in one view and unit of time, of films and of what shines."""
+        of_films = np.zeros(len(self.groups)) if sampler is None else sampler.mass
+        return of_films + self.explored.emission.mass
 
     def _round(
         self,
-        scopes: np.ndarray,
-        candidates: np.ndarray,
-        sampler: CandidateSampler,
-        part: int,
-        attempt: int,
-        round_number: int = 0,
-    ) -> PhotonTable:
-        """Photons of one round of a part of the work: so many candidates for each of these scopes."""
-        owner = scopes.repeat(candidates)
-        views = None if self.photons.scope == "scene" else self.scopes.view[owner]
-        path_seed = seeds.integer(
-            self.seed, stage="candidate paths", part=part, attempt=attempt, round_number=round_number
-        )
-        found = sampler.try_candidates(self.scopes.group[owner], views, path_seed)
-        # Light that is rare but spread far shows on few tiles at a time: it is sought ever farther around.
-        sampler.majorant.lift(found.over, reach=1 + attempt)
-        path = np.arange(found.candidate.size).repeat(found.photons.n)
-        scope = owner[found.candidate[path]]
-        rank = places(scope) + self.scopes.got[scope]
-        taken = rank < self.scopes.wanted[scope]
-        path, scope, rank = path[taken], scope[taken], rank[taken]
-        self.scopes.got += np.bincount(scope, minlength=self.scopes.got.size)
-        self.scopes.tried[scopes] += candidates
-        self.tally.candidates += owner.size
-        self.tally.followed += found.ratio.size
-        self.paths += paths_of(sampler, owner.size, found.ratio.size)
-        self.tally.kept += path.size
-        of_path = np.bincount(path)
-        self.tally.overshoot += int(np.maximum(of_path - 1, 0).sum())
-        self.tally.pairs += pairs_of(of_path)
-        self.share = max(found.photons.n.sum() / max(owner.size, 1), LEAST_SHARE)
-        photons = found.photons.take(path)
-        return replace(photons, n=np.ones_like(photons.n), scope=scope, rank=rank)
+        sampler: CandidateSampler | None,
+        scopes: PhotonScopes,
+        which: np.ndarray,
+        begin: np.ndarray,
+        duration: np.ndarray,
+        found: "_Found",
+        *,
+        emits: bool = False,
+    ) -> None:
+        """Candidates of these scopes, from time `begin` on: of films, and with `emits` of what shines."""
+        numbers = {"seed": self.seed, "round_number": self.stream}
+        self.stream += 1
+        rng = seeds.generator(stage="candidate numbers", **numbers)
+        emission, photons_before = self.explored.emission, scopes.got.sum()
+        candidates = 0
+        if sampler is not None:
+            number = rng.poisson(duration * sampler.mass[scopes.group[which]])
+            owner = which.repeat(number)
+            views = None if self.photons.scope == "scene" else scopes.view[owner]
+            part = sampler.try_candidates(
+                scopes.group[owner], views, seeds.integer(stage="candidate paths", **numbers)
+            )
+            start, length = begin.repeat(number), duration.repeat(number)
+            found.add(part.photons, owner, part.candidate, start, length, rng)
+            found.over.append(part.over)
+            scopes.got += np.bincount(owner[part.candidate], minlength=scopes.got.size)
+            scopes.tried[which] += number
+            candidates += owner.size
+            self.tally.followed += part.ratio.size
+            self.tally.paths += paths_of(sampler, owner.size, part.ratio.size)
+        if emits and emission.mass:
+            number = rng.poisson(duration * emission.mass)
+            owner = which.repeat(number)
+            views = scopes.view[owner]
+            if self.photons.scope == "scene":
+                views = rng.integers(0, self.setup.grid.view_count, owner.size)
+            part = emission.try_candidates(
+                scopes.group[owner], views, self.groups, seeds.integer(stage="emission candidates", **numbers)
+            )
+            found.add(part.photons, owner, part.candidate, begin.repeat(number), duration.repeat(number), rng)
+            scopes.got += np.bincount(owner[part.candidate], minlength=scopes.got.size)
+            scopes.tried[which] += number
+            candidates += owner.size
+            self.tally.paths += owner.size
+        self.tally.candidates += candidates
+        if emits:
+            self.share = max((scopes.got.sum() - photons_before) / max(candidates, 1), LEAST_SHARE)
+
+
+class _Found:
+    """Photons so far, each with its scope and its time, and paths that exceeded the majorant."""
+
+    def __init__(self) -> None:
+        self.tables: list[PhotonTable] = [no_photons()]
+        self.scope: list[np.ndarray] = [np.zeros(0, np.int64)]
+        self.time: list[np.ndarray] = [np.zeros(0)]
+        self.over: list[Samples] = []
+
+    def add(
+        self,
+        photons: PhotonTable,
+        owner: np.ndarray,
+        candidate: np.ndarray,
+        start: np.ndarray,
+        length: np.ndarray,
+        rng: np.random.Generator,
+    ) -> None:
+        """Photons of these candidates, whose scopes are `owner`, at times within `length` after `start`."""
+        self.tables.append(photons)
+        self.scope.append(owner[candidate])
+        self.time.append(start[candidate] + length[candidate] * rng.random(candidate.size))
+
+    def photons(self) -> tuple[PhotonTable, np.ndarray, np.ndarray]:
+        """All photons, their scopes and their times."""
+        return joined(self.tables), np.concatenate(self.scope), np.concatenate(self.time)
+
+    def take_over(self) -> Samples | None:
+        """The paths that exceeded the majorant since the last call, None if there are none."""
+        parts, self.over = [part for part in self.over if part.k.size], []
+        if not parts:
+            return None
+        total = parts[0]
+        for part in parts[1:]:
+            total = total.join(part)
+        return total

@@ -37,10 +37,12 @@ class MajorantArrays:
     `mass` (G,) is the sum of the bounds of the pixels of each group in one view.
     """
 
-    def __init__(self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray]) -> None:
+    def __init__(
+        self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], below: Majorant | None
+    ) -> None:
         self.setup, self.majorant = setup, majorant
         mi, layers = setup.render_scene.mi, majorant.layers
-        of_groups = [chances(setup, majorant, cells) for cells in groups]
+        of_groups = [chances(setup, majorant, below, cells) for cells in groups]
         sizes = np.array([one.running.size for one in of_groups])
         ends = np.cumsum(sizes)
         self.mass = np.array([one.running[-1] for one in of_groups])
@@ -61,6 +63,10 @@ class MajorantArrays:
             floats(mi, majorant.bound),
             floats(mi, majorant.radiance_ratio_bound),
         )
+        # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
+        nowhere = np.zeros_like(majorant.bound)
+        self.bound_below = floats(mi, nowhere if below is None else below.bound)
+        self.ratio_bound_below = floats(mi, nowhere if below is None else below.radiance_ratio_bound)
         self.dim = floats(mi, majorant.dim)
         self.entry_of = signed(mi, majorant.entry_of)
         self.layer_at = signed(mi, layers.layer_at)
@@ -106,6 +112,21 @@ class MajorantArrays:
         return Candidates(
             k, l, row, col, row_px, col_px, entry, colour, wavelength_sample, inside, lens_point
         )
+
+    def limits(self, where: Any, colour: Any, guess: Any) -> tuple[Any, Any]:
+        """What a path's radiance is at most, and what it was under the earlier majorant.
+
+        `where` is the index of its entry and colour, `guess` the radiance that is guessed of its first hit.
+        """
+        mi, dr = self.setup.render_scene.mi, load_drjit()
+        dim = dr.gather(mi.Float, self.dim, colour)
+
+        def limit(bound: Any, radiance_ratio_bound: Any) -> Any:
+            by_guess = dr.maximum(dr.gather(mi.Float, radiance_ratio_bound, where) * guess, dim)
+            return dr.minimum(dr.gather(mi.Float, bound, where), by_guess)
+
+        above = limit(self.bound, self.radiance_ratio_bound)
+        return above, limit(self.bound_below, self.ratio_bound_below)
 
     def at(self, sampler: Any, view: np.ndarray, i: np.ndarray, j: np.ndarray, light: Light) -> Candidates:
         """Candidates (N,) of no entry at given views and places: rows and columns in [0, H) and [0, W)."""

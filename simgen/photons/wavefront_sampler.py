@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from simgen.photons.candidates import Accepted, Setup, even_film_points, nothing
+from simgen.photons.candidates import Accepted, FilmPoints, Setup, nothing, require_finite
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant
 from simgen.photons.wavefront_candidates import Candidates, MajorantArrays
@@ -35,11 +35,16 @@ class WavefrontSampler:
     paths_each, max_dark_candidates = 1, 1 << 20
 
     def __init__(
-        self, setup: Setup, majorant: Majorant, groups: Sequence[np.ndarray], ambient: np.ndarray
+        self,
+        setup: Setup,
+        majorant: Majorant,
+        groups: Sequence[np.ndarray],
+        ambient: np.ndarray,
+        below: Majorant | None,
     ) -> None:
-        self.setup, self.majorant = setup, majorant
+        self.setup, self.majorant, self.below = setup, majorant, below
         self.light = light_of(setup.render_scene, setup.cfa)
-        self.arrays = MajorantArrays(setup, majorant, groups)
+        self.arrays = MajorantArrays(setup, majorant, groups, below)
         self.mass = self.arrays.mass
         self.ambient = [opaque(setup.render_scene.mi.Float, part) for part in ambient]
 
@@ -53,37 +58,34 @@ class WavefrontSampler:
         candidates = self.arrays.draw(sampler, unsigned(mi, group), _views(setup, sampler, view), self.light)
         first, threshold, chance = self._hit_first(candidates), sampler.next_1d(), sampler.next_1d()
         where = candidates.entry * setup.channels + candidates.colour
-        bound, radiance_ratio_bound = (
-            dr.gather(mi.Float, self.arrays.bound, where),
-            dr.gather(mi.Float, self.arrays.radiance_ratio_bound, where),
-        )
+        bound = dr.gather(mi.Float, self.arrays.bound, where)
         guess = self._in_own_colour(first.guess, candidates)
-        most = dr.minimum(
-            bound,
-            dr.maximum(radiance_ratio_bound * guess, dr.gather(mi.Float, self.arrays.dim, candidates.colour)),
-        )
-        promising = candidates.inside & (threshold * bound < most)
+        most, floor = self.arrays.limits(where, candidates.colour, guess)
+        promising = candidates.inside & (threshold * bound < most - floor)
         promising &= mi.UInt32(self.arrays.owner_of(candidates, first.z_mm)) == candidates.entry
-        dr.eval(promising, most, chance)
+        dr.eval(promising, most, floor, chance)
         rest = dr.compress(promising)
         if len(rest) == 0:
             return nothing(setup.channels)
         candidates, first = _take(candidates, rest), _take(first, rest)
         light = self._follow(candidates, first, seed)
-        ratio = self._in_own_colour(light, candidates) / dr.gather(mi.Float, most, rest)
-        multiplicity = mi.UInt32(ratio + dr.gather(mi.Float, chance, rest))
-        dr.eval(multiplicity, ratio)
-        kept, over = dr.compress(multiplicity > 0), dr.compress(ratio > 1)
+        most, floor = dr.gather(mi.Float, most, rest), dr.gather(mi.Float, floor, rest)
+        radiance = self._in_own_colour(light, candidates)
+        is_kept = dr.gather(mi.Float, chance, rest) * (most - floor) < radiance - floor
+        ratio = radiance / most
+        dr.eval(is_kept, ratio)
+        kept, over = dr.compress(is_kept), dr.compress(ratio > 1)
         photon, hit = _take(candidates, kept), _take(first, kept)
-        candidate, multiplicity = dr.gather(mi.UInt32, rest, kept), dr.gather(mi.UInt32, multiplicity, kept)
-        dr.eval(vars(photon), hit.shape, hit.z_mm, candidate, multiplicity)
+        candidate = dr.gather(mi.UInt32, rest, kept)
+        dr.eval(vars(photon), hit.shape, hit.z_mm, candidate)
+        self._require_finite(ratio, first)
         return Accepted(
             photons=PhotonTable(
                 k=np.array(photon.k),
                 l=np.array(photon.l),
                 i=np.array(photon.row),
                 j=np.array(photon.col),
-                n=np.array(multiplicity),
+                n=np.ones(len(kept), dtype=np.int64),
                 object_id=setup.render_scene.object_of_shape[np.array(hit.shape)],
                 z_mm=np.array(hit.z_mm),
             ),
@@ -94,20 +96,21 @@ class WavefrontSampler:
             else nothing(setup.channels).over,
         )
 
-    def trace_evenly(self, rays: int, follow: int, seed: int) -> Samples:
+    def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         """See `candidates`."""
         setup = self.setup
         mi, dr = setup.render_scene.mi, load_drjit()
-        view, i, j = even_film_points(setup.grid, rays, np.random.default_rng(seed))
-        candidates = self.arrays.at(_sampler(mi, seed, view.size), view, i, j, self.light)
+        view = points.view
+        candidates = self.arrays.at(_sampler(mi, seed, view.size), view, points.row, points.col, self.light)
         some = dr.arange(mi.UInt32, min(follow, view.size))
         guess, light = [0.0] * setup.channels, [0.0] * setup.channels
         z_mm = None
         for turn, colour in enumerate(self.light.colours_to_follow(candidates.colour)):
             recoloured = replace(candidates, colour=colour)
             first = self._hit_first(recoloured)
-            followed = _take(recoloured, some)
-            found = self._follow(followed, _take(first, some), seed + turn)
+            followed, first_of_followed = _take(recoloured, some), _take(first, some)
+            found = self._follow(followed, first_of_followed, seed + turn)
+            self._require_finite(dr.sum(found), first_of_followed)
             part = self.light.per_colour(first.guess, colour, candidates.wavelength_sample)
             guess = [old + new for old, new in zip(guess, part, strict=True)]
             part = self.light.per_colour(found, followed.colour, followed.wavelength_sample)
@@ -142,6 +145,12 @@ class WavefrontSampler:
         light = radiance_along(render_scene, rays, first.record, sampler, self.setup.max_depth)
         dr.eval(light)
         return light
+
+    def _require_finite(self, radiance: Any, first: FirstHits) -> None:
+        """`InputError` for radiance that is not finite, with the object that was hit first."""
+        values = np.array(radiance)
+        if not np.isfinite(values).all():
+            require_finite(self.setup, values, self.setup.render_scene.object_of_shape[np.array(first.shape)])
 
     def _in_own_colour(self, radiance: Any, candidates: Candidates) -> Any:
         """What each candidate's pixel gets of radiance that rays carry."""

@@ -1,5 +1,7 @@
-"""Objects that shine by themselves: as Mitsuba's emitters, and the light that they give a plane."""
+"""What shines and has a place: as Mitsuba's emitters, the light that it gives a plane, and where it is."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,15 +10,88 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import Assets
 from simgen.assets.mesh_points import bears_pictures_once, surface_points
-from simgen.assets.solids import triangles_of
-from simgen.renderer.mitsuba_colours import is_spectral, radiance_plugin
+from simgen.assets.solids import card_triangles, globe, triangles_of
+from simgen.renderer.mitsuba_colours import is_spectral, light_spectrum, radiance_plugin
+from simgen.renderer.mitsuba_lights import area_light_pose
 from simgen.renderer.mitsuba_shapes import check_texcoords, pose_of, solid_parts
 from simgen.renderer.mitsuba_surfaces import texture_plugin
-from simgen.spec.scene import SceneObject
+from simgen.spec.lights import AreaLight, Illuminant
+from simgen.spec.scene import Scene, SceneObject
 from simgen.spec.shapes import Card, Sphere
+from simgen.spectral.filters import Filters
+from simgen.spectral.spectra import integral
 
 POINTS = 1 << 12
 """On the surface of an object, at which its light is summed up."""
+BALL_ROWS = 16
+"""Rows of the triangles that a ball's points are drawn on, before they are moved onto the ball itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShiningSurface:
+    """A surface that shines on the side of its normals, evenly in all directions, as triangles.
+
+    `corners_mm` (M, 3, 3), in the world, turn about their normals as Mitsuba's do. `radiance` (C,) is in the
+    unit of rendered views, C = 3 where light is linear sRGB; with a `picture` (H, W, 3) it is multiplied by
+    the pixel at `texcoords` (M, 3, 2), linear in between as Mitsuba has it. `number` is that of the object, 0
+    for a lamp. Of a `ball` (centre, radius, and the columns of its pose) the triangles are only near.
+    """
+
+    number: int
+    corners_mm: np.ndarray
+    radiance: np.ndarray
+    picture: np.ndarray | None = None
+    texcoords: np.ndarray | None = None
+    ball: tuple[np.ndarray, float, np.ndarray] | None = None
+
+
+def shining_surfaces(
+    mi: Any, scene: Scene, assets: Assets, gain: float, filters: Filters | None
+) -> Iterator[ShiningSurface]:
+    """All that shines and can be seen: objects, and lamps with a surface."""
+
+    def radiance(luminance_cd_m2: float, illuminant: Illuminant) -> np.ndarray:
+        if filters is None:
+            return np.array(radiance_plugin(mi, gain * luminance_cd_m2, illuminant)["value"])
+        spectrum = gain * luminance_cd_m2 * light_spectrum(mi, illuminant)
+        return integral(filters.sensitivity * spectrum)
+
+    for light in scene.lights:
+        if isinstance(light, AreaLight):
+            square = card_triangles(2.0, 2.0)
+            pose = area_light_pose(light) * [1, -1, -1, 1]  # a card faces -Z, Mitsuba's rectangle +Z
+            yield ShiningSurface(
+                0,
+                _placed(square.positions, pose)[square.faces],
+                radiance(light.luminance_cd_m2, light.illuminant),
+            )
+    for number, thing in enumerate(scene.objects, start=1):
+        emission, shape = thing.material.emission, thing.shape
+        if emission is None:
+            continue
+        pose = np.array(pose_of(mi, thing).matrix, dtype=np.float64)
+        is_ball = isinstance(shape, Sphere)
+        triangles = (
+            globe(shape.radius_mm, BALL_ROWS) if is_ball else solid_parts(shape, thing.material, assets)
+        )
+        picture, texcoords = None, None
+        if emission.texture is not None and triangles.texcoords is not None:
+            picture = assets.image(emission.texture)
+            texcoords = triangles.texcoords.astype(np.float64)[triangles.faces]
+        yield ShiningSurface(
+            number,
+            _placed(triangles.positions, pose)[triangles.faces],
+            radiance(emission.luminance_cd_m2, emission.illuminant)
+            if picture is None
+            else np.full(3, gain * emission.luminance_cd_m2),
+            picture,
+            texcoords,
+            (pose[:3, 3], shape.radius_mm, pose[:3, :3]) if is_ball else None,
+        )
+
+
+def _placed(positions: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    return positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
 
 
 def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) -> dict[str, Any] | None:

@@ -39,16 +39,49 @@ def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: n
 def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
     """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
     mi, scene = render_scene.mi, render_scene.scene
+    if is_scalar(mi):
+        rays = _scalar_rays(mi, origin_mm, target_mm, SHY_OF_TARGET)
+        return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(origin_mm))
+    return np.array(scene.ray_test(_rays_to(mi, origin_mm, target_mm, SHY_OF_TARGET)))
+
+
+def standing_before(
+    render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
+) -> np.ndarray:
+    """Object id (N,) int16 of what stands between origins and targets (N, 3): 0 of no object, -1 for nothing.
+
+    Rays stop `shy_of_target` of their length before the target.
+    """
+    mi, scene = render_scene.mi, render_scene.scene
+    if not len(origin_mm):
+        return np.zeros(0, dtype=np.int16)
+    if is_scalar(mi):
+        ids, hits = objects_by_shape(render_scene), []
+        for ray in _scalar_rays(mi, origin_mm, target_mm, shy_of_target):
+            hit = scene.ray_intersect(mi.RayDifferential3f(ray))
+            hits.append(ids[hit.shape.id()] if hit.is_valid() else -1)
+        return np.array(hits, dtype=np.int16)
+    dr = load_drjit()
+    hit = scene.ray_intersect_preliminary(_rays_to(mi, origin_mm, target_mm, shy_of_target))
+    shape = np.array(dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0))
+    return np.where(shape > 0, render_scene.object_of_shape[shape], np.int16(-1))
+
+
+def _rays_to(mi: Any, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float) -> Any:
     away = target_mm - origin_mm
     length = np.linalg.norm(away, axis=-1)
-    unit, reach = away / length[:, None], length * (1 - SHY_OF_TARGET)
-    if is_scalar(mi):
-        rows = rows_of(np.column_stack([origin_mm, unit, reach]))
-        rays = (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
-        return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(unit))
-    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin_mm), _vectors(mi, mi.Vector3f, unit))
-    ray.maxt = floats(mi, reach)
-    return np.array(scene.ray_test(ray))
+    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin_mm), _vectors(mi, mi.Vector3f, away / length[:, None]))
+    ray.maxt = floats(mi, length * (1 - shy_of_target))
+    return ray
+
+
+def _scalar_rays(
+    mi: Any, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
+) -> Iterator[Any]:
+    away = target_mm - origin_mm
+    length = np.linalg.norm(away, axis=-1)
+    rows = rows_of(np.column_stack([origin_mm, away / length[:, None], length * (1 - shy_of_target)]))
+    return (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
 
 
 def _vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:

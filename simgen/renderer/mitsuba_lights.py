@@ -60,13 +60,13 @@ def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | 
             radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
             return {
                 "type": "rectangle",
-                "to_world": mi.ScalarTransform4f(_pose(light)),
+                "to_world": mi.ScalarTransform4f(area_light_pose(light)),
                 "emitter": {"type": "area", "radiance": radiance},
                 "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
             }
 
 
-def _pose(light: AreaLight) -> np.ndarray:
+def area_light_pose(light: AreaLight) -> np.ndarray:
     """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
     return _facing(light) * [light.width_mm / 2, light.height_mm / 2, 1, 1]
 
@@ -150,7 +150,7 @@ def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) 
             assert surroundings is not None
             return light.luminance_cd_m2 * _from_around(light, surroundings)
         case AreaLight():
-            pose, (node, weight) = _pose(light), np.polynomial.legendre.leggauss(NODES)
+            pose, (node, weight) = area_light_pose(light), np.polynomial.legendre.leggauss(NODES)
             x, y = np.meshgrid(node, node)
             places = pose[:3, :3] @ np.stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + pose[:3, 3:]
             towards = places - point[:, None]

@@ -9,14 +9,16 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
+from simgen.assets.solids import triangles_of
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
-from simgen.renderer.emission import emission_plugin, object_lux
+from simgen.renderer.emission import ShiningSurface, emission_plugin, object_lux, shining_surfaces
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_shapes import card_pose, placed_shape
 from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_key, surface_plugin, two_sided
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import Scene, SceneObject
+from simgen.spec.shapes import Mesh, Sphere
 from simgen.spectral.filters import Filters, filters_for
 
 BACKDROP, OBJECT, LIGHT = "backdrop", "object", "light"
@@ -37,6 +39,8 @@ class RenderScene:
     """What the camera's pixels see of spectra; None where light is linear sRGB."""
     gain: float = 1.0
     """By how much lights are brighter than they say, for the scene's level."""
+    shining: tuple[ShiningSurface, ...] = ()
+    """All that shines and can be seen, but for what shines from all around."""
 
 
 def build(
@@ -69,9 +73,13 @@ def build(
         surroundings,
         lambda z_mm: sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects),
     )
-    patterns, surfaces = painted_patterns(scene.objects), dict[Hashable, Any]()
+    patterns, surfaces, reach_mm = (
+        painted_patterns(scene.objects),
+        dict[Hashable, Any](),
+        _reach_mm(scene, assets),
+    )
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces)
+        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces, reach_mm)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
         facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
@@ -90,7 +98,33 @@ def build(
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
     _numbers_as_data(mi, loaded)
     filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
-    return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain)
+    shining = tuple(shining_surfaces(mi, scene, assets, gain, filters))
+    return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain, shining)
+
+
+def _reach_mm(scene: Scene, assets: Assets) -> float:
+    """A distance that no two things that the cameras see are farther apart."""
+    far_mm = 0.0 if scene.backdrop is None else scene.backdrop.z_mm
+    for thing in scene.objects:
+        match thing.shape:
+            case Sphere(radius_mm=radius_mm):
+                size_mm = radius_mm
+            case Mesh(file=file, scale=scale):
+                size_mm = np.linalg.norm(assets.mesh(file).positions * np.asarray(scale), axis=1).max()
+            case shape:
+                size_mm = np.linalg.norm(triangles_of(shape, assets).positions, axis=1).max()
+        far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
+    return 2 * far_mm
+
+
+def not_finite(render_scene: RenderScene, number: int) -> str:
+    """The sentence for light of an object (0: none) that is no finite number."""
+    name = render_scene.names.get(number)
+    what = "what is seen beside the objects" if name is None else f"object '{name}'"
+    return (
+        f"{what}: its radiance is not a finite number in the renderer's single precision; make lamps that "
+        "are tiny or almost touch it larger, or move them away"
+    )
 
 
 def alone(render_scene: RenderScene, number: int, *, with_lamps: bool) -> RenderScene:
@@ -138,13 +172,15 @@ def _object(
     pattern: np.ndarray | None,
     gain: float,
     surfaces: dict[Hashable, Any],
+    reach_mm: float,
 ) -> Any:
     """The shape of an object; `surfaces` are those made so far, which objects that look alike share."""
     try:
         key = surface_key(thing.material, thing.shape, assets)
         if key not in surfaces:
             surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
-        return placed_shape(mi, thing, assets, surfaces[key], emission_plugin(mi, thing, assets, gain))
+        emitter = emission_plugin(mi, thing, assets, gain)
+        return placed_shape(mi, thing, assets, surfaces[key], emitter, reach_mm)
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None
 

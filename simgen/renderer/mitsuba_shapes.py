@@ -1,5 +1,6 @@
 """Shapes as Mitsuba's: its own sphere and rectangle, and meshes built in memory, never from a file."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,11 +8,21 @@ import numpy as np
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.cutouts import cut_out
-from simgen.assets.solids import triangles_of
+from simgen.assets.solids import globe, triangles_of
 from simgen.assets.triangles import Triangles
 from simgen.spec.materials import Material
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Card, Mesh, Shape, Sphere
+
+SMALL_BALL_SHARE = 0.02
+"""A ball that shines is a mesh if its radius is a smaller share of the farthest distance in the scene.
+Mitsuba aims at its own sphere through a solid angle that loses its digits in single precision: at a radius
+of 0.01 of the distance the light is right to 4e-4, at 0.001 to 3e-2."""
+BALL_MESH_ROWS = 32
+LEAST_BALL_MESH_ROWS = 6
+STEPS_PER_EDGE = 100
+"""Edges of such a mesh take at least this many steps of single precision, so that its area is right to 1e-4;
+the coarsest mesh may take as few as eight."""
 
 
 def pose_of(mi: Any, thing: SceneObject) -> Any:
@@ -24,19 +35,51 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
 
 
 def placed_shape(
-    mi: Any, thing: SceneObject, assets: Assets, surface: Any, emitter: dict[str, Any] | None
+    mi: Any,
+    thing: SceneObject,
+    assets: Assets,
+    surface: Any,
+    emitter: dict[str, Any] | None,
+    reach_mm: float,
 ) -> Any:
-    """The Mitsuba shape (or the plugin that makes it) of an object with a Mitsuba surface and emitter."""
+    """The Mitsuba shape (or the plugin that makes it) of an object with a Mitsuba surface and emitter.
+
+    No two things of the scene are farther from each other than `reach_mm`. Raises `InputError` for a ball
+    that shines and is smaller than single precision can tell where it stands.
+    """
     T, pose, shape = mi.ScalarTransform4f, pose_of(mi, thing), thing.shape
     plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
+    matrix = np.array(pose.matrix, dtype=np.float64)
     if thing.material.opacity is None:
+        if (
+            isinstance(shape, Sphere)
+            and emitter is not None
+            and shape.radius_mm < SMALL_BALL_SHARE * reach_mm
+        ):
+            return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3]), matrix, plain)
         if isinstance(shape, Sphere):
             return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | plain
         if isinstance(shape, Card):
             to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
             return {"type": "rectangle", "to_world": to_world} | plain
-    matrix = np.array(pose.matrix, dtype=np.float64)
     return _mesh(mi, solid_parts(shape, thing.material, assets), matrix, plain)
+
+
+def _small_ball(radius_mm: float, position_mm: np.ndarray) -> Triangles:
+    """A ball of the sphere's area at this position, as fine as single precision allows."""
+    step_mm = float(np.spacing(np.float32(np.abs(position_mm).max() + radius_mm)))
+    rows = int(np.pi * radius_mm / (STEPS_PER_EDGE * step_mm))
+    if np.pi * radius_mm < 8 * LEAST_BALL_MESH_ROWS * step_mm:
+        least_mm = 8 * LEAST_BALL_MESH_ROWS * step_mm / np.pi
+        raise InputError(
+            f"shape.radius_mm: {radius_mm:g} is too small to shine at {np.linalg.norm(position_mm):.4g} mm "
+            f"from the cameras; it must be at least {least_mm:.2g}"
+        )
+    ball = globe(radius_mm, min(max(rows, LEAST_BALL_MESH_ROWS), BALL_MESH_ROWS))
+    corner = ball.positions.astype(np.float64)[ball.faces]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    share = np.linalg.norm(across, axis=1).sum() / 2 / (4 * np.pi * radius_mm**2)
+    return replace(ball, positions=(ball.positions / np.sqrt(share)).astype(np.float32))
 
 
 def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from simgen.renderer.backend import load_drjit
+from simgen.renderer.backend import is_scalar, load_drjit
+from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.wavelengths import Light
 
@@ -32,8 +33,8 @@ GOLDEN = (5**0.5 - 1) / 2
 class FirstHits:
     """What rays hit first: Mitsuba's record, shape number (0 a miss), z (+inf a miss), and a guess.
 
-    `guess` is the radiance that is known without a light path: what shines itself, else what the
-    lamps would give if nothing stood in the way, and light from all around.
+    `guess` is the radiance that is known without a light path: what the lamps would give if nothing stood
+    in the way, and light from all around. What a surface that is hit shines itself is left out.
     """
 
     record: Any
@@ -50,7 +51,8 @@ def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) ->
     found = active & hit.is_valid()
     shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
     z_mm = dr.select(found, hit.p.z, dr.inf)
-    guess = hit.emitter(render_scene.scene, active).eval(hit, active)
+    missed = active & ~found
+    guess = hit.emitter(render_scene.scene, missed).eval(hit, missed)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
     for lamp in _lamps(render_scene.scene):
         towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
@@ -83,6 +85,26 @@ def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     return found
 
 
+def bright_directions(render_scene: RenderScene, number: int, seed: int) -> np.ndarray:
+    """Unit directions (N, 3) to the image of what shines from all around, drawn by its brightness.
+
+    None, if there is no such image. Works in scalar mode too.
+    """
+    mi, around = render_scene.mi, _surroundings(render_scene.mi, render_scene.scene)
+    if not around:
+        return np.zeros((0, 3))
+    points = np.random.default_rng(seed).random((number, 2))
+    if is_scalar(mi):
+        seen_from = mi.Interaction3f()
+        drawn = (around[0].sample_direction(seen_from, mi.Point2f(point))[0] for point in points.tolist())
+        return np.array([np.ravel(sample.d) for sample in drawn])
+    seen_from = load_drjit().zeros(mi.Interaction3f, number)
+    sample, _ = around[0].sample_direction(
+        seen_from, mi.Point2f(*(floats(mi, column) for column in points.T))
+    )
+    return np.array(sample.d).T.astype(np.float64)
+
+
 def _lamps(scene: Any) -> list[Any]:
     """Emitters that have a place."""
     return [light for light in scene.emitters() if not light.is_environment()]
@@ -102,13 +124,15 @@ def _surroundings(mi: Any, scene: Any) -> list[Any]:
 def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: Any, max_depth: int) -> Any:
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
+    What the first hit shines itself is left out, but not what shines from all around where nothing is hit.
     The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
     `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
     """
     mi = render_scene.mi
     tracer = _Tracer(render_scene, sampler)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    radiance = hit.emitter(render_scene.scene).eval(hit)
+    missed = ~hit.is_valid()
+    radiance = hit.emitter(render_scene.scene, missed).eval(hit, missed)
     return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
 
 

@@ -244,20 +244,6 @@ def test_much_light_is_rendered_and_little_is_not(made: Path, tmp_path: Path) ->
     assert dim.truth.photons.z_mm.shape == (dim.counts.total,)
 
 
-def test_photons_that_come_in_clumps_however_often_they_are_drawn_are_counted_in_views(
-    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("simgen.photons.thinning.pairs_allowed", lambda *_: -1.0)
-    monkeypatch.setattr("simgen.photons.thinning.ATTEMPTS", 1)
-    photons = generate(recipe(), Path(), tmp_path / "dense")["photons"]
-    assert photons["method"] == "dense"
-    assert photons["rendering_noise"] <= photons["rendering_noise_allowed"]
-    found, thinned = open_dataset(tmp_path / "dense"), open_dataset(made)
-    assert abs(found.counts.total - thinned.counts.total) < 5 * np.sqrt(2 * thinned.counts.total)
-    assert found.truth is not None
-    assert found.truth.photons is None
-
-
 def test_errors_of_cameras_are_kept_as_truth_and_nowhere_else(made: Path, tmp_path: Path) -> None:
     errors = {"position_sd_mm": (1.0, 2.0, 0.5), "rotation_sd_deg": (0.2, 0.1, 0.3), "pitch_error": 0.01}
     wrong = recipe(grid=TINY["grid"] | {"errors": errors})

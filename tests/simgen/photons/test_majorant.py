@@ -88,6 +88,21 @@ def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, is_listed: boo
     assert apart.max() == reach
 
 
+def test_raising_keeps_owners_and_lowers_no_limit(majorant: Majorant) -> None:
+    over = pilot(3).take(np.arange(200))
+    before, owners = majorant.copy(), majorant.owner_of(pilot(4))
+    over.light[:] = 1.5 * majorant.bound[majorant.owner_of(over)]
+    majorant.raise_bounds(over, 2)
+    np.testing.assert_array_equal(majorant.owner_of(pilot(4)), owners)
+    assert (majorant.bound >= before.bound).all()
+    assert (majorant.radiance_ratio_bound >= before.radiance_ratio_bound).all()
+    entry = majorant.owner_of(over)
+    assert (majorant.bound[entry] > over.light).all()
+    assert (majorant.radiance_ratio_bound[entry] * over.guess > over.light).all()
+    assert majorant.is_above(before)[entry].all()
+    assert not majorant.is_above(before).all()
+
+
 @pytest.mark.parametrize("shear_px", [(0.0, 0.0), (9.5, -6.0)])
 def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(shear_px: tuple[float, float]) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.
