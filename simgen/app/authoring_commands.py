@@ -82,6 +82,7 @@ def import_scene(
     unit: Literal["mm", "cm", "m", "in", "ft"] = "m",
     place_at_mm: tuple[float, float, float] | None = None,
     fit_mm: float | None = None,
+    emission_unit: Literal["nit", "watt"] = "nit",
 ) -> None:
     """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
 
@@ -92,6 +93,7 @@ def import_scene(
 
         simgen import-scene room.glb -o scenes/room
         simgen import-scene duck.glb -o scenes/duck --place-at-mm 0 0 600 --fit-mm 150
+        simgen import-scene blender.glb -o scenes/blender --emission-unit watt
 
     Parameters
     ----------
@@ -107,11 +109,20 @@ def import_scene(
         X, Y and Z of the middle of the scene, upright, instead of a camera.
     fit_mm
         Length of the longest side of the scene's bounding box, whatever the unit.
+    emission_unit
+        What emission of 1 means in a glTF file: 1 cd/m² (nit), or 1 W/(sr m²), which is 683 cd/m² (watt).
+        Choose watt for files that Blender exported in its lighting mode Standard.
     """
     from simgen.importing.scene_import import import_scene
 
     for line in import_scene(
-        file, out, camera=camera, unit=unit, place_at_mm=place_at_mm, fit_mm=fit_mm
+        file,
+        out,
+        camera=camera,
+        unit=unit,
+        place_at_mm=place_at_mm,
+        fit_mm=fit_mm,
+        emission_unit=emission_unit,
     ).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")

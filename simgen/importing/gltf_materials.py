@@ -38,8 +38,9 @@ class SurfaceOfPrimitive:
 class GltfMaterials:
     """The materials of one file, each made once; pictures and what is lost go into the scene."""
 
-    def __init__(self, gltf: GltfFile, scene: ForeignScene) -> None:
+    def __init__(self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float) -> None:
         self.gltf, self.scene = gltf, scene
+        self.cd_m2_per_emission = cd_m2_per_emission
         self._made: dict[int | None, SurfaceOfPrimitive | None] = {}
 
     def surface(self, index: int | None, where: str) -> SurfaceOfPrimitive | None:
@@ -199,20 +200,22 @@ class _Making:
 
     def _emission(self, made: dict[str, Any]) -> None:
         strength = self.material.extensions.emissive_strength
-        factor = np.array(self.material.emissive_factor) * (
+        emission = np.array(self.material.emissive_factor) * (
             1.0 if strength is None else strength.emissive_strength
         )
-        if not factor.any():
+        if not emission.any():
             return
+        rgb_cd_m2 = emission * self.all.cd_m2_per_emission
         pixels = self._pixels(self.material.emissive_texture, "emissive")
         if self.material.emissive_texture is not None and pixels is None:
             return
         if pixels is None:
-            made["emission"] = light_values("luminance_cd_m2", factor)
+            made["emission"] = light_values("luminance_cd_m2", rgb_cd_m2)
         elif pixels[..., :3].any():
             # White of the new picture has the luminance of the strongest factor.
-            file = self.scene.keep(f"{self.name}-emission", _tinted(pixels[..., :3], factor / factor.max()))
-            made["emission"] = {"luminance_cd_m2": float(factor.max()), "texture": file}
+            tint = emission / emission.max()
+            file = self.scene.keep(f"{self.name}-emission", _tinted(pixels[..., :3], tint))
+            made["emission"] = {"luminance_cd_m2": float(rgb_cd_m2.max()), "texture": file}
 
     def _lost(self, material: Material, more: MaterialExtensions) -> None:
         if material.occlusion_texture is not None:

@@ -5,7 +5,7 @@ The file is in metres, X right, Y up, Z towards who looks; its cameras and light
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -21,17 +21,30 @@ FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
 DEEPEST = 500
 """Nodes that may lie within each other."""
+EmissionUnit = Literal["nit", "watt"]
+"""Of emission, which is a factor times a strength: cd/m^2, as the specification says, or W/(sr m^2)."""
+LUMENS_PER_WATT = 683.0
+"""Blender's exporter multiplies the watts of lights by it, whatever their colour, to write candela and lux.
+It writes the emission of materials in W/(sr m^2)."""
+CD_M2_PER_EMISSION: dict[EmissionUnit, float] = {"nit": 1.0, "watt": LUMENS_PER_WATT}
+"""Luminance of an emission of 1."""
+MAY_BE_IN_WATTS = (
+    "the ratio of surfaces that shine to lights, if Blender exported the file in its lighting mode Standard: "
+    f"its surfaces are {LUMENS_PER_WATT:g} times too dim, which --emission-unit watt mends"
+)
 
 
-def foreign_gltf(path: Path, metres_per_unit: float) -> ForeignScene:
+def foreign_gltf(path: Path, metres_per_unit: float, emission_unit: EmissionUnit) -> ForeignScene:
     """Read a .gltf or .glb file. Raises `InputError` for one that is wrong, or that cannot be read."""
     gltf = read_gltf(path)
     scene = ForeignScene(title=path.stem, mm=1000 * metres_per_unit, upright=FLIP[:3, :3])
-    reader = _Reader(gltf, scene)
+    reader = _Reader(gltf, scene, CD_M2_PER_EMISSION[emission_unit])
     for index, matrix in _placed_nodes(gltf):
         reader.add(gltf.document.nodes[index], index, matrix)
     if gltf.document.animations:
         scene.left_out.append("animations: everything stands as the file begins")
+    if emission_unit == "nit" and scene.lamps and any("emission" in part.material for part in scene.parts):
+        scene.lose(MAY_BE_IN_WATTS)
     return scene
 
 
@@ -86,9 +99,9 @@ def _matrix(node: Node) -> np.ndarray:
 class _Reader:
     """What the nodes hold, put into the scene."""
 
-    def __init__(self, gltf: GltfFile, scene: ForeignScene) -> None:
+    def __init__(self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float) -> None:
         self.gltf, self.scene = gltf, scene
-        self.materials = GltfMaterials(gltf, scene)
+        self.materials = GltfMaterials(gltf, scene, cd_m2_per_emission)
         self._primitives: dict[tuple[int, int], tuple[Triangles, dict[str, Any]] | None] = {}
         self._faces = 0
 

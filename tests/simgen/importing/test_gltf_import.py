@@ -15,6 +15,7 @@ from pcii.base.srgb import linear_to_srgb, srgb_to_linear
 from pcii.core.camera_grid import CameraGrid
 from simgen.assets.asset_files import read_assets
 from simgen.assets.solids import triangles_of
+from simgen.importing.gltf_scene import MAY_BE_IN_WATTS
 from simgen.importing.scene_import import import_scene
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
@@ -176,6 +177,39 @@ def test_lights_keep_their_candela_and_lux(tmp_path: Path) -> None:
     assert other.lights[0].intensity_cd == pytest.approx(4 * point.intensity_cd)  # type: ignore[union-attr]
 
 
+@pytest.mark.parametrize("picture", [False, True])
+def test_emission_in_watts_has_blenders_ratio_to_its_lights(tmp_path: Path, picture: bool) -> None:
+    """In Blender a lamp of P watts sends P / (4 pi) W/sr, a sun brings S W/m^2, a surface sends s W/(sr m^2).
+
+    The exporter's lighting mode Standard multiplies the first two by 683 lm/W, and writes s as it is.
+    """
+    watts, sun_w_m2, strength = 5.0, 2.0, 40.0
+    draft = GltfDraft()
+    glow: dict[str, Any] = {
+        "emissiveFactor": [1.0, 1.0, 1.0],
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": strength}},
+    }
+    if picture:
+        glow["emissiveTexture"] = {"index": draft.texture(png(QUARTERS))}
+    draft.node(mesh=draft.mesh(uv=QUAD_UV, material=glow), name="panel", translation=[0, 0, -1])
+    draft.camera()
+    draft.light({"type": "point", "intensity": 683 * watts / (4 * np.pi)})
+    draft.light({"type": "directional", "intensity": 683 * sun_w_m2})
+    for unit, factor, remarks in (("watt", 1.0, ()), ("nit", 683.0, (MAY_BE_IN_WATTS,))):
+        options = {} if unit == "nit" else {"emission_unit": unit}
+        scene, left_out = imported(draft, tmp_path / unit, **options)
+        emission = scene.objects[0].material.emission
+        bulb, sun = scene.lights
+        assert emission is not None
+        assert bulb.type == "point"
+        assert sun.type == "directional"
+        per_m2 = emission.luminance_cd_m2 / bulb.intensity_cd
+        assert per_m2 == pytest.approx(strength / (watts / (4 * np.pi)) / factor, rel=1e-6)
+        per_sr = emission.luminance_cd_m2 / sun.illuminance_lux
+        assert per_sr == pytest.approx(strength / sun_w_m2 / factor, rel=1e-6)
+        assert left_out == remarks
+
+
 def png(pixels: np.ndarray) -> bytes:
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "png")
@@ -224,7 +258,7 @@ def test_numbers_of_materials(tmp_path: Path) -> None:
     # The widths of the coat's highlights agree: alpha is 0.2^2, and 0.1 to 0.001 over the gloss.
     assert 0.1 + finish.clearcoat_gloss * (0.001 - 0.1) == pytest.approx(0.04, abs=1e-6)
     assert made.emission.luminance_cd_m2 == pytest.approx(40 * (0.2126 + 0.7152 / 2))
-    assert left_out == ("KHR_materials_sheen of materials",)
+    assert left_out == ("KHR_materials_sheen of materials", MAY_BE_IN_WATTS)
 
 
 def test_the_specular_factor_is_the_strength_of_highlights(tmp_path: Path) -> None:

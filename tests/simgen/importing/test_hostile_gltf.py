@@ -154,6 +154,7 @@ def test_a_sound_file_is_read(tmp_path: Path) -> None:
     [
         ({"fit_mm": 0.0}, "--fit-mm: expected a length above 0, got 0"),
         ({"unit": "mile"}, "--unit: expected one of mm, cm, m, in, ft, got 'mile'"),
+        ({"emission_unit": "lumen"}, "--emission-unit: expected one of nit, watt, got 'lumen'"),
         ({"place_at_mm": (0.0, 0.0, float("nan"))}, "--place-at-mm: expected three finite numbers"),
         ({"place_at_mm": (0.0, 0.0, 1e9)}, "position_mm"),
     ],
@@ -173,3 +174,5 @@ def test_nothing_of_the_users_is_overwritten(tmp_path: Path) -> None:
         import_scene(tmp_path / "a.obj", tmp_path / "other")
     with pytest.raises(InputError, match="there is no such file"):
         import_scene(tmp_path / "b.glb", tmp_path / "other")
+    with pytest.raises(InputError, match="--emission-unit: is for glTF files"):
+        import_scene(tmp_path / "a.xml", tmp_path / "other", emission_unit="watt")
