@@ -18,7 +18,7 @@ from pcii.core.truth import PhotonTruth, Truth
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
 from simgen.dataset.prepared import Prepared, capture_of, needs_of, prepare_scene
-from simgen.dataset.rendered_views import exact_view
+from simgen.dataset.rendered_views import exact_view, halved_view
 from simgen.dataset.resources import available_bytes, check_resources, fits, in_bytes
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import plan
@@ -81,11 +81,13 @@ def draw_photons(
     drawn = thin(capture, setup, made, report) if made.thins else None
 
     @cache
-    def mosaic_of(k: int, l: int) -> np.ndarray:
-        image = exact_view(render_scene, capture.rig, k, l, made.samples, capture.seed)
-        return sense(image, recipe.cfa)
+    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
+        view = halved_view(render_scene, capture.rig, k, l, made.samples, capture.seed, recipe.cfa)
+        return sense(view.image, recipe.cfa), view.variance
 
-    arrivals, _ = drawn or draw_from_views(capture, mosaic_of, made, report)
+    arrivals, _ = drawn or draw_from_views(
+        capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], made, report
+    )
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)

@@ -148,11 +148,12 @@ def _work(
         None if renders else recipe.render.background_samples_per_pixel,
         capture.seed,
         out,
+        are_for_counts=renders,
     )
     if products.radiance != "none" or renders:
         with clock.stage("radiance"):
             views.render(setup.render_scene, report)
     if made is not None and renders:
         with clock.stage("counts"):
-            photons = write(*draw_from_views(capture, views.mosaic, made, report))
+            photons = write(*draw_from_views(capture, views.mosaic, views.variance, made, report))
     return photons

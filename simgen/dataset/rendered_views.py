@@ -1,5 +1,6 @@
 """Radiance images of views; on disk as products of a dataset, or as what its photon counts are drawn from."""
 
+import json
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -9,8 +10,10 @@ from typing import Literal
 import numpy as np
 
 from pcii.base.progress import Report
+from pcii.core.bayer import channel_count, colour_index
 from pcii.core.photon_limit import sense
 from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
+from pcii.store.safe_files import write_json_safely
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -44,6 +47,44 @@ def exact_view(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class HalvedView:
+    """A view (H, W, C) as the mean of two halves of its samples, and the noise that their difference tells.
+
+    `variance` (C,) is that of the mean, in the sensor's colours, summed over the pixels of each.
+    """
+
+    image: np.ndarray
+    variance: np.ndarray
+
+
+def halved_view(
+    render_scene: RenderScene, rig: Rig, k: int, l: int, samples_per_pixel: int, seed: int, cfa: str | None
+) -> HalvedView:
+    """Radiance of camera (k, l) with as many samples per pixel, or one more; `seed` is that of the draw."""
+    number, samples = k * rig.grid.cols + l, samples_of_half(samples_per_pixel)
+    one, other = (
+        render_view(
+            render_scene,
+            rig,
+            k,
+            l,
+            samples_per_pixel=samples,
+            seed=seeds.integer(seed, view=number, stage="radiance", part=part),
+        ).astype(np.float64)
+        for part in (0, 1)
+    )
+    apart = sense(one - other, cfa)
+    colours = colour_index(apart.shape[0], apart.shape[1], cfa).ravel()
+    variance = np.bincount(colours, (apart**2).ravel() / 4, minlength=channel_count(cfa))
+    return HalvedView(((one + other) / 2).astype(np.float32), variance)
+
+
+def samples_of_half(samples_per_pixel: int) -> int:
+    """Samples of each half of at least as many."""
+    return -(-samples_per_pixel // 2)
+
+
 def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
     """Light paths that all views take less than with `render.samples_per_pixel` everywhere."""
     fewer = render.background_samples_per_pixel
@@ -70,6 +111,8 @@ class RenderedViews:
     background_samples: int | None
     seed: int
     out: Path
+    are_for_counts: bool = False
+    """Whether counts are drawn from them: then each is rendered in two halves, and its noise is known."""
 
     def render(self, render_scene: RenderScene, report: Report) -> None:
         """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
@@ -77,24 +120,32 @@ class RenderedViews:
         with ThreadPoolExecutor(1, "views") as writer:
             writing: deque[Future[None]] = deque()
             for k, l in np.ndindex(grid.rows, grid.cols):
-                image = None
-                if not self._exact_file(k, l).is_file():
-                    image = self._exact(render_scene, k, l)
-                writing.append(writer.submit(self._write, k, l, image))
+                view = None
+                if not self._exact_file(k, l).is_file() or (
+                    self.are_for_counts and not self._noise_file(k, l).is_file()
+                ):
+                    view = self._exact(render_scene, k, l)
+                writing.append(writer.submit(self._write, k, l, view))
                 while writing and (len(writing) > 1 or k * grid.cols + l == grid.view_count - 1):
                     writing.popleft().result()
                     written += 1
                     report("views", written, grid.view_count)
 
-    def _exact(self, render_scene: RenderScene, k: int, l: int) -> np.ndarray:
-        samples = self.samples_per_pixel, self.seed, self.background_samples
-        return exact_view(render_scene, self.rig, k, l, *samples)
+    def _exact(self, render_scene: RenderScene, k: int, l: int) -> HalvedView:
+        samples, seed = self.samples_per_pixel, self.seed
+        if self.are_for_counts:
+            return halved_view(render_scene, self.rig, k, l, samples, seed, self.sensor.bayer)
+        image = exact_view(render_scene, self.rig, k, l, samples, seed, self.background_samples)
+        return HalvedView(image, np.zeros(0))
 
-    def _write(self, k: int, l: int, image: np.ndarray | None) -> None:
+    def _write(self, k: int, l: int, view: HalvedView | None) -> None:
         """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""
         cfa, exact = self.sensor.bayer, self._exact_file(k, l)
-        if image is not None:
-            write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, cfa)[..., None])
+        if view is not None:
+            image = view.image if self.radiance == "rgb" else sense(view.image, cfa)[..., None]
+            write_exr_safely(exact, image)
+            if self.are_for_counts:
+                write_json_safely(self._noise_file(k, l), view.variance.tolist())
         if self.sensor.full_light is not None and self.radiance != "none":
             assert self.exposure is not None
             measured = full_light_image(
@@ -110,6 +161,13 @@ class RenderedViews:
         """Radiance that each of the sensor's pixels gets in a view that is on disk, (H, W)."""
         image = read_exr(self._exact_file(k, l))
         return sense(image, self.sensor.bayer) if image.shape[2] == 3 else image[..., 0]
+
+    def variance(self, k: int, l: int) -> np.ndarray:
+        """Noise of a view that is on disk, as of `HalvedView`."""
+        return np.array(json.loads(self._noise_file(k, l).read_bytes()))
+
+    def _noise_file(self, k: int, l: int) -> Path:
+        return self.out / radiance_name(k, l).replace(RADIANCE, RENDERED, 1).replace(".exr", ".json")
 
     def _exact_file(self, k: int, l: int) -> Path:
         """Where a view's exact radiance is kept while the dataset is made; in the end, if it is a product."""

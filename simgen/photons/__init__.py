@@ -5,13 +5,13 @@ candidates            Candidates of photons: rays drawn from a majorant, and fol
 counting_plan         How photon counts will be made: thinned one by one or drawn from rendered views, and
                       what led to it.
 disparity_layers      Layers of disparity and their tiles: pieces of surface that all views share.
+emission_sampler      Candidates of photons that come straight from something that shines, drawn on its
+                      surface.
 exploration           What is found out about a scene's light before photons are drawn: the majorant, and
                       what it keeps.
 majorant              How bright it can get where: the majorant from which photon candidates are drawn.
 photon_counting       The photon counts of a dataset: thinned or drawn from views, counted by the sensor,
                       written.
-photon_scopes         What photons are counted over, how many each of these scopes still lacks, and
-                      candidates for a round.
 pilot                 The pilot: a few paths that find where there is light, and from them the first
                       majorant.
 rendering_noise       How many samples a dense rendering needs for its noise not to show in the photon
@@ -20,10 +20,9 @@ samplers              Which sampler of candidates: all at once where a compiled 
                       one.
 scalar_sampler        Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call
                       of the renderer each.
+shining_pieces        Pieces of all that shines and can be seen, each with a bound of how many photons its
+                      points send to a film.
 thinning              Photons, not pixels: photon-limited images by thinning, in the time that their
                       photons take.
-wavefront_candidates  A majorant in the renderer's arrays: many candidates drawn from it at once, and
-                      whose tile a path is on.
-wavefront_sampler     Candidates traced all at once in the renderer's arrays, for compiled backends; what
-                      leaves is NumPy.
+wavefront_sampler     Candidates drawn and traced all at once in the renderer's arrays, for compiled backends.
 """

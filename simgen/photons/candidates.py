@@ -125,6 +125,14 @@ def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) ->
     return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
 
 
+def cell_groups(scope: str, cfa: str | None) -> list[np.ndarray]:
+    """Groups of Bayer cells (2 a + b) that are counted apart: those of each colour for scope "channel"."""
+    if scope != "channel":
+        return [np.arange(4)]
+    cells = colour_cells(cfa).ravel()
+    return [np.flatnonzero(cells == colour) for colour in range(channel_count(cfa))]
+
+
 def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:
     """Light paths of so many candidates, of which some are followed beyond their first hit."""
     return candidates + (sampler.paths_each - 1) * followed

@@ -9,6 +9,7 @@ of a pixel gets its photons as a window of a million does. Paths through the fil
 """
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,24 @@ class FilmPoints:
     bound: np.ndarray
 
 
+class Arriving(NamedTuple):
+    """Light (N,) that arrives on films: of which candidate, in which pixel, from which surface.
+
+    `radiance` is in the pixel's own colour, `z_mm` the planar depth of the point that shines.
+    """
+
+    candidate: np.ndarray
+    row: np.ndarray
+    col: np.ndarray
+    surface: np.ndarray
+    radiance: np.ndarray
+    z_mm: np.ndarray
+
+    def take(self, which: np.ndarray) -> "Arriving":
+        """Some of it, by mask or index."""
+        return Arriving(*(column[which] for column in self))
+
+
 class EmissionSampler:
     """What shines in view, as candidates are drawn from it.
 
@@ -66,41 +85,41 @@ class EmissionSampler:
 
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
-        rng = np.random.default_rng(seed)
-        found, chance = self.film_points(view, rng), rng.random(view.size)
-        row, col = np.floor(found.row_px + 0.5), np.floor(found.col_px + 0.5)
-        grid = self.setup.grid
-        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width) & (found.sent > 0)
-        which = np.flatnonzero(inside)
-        row, col = row[which].astype(np.int64), col[which].astype(np.int64)
-        cell = row % 2 * 2 + col % 2
+        kept = self.arriving(view, np.random.default_rng(seed))
         is_wanted = np.zeros((len(cells), 4), dtype=bool)
         for number, own in enumerate(cells):
             is_wanted[number, own] = True
-        radiance = self._radiance(found.surface[which], found.texcoord[which])
-        own_colour = radiance[np.arange(which.size), colour_cells(self.setup.cfa).ravel()[cell]]
-        sent = found.sent[which] * own_colour * is_wanted[group[which], cell]
-        kept = chance[which] * found.bound[which] < sent
-        which, row, col = which[kept], row[kept], col[kept]
-        before = standing_before(
-            self.setup.render_scene, found.camera_mm[which], found.point_mm[which], SHY_OF_SURFACE
+        kept = kept.take(is_wanted[group[kept.candidate], kept.row % 2 * 2 + kept.col % 2])
+        numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
+        photons = PhotonTable(
+            k=view[kept.candidate] // self.setup.grid.cols,
+            l=view[kept.candidate] % self.setup.grid.cols,
+            i=kept.row,
+            j=kept.col,
+            n=np.ones(kept.row.size, dtype=np.int64),
+            object_id=numbers[kept.surface],
+            z_mm=kept.z_mm,
         )
+        return replace(nothing(self.setup.channels), photons=photons, candidate=kept.candidate)
+
+    def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
+        """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
+        found, chance, grid = self.film_points(view, rng), rng.random(view.size), self.setup.grid
+        row, col = np.floor(found.row_px + 0.5), np.floor(found.col_px + 0.5)
+        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width) & (found.sent > 0)
+        which = np.flatnonzero(inside)
+        row, col = row[which].astype(np.int64), col[which].astype(np.int64)
+        colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
+        radiance = self._radiance(found.surface[which], found.texcoord[which])[np.arange(which.size), colour]
+        kept = chance[which] * found.bound[which] < found.sent[which] * radiance
+        which, row, col, radiance = which[kept], row[kept], col[kept], radiance[kept]
+        surface, point_mm = found.surface[which], found.point_mm[which]
+        before = standing_before(self.setup.render_scene, found.camera_mm[which], point_mm, SHY_OF_SURFACE)
         numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
         is_ball = np.array([one.ball is not None for one in self.surfaces])
-        surface = found.surface[which]
         seen = (before < 0) | (is_ball[surface] & (before == numbers[surface]))
-        which, row, col = which[seen], row[seen], col[seen]
-        photons = PhotonTable(
-            k=view[which] // grid.cols,
-            l=view[which] % grid.cols,
-            i=row,
-            j=col,
-            n=np.ones(which.size, dtype=np.int64),
-            object_id=numbers[found.surface[which]],
-            z_mm=found.point_mm[which, 2],
-        )
-        return replace(nothing(self.setup.channels), photons=photons, candidate=which)
+        return Arriving(which, row, col, surface, radiance, point_mm[:, 2]).take(seen)
 
     def film_points(self, view: np.ndarray, rng: np.random.Generator) -> FilmPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""

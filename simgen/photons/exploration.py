@@ -14,10 +14,9 @@ import numpy as np
 
 from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler, Setup, paths_of
+from simgen.photons.candidates import Accepted, CandidateSampler, Setup, cell_groups, paths_of
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.majorant import Majorant
-from simgen.photons.photon_scopes import cell_groups
 from simgen.photons.pilot import AIMED_RAYS, EXPLORATION_SEED, send_pilot
 from simgen.photons.samplers import sampler_for
 from simgen.spec.recipe import Photons
@@ -75,13 +74,15 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
         return float(photons_per_radiance * mean[cells].mean() * pixels)
 
     emission = EmissionSampler(setup)
+    share_of_emission = _share_of(emission, setup) if emission.mass else 0.0
     pilot = send_pilot(setup, emission, expected)
     found = Exploration(
         pilot.majorant, emission, pilot.ambient, LIKELY_SHARE, pilot.paths, pilot.max_dark_candidates
     )
     film_mass = 0.0
     if pilot.majorant is not None:
-        warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean))
+        direct = emission.mass * share_of_emission
+        warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean), direct)
         warmed.warm_up()
         is_bounded = warmed.rehearse()
         film_mass = float(warmed.sampler().mass.mean())
@@ -90,9 +91,7 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
             found, share=warmed.share, paths=paths, is_bounded=is_bounded, excess_share=warmed.excess_share
         )
     if emission.mass:
-        share = (film_mass * found.share + emission.mass * _share_of(emission, setup)) / (
-            film_mass + emission.mass
-        )
+        share = (film_mass * found.share + emission.mass * share_of_emission) / (film_mass + emission.mass)
         found = replace(found, share=max(share, LEAST_SHARE))
     return found
 
@@ -114,6 +113,8 @@ class _Warming:
     groups: list[np.ndarray]
     ambient: np.ndarray
     photons: float
+    direct: float
+    """Light that comes straight from what shines, in one view, in the unit of `CandidateSampler.mass`."""
     share: float = LIKELY_SHARE
     paths: int = 0
     rounds: int = 0
@@ -138,11 +139,17 @@ class _Warming:
             found = self._try(sampler, int(np.clip(self.photons / self.share, WARM_UP_CANDIDATES[0], most)))
             # Rare light shows on few tiles at a time, so tiles farther away are raised too.
             self.majorant.lift(found.over, reach=min(1 + turn // 2, MOST_REACH))
-            shares.append(excess(found.ratio) / max(float(found.ratio.sum(dtype=np.float64)), 1.0))
+            shares.append(self._share_above(sampler, found))
             self.excess_share = float(np.mean(shares[-MEAN_OF:]))
             if (turn == 0 or turn >= MEAN_OF - 1) and self.excess_share <= allowed:
                 return True
         return False
+
+    def _share_above(self, sampler: CandidateSampler, found: Accepted) -> float:
+        """The share of all light that these candidates found above the bounds."""
+        of_films = float(sampler.mass.mean()) * self.share
+        photons = max(float(found.ratio.sum(dtype=np.float64)), 1.0)
+        return excess(found.ratio) / photons * of_films / (of_films + self.direct)
 
     def sampler(self) -> CandidateSampler:
         """Candidates by the majorant as it is now."""

@@ -1,6 +1,6 @@
 """The photon counts of a dataset: thinned or drawn from views, counted by the sensor, written."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,11 @@ from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.dataset_writer import write_counts as save_counts
 from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
+from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan
-from simgen.photons.photon_scopes import places
 from simgen.photons.rendering_noise import NOISE_SHARE
-from simgen.photons.thinning import thin_photons
+from simgen.photons.thinning import places, thin_photons
 from simgen.sensor.detector import detect, nested_subset
 from simgen.sensor.frame_readout import counts_of, in_frames, read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals
@@ -50,14 +50,30 @@ def thin(
 
 
 def draw_from_views(
-    capture: Capture, mosaic_of: Callable[[int, int], np.ndarray], made: Plan, report: Report
+    capture: Capture,
+    mosaic_of: Callable[[int, int], np.ndarray],
+    variance_of: Callable[[int, int], np.ndarray],
+    made: Plan,
+    report: Report,
 ) -> tuple[PhotonTable, dict[str, Any]]:
-    """Photons of all views drawn from rendered ones, (H, W) each; and what the manifest says of them."""
+    """Photons of all views drawn from rendered ones, (H, W) each; and what the manifest says of them.
+
+    `variance_of` is the noise (C,) of a view in each colour, summed over its pixels. Raises `InputError` for
+    noise that adds more than `NOISE_SHARE` to the variance of the counts, and for too much light in a pixel.
+    """
     grid, cfa, photons, gain = capture.grid, capture.cfa, capture.photons, capture.photons_per_radiance
     views = list(np.ndindex(grid.rows, grid.cols))
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
     dark = int((energies <= 0).all(axis=1).sum())
     normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
+    noise = _measured_noise(capture, energies, normalisers, [variance_of(k, l) for k, l in views])
+    if noise > NOISE_SHARE:
+        most = two_digits(made.photons_per_view * NOISE_SHARE / noise / ROUNDING)
+        raise InputError(
+            f"photons: the noise of views rendered with {made.samples} samples per pixel adds {noise:.2g} of "
+            f"their own variance to the counts, and {NOISE_SHARE:g} is allowed, since some light comes in "
+            f"rare and bright paths; take at most {most} photons per view, larger lamps or rougher metals"
+        )
     totals = fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns: list[list[np.ndarray]] = []
     for number, (k, l) in enumerate(views):
@@ -82,11 +98,29 @@ def draw_from_views(
     return arrivals, {
         "method": "dense",
         "samples_per_pixel": made.samples,
-        "rendering_noise": made.noise,
+        "rendering_noise": float(f"{noise:.3g}"),
+        "rendering_noise_forecast": made.noise,
         "rendering_noise_allowed": NOISE_SHARE,
         "views_without_light": dark,
         "normaliser_standard_error": made.normaliser_error,
     }
+
+
+def _measured_noise(
+    capture: Capture, energies: np.ndarray, normalisers: np.ndarray, variances: Sequence[np.ndarray]
+) -> float:
+    """Variance that the noise of all views adds to counts, as a share of their own.
+
+    Energies and what they are divided by are (V, S), of each view and scope; variances are (C,) of each view.
+    """
+    if capture.photons_per_radiance is not None:
+        gain = np.full_like(energies, capture.photons_per_radiance)
+    else:
+        lit = normalisers > 0
+        gain = np.divide(capture.photons.budget, normalisers, out=np.zeros_like(energies), where=lit)
+    photons = float((gain * energies).sum())
+    added = float((gain**2 * np.stack(variances)).sum()) if photons > 0 else 0.0
+    return added / photons if photons > 0 else 0.0
 
 
 def write_counts(

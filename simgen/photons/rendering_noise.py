@@ -5,6 +5,9 @@ amount of variance v makes counts whose variance is larger by v. That share of t
 to stay below `NOISE_SHARE`, so dimmer light needs fewer samples. The paths of a pixel are spread evenly and
 vary less than independent ones, of which that is said. A budget is divided by a view's light, whose own
 standard error is to stay below `NORMALISER_ERROR`.
+
+That is a forecast, by a probe of few paths and by what is known of all that shines in view. Each view is then
+rendered in two halves, whose difference tells the noise that there is: see `photon_counting.draw_from_views`.
 """
 
 import math
@@ -16,6 +19,9 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import corners, with_larger_pixels
+from simgen.photons.candidates import Setup
+from simgen.photons.emission_sampler import EmissionSampler
+from simgen.photons.pilot import EXPLORATION_SEED
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.truth.first_hits import first_hits_of_view
@@ -25,6 +31,8 @@ NORMALISER_ERROR = 0.003
 PROBE_PX = 64
 """The probe renders a film of so few pixels across, twice."""
 PROBE_SAMPLES = 64
+AIMED_POINTS = 1 << 13
+"""Points of what shines in view, by which its light and its share of the film are known."""
 DEPTHS = 64
 """Depths are rounded to so many equal steps of disparity."""
 
@@ -76,7 +84,30 @@ def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: in
     )
     # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
     variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
-    return Probe(float((first + second).mean() / 2), float(variance))
+    missed_mean, missed_variance = _missed(render_scene, small, cfa, grid)
+    return Probe(float((first + second).mean() / 2) + missed_mean, float(variance) + missed_variance)
+
+
+def _missed(
+    render_scene: RenderScene, small: CameraGrid, cfa: str | None, grid: CameraGrid
+) -> tuple[float, float]:
+    """Mean radiance of a pixel, and variance of a path, that the probe's paths are likely not to have met.
+
+    A surface of radiance L that fills the share a of a pixel, small beside 1, has the mean a L and the
+    variance a L^2. The probe misses it with the probability exp(-n) if n of its paths hit it on average.
+    """
+    centre = replace(grid, rows=1, cols=1)
+    emission = EmissionSampler(Setup(render_scene, centre, cfa, 1))
+    if not emission.mass:
+        return 0.0, 0.0
+    rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=2)
+    arriving = emission.arriving(np.zeros(AIMED_POINTS, dtype=np.int64), rng)
+    pixels, paths = grid.height * grid.width, 2 * PROBE_SAMPLES * small.height * small.width
+    light = emission.mass / AIMED_POINTS / pixels  # of each that arrives, per pixel
+    number = len(emission.surfaces)
+    film_share = np.bincount(arriving.surface, light / arriving.radiance, minlength=number)
+    unmet = np.exp(-paths * film_share)[arriving.surface]
+    return float(light * unmet.sum()), float(light * (unmet * arriving.radiance).sum())
 
 
 def first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:

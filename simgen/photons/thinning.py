@@ -15,6 +15,7 @@ Nothing is drawn again and nothing discarded, so the result does not depend on w
 photons come of one path. docs/theory.md has the proof.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,21 +24,15 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import CandidateSampler, Setup, paths_of
+from simgen.photons.candidates import CandidateSampler, Setup, cell_groups, paths_of
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.exploration import LEAST_SHARE, Exploration, explore
-from simgen.photons.photon_scopes import (
-    WAVEFRONT,
-    PhotonScopes,
-    candidates_needed,
-    cell_groups,
-    places,
-    scopes_for,
-)
 from simgen.photons.samplers import sampler_for
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
+WAVEFRONT = 1 << 21
+"""Candidates traced at once at most."""
 MOST_RAISES = 64
 """How often the majorant is raised in one draw at most; light that exceeds every bound is refused then."""
 MOST_EXTRA = 256
@@ -72,6 +67,56 @@ def thin_photons(
     draw = _Drawing(setup, photons, seed, photons_per_radiance, explored, report)
     drawn = draw.all_photons() if keeps_origins else draw.counts()
     return drawn.by_pixel(setup.grid), draw.log()
+
+
+@dataclass
+class PhotonScopes:
+    """What photons are counted over, (S,): view (-1: all together), group of cells, and progress."""
+
+    view: np.ndarray
+    group: np.ndarray
+    wanted: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.got = np.zeros(self.view.size, dtype=np.int64)
+        self.tried = np.zeros(self.view.size, dtype=np.int64)
+        self.time = np.zeros(self.view.size)
+        """How long photons have been drawn, in candidates per unit of majorant."""
+
+    def open(self, max_dark_candidates: int) -> np.ndarray:
+        """Numbers of those that still want photons and are not dark.
+
+        Dark are those of which `max_dark_candidates` found nothing.
+        """
+        dark = (self.got == 0) & (self.tried >= max_dark_candidates)
+        return np.flatnonzero((self.got < self.wanted) & ~dark)
+
+    def part(self, number: int, parts: int) -> "PhotonScopes":
+        """Like scopes that want an equal share of the photons, the `number`-th of `parts`."""
+        share = self.wanted * (number + 1) // parts - self.wanted * number // parts
+        is_endless = self.wanted == np.iinfo(np.int64).max
+        return PhotonScopes(self.view, self.group, np.where(is_endless, self.wanted, share))
+
+    def blocks(self) -> Iterator[np.ndarray]:
+        """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""
+        block = (np.cumsum(self.wanted) - 1) // (WAVEFRONT // 4)
+        yield from np.split(np.arange(self.wanted.size), np.flatnonzero(np.diff(block)) + 1)
+
+
+def scopes_for(photons: Photons, view_count: int, group_count: int, seed: int) -> PhotonScopes:
+    """The scopes of so many views and groups of cells; how many photons each gets of a budget is random.
+
+    An exposure has no budget: its scopes, one a view, take as many as come.
+    """
+    views = np.array([-1]) if photons.scope == "scene" else np.arange(view_count)
+    view, group = views.repeat(group_count), np.tile(np.arange(group_count), views.size)
+    if photons.scope == "exposure":
+        wanted = np.full(view.size, np.iinfo(np.int64).max)
+    elif photons.statistics == "multinomial":
+        wanted = np.full(view.size, round(photons.budget))
+    else:
+        wanted = seeds.generator(seed, stage="budget totals").poisson(photons.budget, view.size)
+    return PhotonScopes(view, group, wanted)
 
 
 @dataclass
@@ -326,3 +371,19 @@ class _Found:
         for part in parts[1:]:
             total = total.join(part)
         return total
+
+
+def candidates_needed(missing: np.ndarray, round_number: int, share: float) -> np.ndarray:
+    """How many to draw for each scope: about what is missing at first, then enough to be done.
+
+    Together never more than fit a wavefront.
+    """
+    aim = missing if round_number == 0 else missing + 3.5 * np.sqrt(missing) + 4
+    return np.clip(aim / share, 16, max(WAVEFRONT // missing.size, 16)).astype(np.int64)
+
+
+def places(scope: np.ndarray) -> np.ndarray:
+    """Place (N,), from 0, of each photon in its scope; `scope` (N,) is sorted, so that each is a run."""
+    number = np.bincount(scope)
+    first = np.cumsum(number) - number
+    return np.arange(scope.size) - first[scope]

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from simgen.cameras.film_windows import Window, covered_px, object_windows
 from simgen.cameras.rig import Camera, Cameras, as_rig
 from simgen.renderer.backend import shape_numbers
+from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_colours import spectrum_plugin
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.mitsuba_scene import RenderScene, not_finite
 from simgen.spectral.filters import Filters
 
 SEED_STEP = 0x9E3779B9
@@ -38,7 +40,7 @@ def render_view(
     windows that objects are in; the same bytes for the same seed on the same backend. Views need different
     seeds: with one seed their noise is the same. The paths of a pixel are spread evenly over it and over the
     lamps (correlated multi-jittered sampling, Kensler 2013), which at 4 or 8 paths has the error of four
-    times as many `independent` ones.
+    times as many `independent` ones. Raises `InputError` for radiance that is not finite.
     """
     camera = as_rig(cameras).camera(k, l)
     sampler = {"type": "independent" if independent else "multijitter"}
@@ -83,10 +85,22 @@ def _mean_of_paths(
     total = np.zeros(())
     for samples in _parts(samples_per_pixel):
         image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=samples, seed=next(own_seeds)))
+        _require_finite(render_scene, camera, image)
         if samples == samples_per_pixel:
             return image
         total = total + samples * image.astype(np.float64)
     return (total / samples_per_pixel).astype(np.float32)
+
+
+def _require_finite(render_scene: RenderScene, camera: Camera, image: np.ndarray) -> None:
+    """`InputError` that names the object in a pixel whose radiance is no finite number."""
+    if np.isfinite(image).all():
+        return
+    row, col = np.argwhere(~np.isfinite(image).all(axis=2))[0]
+    towards = camera.towards(np.array([row]), np.array([col]))
+    raise InputError(
+        not_finite(render_scene, int(first_objects(render_scene, camera.position_mm, towards)[0]))
+    )
 
 
 def _object_boxes_mm(render_scene: RenderScene) -> np.ndarray:

@@ -20,7 +20,7 @@ from simgen.cameras.calibration import turn
 from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
 from simgen.cameras.rig import as_rig, with_larger_pixels
 from simgen.photons.candidates import even_film_points
-from simgen.photons.photon_scopes import WAVEFRONT, candidates_needed, places
+from simgen.photons.thinning import WAVEFRONT, candidates_needed, places
 from simgen.sensor.detector import detect, full_light_image, nested_subset
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.frame_readout import read_out

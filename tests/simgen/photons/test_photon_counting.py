@@ -63,13 +63,15 @@ def planned(made: Recipe, render_scene: RenderScene, kind: str) -> Plan:
 
 
 def thin(made: Recipe, render_scene: RenderScene, plan: Plan = PLAN) -> PhotonTable:
-    drawn = photon_counting.thin(capture_of(made, made.seed), setup_of(made, render_scene), plan)
-    assert drawn is not None
-    return drawn[0]
+    return photon_counting.thin(capture_of(made, made.seed), setup_of(made, render_scene), plan)[0]
+
+
+def no_noise(k: int, l: int) -> np.ndarray:
+    return np.zeros(3)
 
 
 def dense(made: Recipe) -> PhotonTable:
-    return draw_from_views(capture_of(made, made.seed), mosaic_of, PLAN, silent)[0]
+    return draw_from_views(capture_of(made, made.seed), mosaic_of, no_noise, PLAN, silent)[0]
 
 
 @pytest.fixture(scope="module")
@@ -193,14 +195,16 @@ def test_smaller_budgets_do_not_change_the_whole(statistics: str) -> None:
 def test_views_without_light_have_no_photons_of_any_budget() -> None:
     made = recipe(photons=nested(statistics="multinomial"))
     arrivals, log = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: k * mosaic_of(k, l), PLAN, silent
+        capture_of(made, made.seed), lambda k, l: k * mosaic_of(k, l), no_noise, PLAN, silent
     )
     assert log["views_without_light"] == 2
     for budget in BUDGETS:
         assert by_scope(counted(subset(arrivals, made, budget), made), "view").tolist() == [0, 0] + 2 * [
             budget
         ]
-    black, log = draw_from_views(capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)
+    black, log = draw_from_views(
+        capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
+    )
     assert log["views_without_light"] == 4
     assert subset(black, made, 8).k.size == 0
 
@@ -320,7 +324,9 @@ def test_frames_are_written_on_request_and_nested_like_the_photons(tmp_path: Pat
 
 def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
     made = recipe()
-    black = draw_from_views(capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), PLAN, silent)[0]
+    black = draw_from_views(
+        capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
+    )[0]
     told = write_counts(capture_of(made, made.seed), made.sensor, black, tmp_path, with_origins=True)
     assert told["total"] == 0
     assert (stored(tmp_path, made, 8) == 0).all()

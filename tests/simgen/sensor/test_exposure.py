@@ -53,9 +53,7 @@ def planned(thins: bool) -> Plan:
 def thinned(made: Recipe, built: RenderScene) -> PhotonTable:
     capture = capture_of(made, made.seed)
     setup = Setup(built, capture.rig, capture.cfa, made.render.max_depth)
-    drawn = thin(capture, setup, planned(True))
-    assert drawn is not None
-    return drawn[0]
+    return thin(capture, setup, planned(True))[0]
 
 
 def dense(made: Recipe, built: RenderScene) -> PhotonTable:
@@ -65,7 +63,9 @@ def dense(made: Recipe, built: RenderScene) -> PhotonTable:
         image = render_view(built, grid, k, l, samples_per_pixel=1, seed=1)
         return sense(image, made.cfa)
 
-    return draw_from_views(capture_of(made, made.seed), mosaic_of, planned(False), silent)[0]
+    return draw_from_views(
+        capture_of(made, made.seed), mosaic_of, lambda k, l: np.zeros(3), planned(False), silent
+    )[0]
 
 
 def counted(arrivals: PhotonTable) -> np.ndarray:
