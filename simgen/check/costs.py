@@ -14,6 +14,8 @@ from simgen.dataset.resources import (
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
 MOST_MEMORY = 0.8
+USUAL_SHARE = 0.25
+"""Share of the candidates that is kept where a photon costs `PHOTON_COST`; where fewer are, it costs more."""
 
 
 def hopeless(needs: Needs) -> list[Finding]:
@@ -74,7 +76,9 @@ def seconds(facts: Facts) -> float:
         spent += facts.path_s * samples * everywhere
     if plan is not None and plan.thins:
         costs = (PHOTON_COST, SAMPLE_COST) if facts.compiled else (SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST)
-        spent += facts.path_s * costs[0] / costs[1] * _photons(facts)
+        share = USUAL_SHARE if plan.explored is None else plan.explored.share
+        dearer = max(USUAL_SHARE / share, 1.0)
+        spent += facts.path_s * costs[0] / costs[1] * _photons(facts) * dearer
     return spent
 
 

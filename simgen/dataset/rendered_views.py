@@ -116,7 +116,9 @@ class RenderedViews:
 
     def render(self, render_scene: RenderScene, report: Report) -> None:
         """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
-        grid, written = self.rig.grid, 0
+        grid, written, stage = self.rig.grid, 0, "views"
+        if self.are_for_counts:
+            stage = f"views of {self.samples_per_pixel} samples per pixel, for the counts"
         with ThreadPoolExecutor(1, "views") as writer:
             writing: deque[Future[None]] = deque()
             for k, l in np.ndindex(grid.rows, grid.cols):
@@ -129,7 +131,7 @@ class RenderedViews:
                 while writing and (len(writing) > 1 or k * grid.cols + l == grid.view_count - 1):
                     writing.popleft().result()
                     written += 1
-                    report("views", written, grid.view_count)
+                    report(stage, written, grid.view_count)
 
     def _exact(self, render_scene: RenderScene, k: int, l: int) -> HalvedView:
         samples, seed = self.samples_per_pixel, self.seed

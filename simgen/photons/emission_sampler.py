@@ -15,7 +15,7 @@ import numpy as np
 
 from pcii.core.bayer import colour_cells
 from simgen.photons.candidates import Accepted, Setup, nothing
-from simgen.photons.shining_pieces import look_of, points_on_ball, shining_pieces
+from simgen.photons.shining_pieces import look_of, pieces_in_view, points_on_ball
 from simgen.renderer.intersection import standing_before
 from simgen.sensor.photon_table import PhotonTable
 
@@ -73,7 +73,7 @@ class EmissionSampler:
         if not self.surfaces:
             return
         self.look = look_of(self.surfaces, setup.cfa, setup.render_scene.filters is not None)
-        self.pieces = shining_pieces(self.surfaces, self.look, setup.rig)
+        self.pieces = pieces_in_view(self.surfaces, self.look, setup.rig)
         self.normal = self.pieces.normal
         self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
         self.mass = float(self.running[-1]) if self.running.size else 0.0

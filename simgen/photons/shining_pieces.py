@@ -89,7 +89,7 @@ def look_of(surfaces: Sequence[ShiningSurface], cfa: str | None, is_spectral: bo
     return Look(tuple(radiance), tuple(pictures))
 
 
-def shining_pieces(surfaces: Sequence[ShiningSurface], look: Look, rig: Rig) -> Pieces:
+def pieces_in_view(surfaces: Sequence[ShiningSurface], look: Look, rig: Rig) -> Pieces:
     """All pieces that a camera may see; there may be none."""
     pieces = _whole(surfaces)
     bound, is_loose = _bounds(pieces, surfaces, look, rig)

@@ -253,7 +253,7 @@ class _Drawing:
                 every, np.flatnonzero(np.diff(expected[every].cumsum() // (WAVEFRONT / 2))) + 1
             ):
                 self._round(sampler, scopes, some, np.zeros(some.size), scopes.time[some], found)
-            self.report(f"photons above the bound, raised {raised} times", raised, raised)
+            self.report("photons above the raised bound", raised, raised)
         else:
             if found.take_over() is None:
                 return

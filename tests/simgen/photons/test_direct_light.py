@@ -23,7 +23,7 @@ from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.exploration import explore
 from simgen.photons.photon_counting import draw_from_views
 from simgen.photons.rendering_noise import probe
-from simgen.photons.shining_pieces import look_of, shining_pieces
+from simgen.photons.shining_pieces import look_of, pieces_in_view
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.emission import ShiningSurface
@@ -149,7 +149,7 @@ def test_pieces_of_a_ball_cover_half_of_it() -> None:
         ball=(centre, radius, np.eye(3)),
     )
     look = look_of([surface], "GRBG", is_spectral=False)
-    pieces = shining_pieces([surface], look, as_rig(GRID))
+    pieces = pieces_in_view([surface], look, as_rig(GRID))
     assert 0.5 < pieces.area_mm2.sum() / (4 * np.pi * radius**2) < 0.75  # what no camera sees is left out
 
 
