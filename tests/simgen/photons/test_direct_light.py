@@ -49,7 +49,7 @@ def wall(*others: simgen.SceneObject) -> simgen.Scene:
     grey = simgen.Material(reflectance=(0.8, 0.8, 0.8))
     behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 620), shape=LARGE, material=grey)
     light = simgen.UniformLight(luminance_cd_m2=1.0)
-    return simgen.Scene(title="lamp", objects=[*others, behind], lights=[light])
+    return simgen.Scene(title="lamp", objects=(*others, behind), lights=(light,))
 
 
 def built(scene: simgen.Scene) -> RenderScene:
@@ -76,7 +76,7 @@ def test_a_lamp_in_view_sends_its_share_of_the_photons(shape: str, size_mm: floa
     scene = wall(lamp)
     if shape != "card":  # which, unlike it, would light the wall
         black = shining(LARGE, WALL_RADIANCE, 620.0, "screen")
-        scene = simgen.Scene(title="lamp", objects=[lamp, black])
+        scene = simgen.Scene(title="lamp", objects=(lamp, black))
     setup = Setup(built(scene), GRID, "GRBG", DEPTH)
     settings = Photons(budget=BUDGET, statistics="multinomial")
     explored = explore(setup, settings)
@@ -94,7 +94,8 @@ def test_a_lamp_in_view_sends_its_share_of_the_photons(shape: str, size_mm: floa
 
 def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[float, float]:
     """Light of a surface on all films by the sampler, and the largest share of a bound that is used."""
-    scene = replace(built(simgen.Scene(title="dark", lights=[{"type": "uniform", "luminance_cd_m2": 1.0}])))
+    light = simgen.UniformLight(luminance_cd_m2=1.0)
+    scene = built(simgen.Scene(title="empty", lights=(light,)))
     sampler = EmissionSampler(Setup(replace(scene, shining=(surface,)), rig, cfa, DEPTH))
     if not sampler.mass:
         return 0.0, 0.0
@@ -163,7 +164,7 @@ def test_small_balls_shine_as_they_should(radius_mm: float) -> None:
     grey = simgen.Material(reflectance=(0.8, 0.8, 0.8))
     behind = simgen.SceneObject(name="wall", position_mm=(0, 0, 1600), shape=card, material=grey)
     grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=1.2, height=16, width=16)
-    scene = simgen.Scene(title="bulb", objects=[ball, behind])
+    scene = simgen.Scene(title="bulb", objects=(ball, behind))
     view = simgen.render(scene, grid, samples_per_pixel=256, max_depth=2).view(0, 0)[..., 1]
     row, col = np.indices(view.shape)
     x, y = ((place - 7.5) * 1.2 / 50 * 1600 for place in (col, row))
