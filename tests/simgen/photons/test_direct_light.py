@@ -92,6 +92,46 @@ def test_a_lamp_in_view_sends_its_share_of_the_photons(shape: str, size_mm: floa
     assert stats.chi2.sf(3 * spread, 3) > 1e-4
 
 
+@pytest.mark.renders
+@pytest.mark.skipif(not COMPILED, reason="scalar mode does not look for openings")
+def test_a_hole_in_a_dark_room_shows_the_sky_in_every_view() -> None:
+    """A closed room with a lamp, and a hole of half a pixel to a sky that is 10 000 times as bright."""
+    side_mm, width_mm = 0.5 / PX_PER_MM, 600.0
+    across, along = (width_mm + side_mm) / 2, 2 * width_mm + side_mm
+    walls = [
+        ((0, -across, 500), (0, 0, 0), (along, width_mm)),
+        ((0, across, 500), (0, 0, 0), (along, width_mm)),
+        ((-across, 0, 500), (0, 0, 0), (width_mm, side_mm)),
+        ((across, 0, 500), (0, 0, 0), (width_mm, side_mm)),
+        ((0, -300, 150), (90, 0, 0), (700, 900)),
+        ((0, 300, 150), (90, 0, 0), (700, 900)),
+        ((-300, 0, 150), (0, 90, 0), (900, 700)),
+        ((300, 0, 150), (0, 90, 0), (900, 700)),
+        ((0, 0, -200), (0, 0, 0), (700, 700)),
+    ]
+    parts = tuple(
+        simgen.SceneObject(
+            name=f"wall-{number}",
+            position_mm=place,
+            rotation_deg=turn,
+            shape=simgen.Card(width_mm=size[0], height_mm=size[1]),
+            material=simgen.Material(reflectance=(0.8, 0.8, 0.8)),
+        )
+        for number, (place, turn, size) in enumerate(walls)
+    )
+    lamp = simgen.PointLight(position_mm=(0.0, -200.0, 200.0), intensity_cd=1.0)
+    dark = simgen.Scene(title="room", objects=parts, lights=(lamp,))
+    view = simgen.render(dark, GRID, samples_per_pixel=64, max_depth=DEPTH).view(0, 0)[..., 1]
+    sky = 1e4 * float(view.mean())
+    lit = dark.change(lights=(lamp, simgen.UniformLight(luminance_cd_m2=sky)))
+    setup, settings = Setup(built(lit), GRID, None, DEPTH), Photons(budget=2000, statistics="multinomial")
+    explored = explore(setup, settings)
+    drawn = [thin_photons(setup, settings, seed=seed, explored=explored)[0] for seed in range(3)]
+    beyond = sum(np.bincount(2 * one.k + one.l, np.isinf(one.z_mm), minlength=4) for one in drawn)
+    expected = 6000 * 0.25 * sky / (0.25 * sky + 64 * 64 * sky / 1e4)
+    assert (np.abs(beyond - expected) < 5 * np.sqrt(6000 / 4)).all()
+
+
 def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[float, float]:
     """Light of a surface on all films by the sampler, and the largest share of a bound that is used."""
     light = simgen.UniformLight(luminance_cd_m2=1.0)
