@@ -64,7 +64,7 @@ def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     array = np.asarray(values)
     if array.dtype.kind == "f":
         is_whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
-        if not is_whole or (array.size and np.abs(array).max() > 2**53):
+        if not is_whole or (array.size and float(np.abs(array).max()) > 2**53):
             raise InputError(f"{name}: photon counts must be whole numbers")
         array = array.astype(np.int64)
     if array.dtype.kind not in "iub":

@@ -67,10 +67,27 @@ NonNegative = Annotated[Real, Field(ge=0)]
 Share = Annotated[Real, Field(ge=0, le=1)]
 Count = Annotated[Whole, Field(ge=1)]
 Vector = tuple[Real, Real, Real]
+SMALLEST_MM = 1e-6
 LARGEST_MM = 1e6
-Length = Annotated[Real, Field(gt=0, le=LARGEST_MM)]
+"""Lengths are a nanometre to a kilometre: products of several still are numbers in single precision."""
+Length = Annotated[Real, Field(ge=SMALLEST_MM, le=LARGEST_MM)]
 Coordinate = Annotated[Real, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 Position = tuple[Coordinate, Coordinate, Coordinate]
+LARGEST_COMPONENT = 1e6
+
+
+def _has_a_length(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    least = 1 / LARGEST_COMPONENT
+    if not least <= max(map(abs, direction)) <= LARGEST_COMPONENT:
+        raise ValueError(
+            f"the largest number of a direction must be {least:g} to {LARGEST_COMPONENT:g} in size, "
+            f"as in (0, 0, 1), got {direction}"
+        )
+    return direction
+
+
+Direction = Annotated[Vector, AfterValidator(_has_a_length)]
+"""A direction, whose length is of no matter within what single precision can square."""
 LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
 
 

@@ -21,6 +21,11 @@ STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
 BOUNCES = 2
 """From the first hit so many directions are followed: a surface nearby that shines on it is rarely met."""
+ROULETTE_THROUGHPUT = 0.05
+"""Russian roulette ends paths whose throughput since the first hit is below this, in proportion to it.
+
+Larger: more noise from what is left of such a path. Smaller: longer paths, above all in closed white rooms.
+"""
 LEAST_REFLECTANCE = 0.001
 """A surface is never guessed to be less reflective than this: it may shine."""
 LEAST_RADIANCE = 1e-9
@@ -125,68 +130,138 @@ def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: An
     """Radiance (linear sRGB, luminance in cd/m^2) that one path from each first hit estimates.
 
     What the first hit shines itself is left out, but not what shines from all around where nothing is hit.
-    The path is unrolled into one kernel: `max_depth` is small. It is split at the first hit, where
-    `STRATA` x `STRATA` points of each lamp and `BOUNCES` directions are followed.
+    A path has at most `max_depth` segments. It is split at the first hit, where `STRATA` x `STRATA` points
+    of each lamp and `BOUNCES` directions are followed; what each direction meets is followed in a loop, as
+    one path. `sampler` gives the random numbers.
     """
-    mi = render_scene.mi
-    tracer = _Tracer(render_scene, sampler)
+    mi, dr = render_scene.mi, load_drjit()
+    tracer = _Tracer(render_scene)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, True)
-    missed = ~hit.is_valid()
-    radiance = hit.emitter(render_scene.scene, missed).eval(hit, missed)
-    return radiance + tracer.scattered(ray, hit, hit.is_valid(), max_depth - 1, STRATA, BOUNCES)
+    is_hit = hit.is_valid()
+    radiance = hit.emitter(render_scene.scene, ~is_hit).eval(hit, ~is_hit)
+    if max_depth == 1:
+        return radiance
+    bsdf = hit.bsdf(ray)
+    radiance += tracer.direct_light(hit, bsdf, sampler, STRATA, BOUNCES, is_hit)
+    left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
+    for bounce in range(BOUNCES):
+        onward = tracer.next_segment(hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit)
+        path = _Path(onward.ray, onward.hit, onward.emitted, mi.Spectrum(1), onward.goes_on, left, sampler)
+        if max_depth > 2:
+            path = tracer.follow(path)
+        sampler = path.sampler
+        radiance += onward.weight * path.radiance / BOUNCES
+    return radiance
+
+
+@dataclass(frozen=True)
+class _Segment:
+    """A segment of a path, in a direction that the surface at its beginning chose.
+
+    `weight` is what share of the light that arrives along `ray` leaves the surface, 0 for rays that are not
+    active; `emitted` is what shines where the segment ends at `hit`, weighted against aiming at it.
+    """
+
+    ray: Any
+    hit: Any
+    weight: Any
+    emitted: Any
+    goes_on: Any
+
+
+@dataclass
+class _Path:
+    """Paths from the second hit on: what a loop's iteration changes (Dr.Jit sets the fields).
+
+    `ray` and `hit` are of the last segment, `radiance` is what all segments have brought so far, and
+    `throughput` what share of the light that leaves `hit` arrives at the path's beginning. Paths that are
+    active have `left` more segments at most.
+    """
+
+    ray: Any
+    hit: Any
+    radiance: Any
+    throughput: Any
+    active: Any
+    left: Any
+    sampler: Any
 
 
 class _Tracer:
-    """The two halves of path tracing, which call each other: what leaves a hit, what arrives there."""
+    """The parts of a path: light that comes straight from lamps, and the segment that goes on."""
 
-    def __init__(self, render_scene: RenderScene, sampler: Any) -> None:
-        self.mi, self.dr, self.scene, self.sampler = (
-            render_scene.mi,
-            load_drjit(),
-            render_scene.scene,
-            sampler,
-        )
+    def __init__(self, render_scene: RenderScene) -> None:
+        self.mi, self.dr, self.scene = render_scene.mi, load_drjit(), render_scene.scene
         self.context = self.mi.BSDFContext()
         around = _surroundings(render_scene.mi, render_scene.scene)
         self.lamps, self.aims_around = _lamps(render_scene.scene) + around, bool(around)
 
-    def scattered(self, ray: Any, hit: Any, active: Any, left: int, side: int, bounces: int) -> Any:
-        """Radiance sent back along `ray` by what it hit, through at most `left` more segments."""
-        mi, dr, sampler = self.mi, self.dr, self.sampler
-        radiance = mi.Spectrum(0)
-        if left == 0:
-            return radiance
-        bsdf = hit.bsdf(ray)
+    def follow(self, path: _Path) -> _Path:
+        """The same paths at their ends."""
+        # A loop also for short paths: it is as fast as unrolled segments, and one kernel serves all lengths.
+        (path,) = self.dr.while_loop(
+            (path,),
+            lambda path: path.active & (path.left > 0),
+            lambda path: (self._lengthened(path),),
+            label="path",
+        )
+        return path
+
+    def _lengthened(self, path: _Path) -> _Path:
+        """Paths with one more segment, unless Russian roulette (Arvo and Kirk 1990) ends them."""
+        dr, sampler = self.dr, path.sampler
+        bsdf = path.hit.bsdf(path.ray)
+        direct = self.direct_light(path.hit, bsdf, sampler, 1, 1, path.active)
+        onward = self.next_segment(path.hit, bsdf, sampler, 1, 1, 0, path.active)
+        throughput = path.throughput * onward.weight
+        radiance = path.radiance + path.throughput * direct + throughput * onward.emitted
+        left = path.left - 1
+        active = onward.goes_on & dr.any(throughput != 0) & (left > 0)
+        largest = dr.max(throughput)
+        is_faint = active & (largest < ROULETTE_THROUGHPUT)
+        # Only faint paths draw a number, so that the others are those without roulette.
+        active &= ~is_faint | (sampler.next_1d(is_faint) * ROULETTE_THROUGHPUT < largest)
+        throughput = dr.select(is_faint, throughput * (ROULETTE_THROUGHPUT / largest), throughput)
+        return _Path(onward.ray, onward.hit, radiance, throughput, active, left, sampler)
+
+    def direct_light(self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, active: Any) -> Any:
+        """Light straight from all lamps, from `side` x `side` points of each, that leaves `hit` backwards."""
+        radiance = self.mi.Spectrum(0)
         for lamp in self.lamps:
             for cell in np.ndindex(side, side):
-                point = (mi.Vector2f(*cell) + sampler.next_2d(active)) / side
+                point = (self.mi.Vector2f(*cell) + sampler.next_2d(active)) / side
                 radiance += self._direct(lamp, hit, bsdf, point, side**2, bounces, active) / side**2
-        for bounce in range(bounces):
-            across = sampler.next_2d(active)
-            across.x = (across.x + bounce) / bounces
-            sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
-            on = active & dr.any(weight != 0)
-            onward = hit.spawn_ray(hit.to_world(sample.wo))
-            arriving = self._arriving(onward, hit, sample, on, left, side, bounces)
-            radiance += dr.select(on, weight * arriving, 0) / bounces
         return radiance
 
-    def _arriving(
-        self, ray: Any, before: Any, sample: Any, active: Any, left: int, side: int, bounces: int
-    ) -> Any:
-        """Radiance that arrives at `before` along `ray`, whose direction the surface chose."""
+    def next_segment(
+        self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, bounce: int, active: Any
+    ) -> _Segment:
+        """The segment that leaves `hit` as the number `bounce` of `bounces`.
+
+        At each lamp `side` x `side` points are aimed at besides.
+        """
         mi, dr, scene = self.mi, self.dr, self.scene
-        hit = scene.ray_intersect(ray, active)
-        lamp = hit.emitter(scene, active)
-        towards = mi.DirectionSample3f(scene, hit, mi.Interaction3f(before))
+        across = sampler.next_2d(active)
+        across.x = (across.x + bounce) / bounces
+        sample, weight = bsdf.sample(self.context, hit, sampler.next_1d(active), across, active)
+        active = active & dr.any(weight != 0)
+        ray = hit.spawn_ray(hit.to_world(sample.wo))
+        arrival = scene.ray_intersect(ray, active)
+        lamp = arrival.emitter(scene, active)
+        towards = mi.DirectionSample3f(scene, arrival, mi.Interaction3f(hit))
         # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
         aimed = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         if not self.aims_around:
-            aimed &= hit.is_valid()
-        pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(before), towards, active)
-        share = dr.select(aimed, _share(bounces * sample.pdf, pdf_lamp), 1)
-        radiance = lamp.eval(hit, active) * share
-        return radiance + self.scattered(ray, hit, active & hit.is_valid(), left - 1, 1, 1)
+            aimed &= arrival.is_valid()
+        pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(hit), towards, active)
+        mis_weight = dr.select(aimed, _power_heuristic(bounces * sample.pdf, pdf_lamp), 1)
+        return _Segment(
+            ray,
+            arrival,
+            dr.select(active, weight, 0),
+            dr.select(active, lamp.eval(arrival, active) * mis_weight, 0),
+            active & arrival.is_valid(),
+        )
 
     def _direct(
         self, lamp: Any, hit: Any, bsdf: Any, point: Any, tries: int, bounces: int, active: Any
@@ -198,10 +273,10 @@ class _Tracer:
         able &= towards.pdf != 0
         blocked = self.scene.ray_test(hit.spawn_ray_to(towards.p), able)
         value, pdf = bsdf.eval_pdf(self.context, hit, hit.to_local(towards.d), able)
-        share = dr.select(towards.delta, 1, _share(tries * towards.pdf, bounces * pdf))
-        return dr.select(able & ~blocked, value * weight * share, 0)
+        mis_weight = dr.select(towards.delta, 1, _power_heuristic(tries * towards.pdf, bounces * pdf))
+        return dr.select(able & ~blocked, value * weight * mis_weight, 0)
 
 
-def _share(pdf: Any, other: Any) -> Any:
+def _power_heuristic(pdf: Any, other: Any) -> Any:
     """Weight of a sample that two ways could have given: the power heuristic with exponent 2."""
     return pdf * pdf / (pdf * pdf + other * other)

@@ -2,17 +2,17 @@
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from simgen.base.asset_names import EnvironmentName
 from simgen.base.strict_models import (
     Colour,
+    Direction,
     Length,
     Position,
     Positive,
     Real,
     Strict,
-    Vector,
     completed_by,
 )
 from simgen.spectral.spectra import illuminant_names, known_illuminant
@@ -106,18 +106,11 @@ class DirectionalLight(Strict):
     """Parallel light from far away, such as the sun's, which fills the scene; it is seen by no camera."""
 
     type: Literal["directional"] = "directional"
-    direction: Vector
+    direction: Direction
     """Where the light goes: (0, 0, 1) away from the cameras, (0, 1, 0) down; its length is of no matter."""
     illuminance_lux: Positive
     """What a surface that faces the light gets; 100 000 of the sun, 0.2 of the moon."""
     illuminant: Illuminant = "D65"
-
-    @field_validator("direction")
-    @classmethod
-    def _goes_somewhere(cls, direction: Vector) -> Vector:
-        if not any(direction):
-            raise ValueError("a direction is not (0, 0, 0); (0, 0, 1) points away from the cameras")
-        return direction
 
 
 def _check_target(lamp: AreaLight | SpotLight) -> None:

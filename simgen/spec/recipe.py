@@ -46,6 +46,8 @@ MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
 OF_ITS_SCENE = ("title", "analysis")
 """What a recipe says of its own scene alone."""
+MAX_SEGMENTS = 1_000_000
+"""Longer paths carry no light, and the renderer counts segments in 32 bits."""
 SEED_LIMIT = 1 << 63
 """Seeds are less."""
 APERTURE_TOLERANCE = 0.01
@@ -151,7 +153,7 @@ class Render(Strict):
     """Light paths through each pixel of the radiance images; photon counts choose their own number."""
     background_samples_per_pixel: Count | None = None
     """Paths where no object can be seen, if fewer are enough there, as for a dark backdrop."""
-    max_depth: Count = 3
+    max_depth: Annotated[Count, Field(le=MAX_SEGMENTS)] = 3
     """Longest light path in segments: 2 is direct light, 3 adds one bounce."""
 
     @model_validator(mode="after")

@@ -11,6 +11,7 @@ from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.renderer import backend
+from simgen.spec.lights import DirectionalLight
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GREY = 0.6
@@ -176,6 +177,14 @@ def lights_of(kind: str, folder: Path, coloured: bool) -> list[dict[str, Any]]:
         "directional": [DIRECTIONAL],
         "two": [NEAR_LAMP, lamp],
     }[kind]
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-30, 1e300])
+def test_a_direction_whose_length_the_renderer_cannot_use_is_refused(length: float) -> None:
+    with pytest.raises(
+        InputError, match=r"'direction': the largest number of a direction must be 1e-06 to 1e"
+    ):
+        DirectionalLight(direction=(0.0, length, 0.0), illuminance_lux=1.0)
 
 
 @pytest.mark.parametrize("kind", ["uniform", "area", "point", "spot", "directional", "two", SUN])

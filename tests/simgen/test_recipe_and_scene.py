@@ -138,6 +138,22 @@ EXPOSED = {"f_number": 8.0, "time_s": 0.01}
         ),
         ({"photons": {"scope": "exposure"}}, "photons.scope: 'exposure' needs the table [exposure]"),
         ({"sensor": {"full_light": {}}}, "sensor.full_light: needs the table [exposure]"),
+        (
+            {"grid": {"pitch_mm": [1e300, 5]}},
+            "'grid.pitch_mm[0]': input should be less than or equal to 1000000",
+        ),
+        (
+            {"grid": {"focal_mm": 1e-300}},
+            "'grid.focal_mm': input should be greater than or equal to 0.000001",
+        ),
+        ({"grid": {"focal_mm": 1e-5}}, "focal_mm: views of 36.0448 mm need a focal length of 0.00180224 mm"),
+        ({"grid": {"shear_px": [0, -1e300]}}, "'grid.shear_px[1]'"),
+        ({"grid": {"lens": {"aperture_mm": 1e300, "focus_mm": 5}}}, "'grid.lens.aperture_mm'"),
+        ({"grid": {"errors": {"position_sd_mm": [1e300, 0, 0]}}}, "'grid.errors.position_sd_mm[0]'"),
+        (
+            {"render": {"max_depth": 10**10}},
+            "'render.max_depth': input should be less than or equal to 1000000",
+        ),
         ({"exposure": {"f_number": 0}}, "'exposure.f_number': input should be greater than 0, got 0"),
         ({"exposure": {"time_s": -1}}, "'exposure.time_s'"),
         ({"exposure": {"time_s": float("inf")}}, "'exposure.time_s'"),

@@ -116,6 +116,11 @@ def test_a_narrow_dtype_does_not_wrap_in_the_total():
     assert PhotonCounts.from_dense(dense, unit_grid(3, 3, 4, 4)).total == 255 * 144
 
 
+def test_counts_in_half_precision_are_whole_numbers_without_a_warning():
+    dense = np.full((1, 1, 2, 2), 2048, np.float16)
+    assert PhotonCounts.from_dense(dense, unit_grid(1, 1, 2, 2)).total == 8192
+
+
 def test_a_dense_stack_of_another_shape_is_refused():
     with pytest.raises(InputError, match=r"^counts: expected shape \(1, 1, 2, 2\)"):
         PhotonCounts.from_dense(np.zeros((1, 1, 2, 3), dtype=int), unit_grid(1, 1, 2, 2))

@@ -81,7 +81,7 @@ WORDS = st.text(max_size=40) | st.sampled_from(
     ['"""', "\\", "a\r\nb", "\n\n", '\\"\n"', "\x7f\x00\t", "''' é\n"]
 )
 NUMBERS = st.floats(-1e6, 1e6)
-LENGTHS = st.floats(0, 1e6, exclude_min=True)
+LENGTHS = st.floats(1e-6, 1e6)
 SHARES = st.floats(0, 1)
 VECTORS = st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 3)
 FILES = st.text(min_size=1, max_size=30).filter(str.isprintable)

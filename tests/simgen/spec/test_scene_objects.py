@@ -40,7 +40,10 @@ def fault_of(make: Callable[[], Any]) -> str:
 @pytest.mark.parametrize(
     ("make", "expected"),
     [
-        (lambda: Sphere(radius_mm=-1), "Sphere: 'radius_mm': input should be greater than 0, got -1"),
+        (
+            lambda: Sphere(radius_mm=-1),
+            "Sphere: 'radius_mm': input should be greater than or equal to 0.000001",
+        ),
         (lambda: Material(), "Material: give either 'reflectance' or 'texture'"),
         (
             lambda: Material(finish=Glass(), texture=Checks(rows=1, columns=2)),
@@ -86,7 +89,7 @@ def test_a_fault_deep_in_a_table_keeps_its_place() -> None:
         "lights": [SKY],
         "objects": [thing | {"shape": {"type": "sphere", "radius_mm": 0}}],
     }
-    told = "'objects[0].shape.radius_mm': input should be greater than 0, got 0"
+    told = "'objects[0].shape.radius_mm': input should be greater than or equal to 0.000001, got 0"
     assert fault_of(lambda: validate(Scene, values, "scene.toml")) == f"scene.toml: {told}"
     assert fault_of(lambda: Scene(**values)) == f"Scene: {told}"
 
