@@ -28,8 +28,11 @@ WARM_UP_ROUNDS = 2
 REHEARSALS = 16
 """Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
 REHEARSAL_PATHS = 1 << 18
+MOST_MISSING_SD = 0.2
+"""Light that may lie above the bounds before photons are drawn, in standard deviations of their number: if none
+of it were drawn, n photons would be short by this times sqrt(n). What a draw meets of it is drawn after all."""
 MEAN_OF = 4
-"""Rehearsals end if the first is within `excess_allowed`, or else the mean of this many is: of light in rare
+"""Rehearsals end if the first is within `MOST_MISSING_SD`, or else the mean of this many is: of light in rare
 paths one of them may have met little by chance. If neither is so, views are rendered."""
 MOST_REACH = 4
 EXCESS_SHARE = 1e-5
@@ -132,7 +135,7 @@ class _Warming:
 
     def rehearse(self) -> bool:
         """Rehearse and lift until little enough light is above the bounds; whether that is so in the end."""
-        allowed, shares = excess_allowed(math.prod(self.setup.grid.shape_KLHW)), list[float]()
+        allowed, shares = MOST_MISSING_SD / math.sqrt(max(self.photons, 1.0)), list[float]()
         for turn in range(REHEARSALS):
             sampler = self.sampler()
             most = REHEARSAL_PATHS // sampler.paths_each
@@ -167,16 +170,6 @@ class _Warming:
 def excess(ratio: np.ndarray) -> float:
     """Photons that paths of these ratios of radiance to bound should have given and did not."""
     return float(np.maximum(ratio.astype(np.float64) - 1, 0).sum())
-
-
-def excess_allowed(pixels: int) -> float:
-    """The share of the light that may lie above the bounds of `pixels` of all views before photons are drawn.
-
-    If none of it were drawn, a share s of n photons would be missing, s sqrt(n) standard deviations of their
-    number; with s = 1 / sqrt(2 P) over P pixels that is less than one for up to two photons per pixel. What a
-    draw meets of it is drawn after all.
-    """
-    return 1 / float(np.sqrt(2 * pixels))
 
 
 def _factor(ratio: np.ndarray) -> float:
