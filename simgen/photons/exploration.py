@@ -29,8 +29,8 @@ REHEARSALS = 16
 """Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
 REHEARSAL_PATHS = 1 << 18
 MOST_MISSING_SD = 0.2
-"""Light that may lie above the bounds before photons are drawn, in standard deviations of their number: if none
-of it were drawn, n photons would be short by this times sqrt(n). What a draw meets of it is drawn after all."""
+"""Light that may lie above the bounds before photons are drawn, in standard deviations of their number: if
+none of it were drawn, n photons would be short by this times sqrt(n). What a draw meets of it is drawn."""
 MEAN_OF = 4
 """Rehearsals end if the first is within `MOST_MISSING_SD`, or else the mean of this many is: of light in rare
 paths one of them may have met little by chance. If neither is so, views are rendered."""
