@@ -1,6 +1,7 @@
 """Radiance images of views; on disk as products of a dataset, or as what its photon counts are drawn from."""
 
 import json
+import math
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
@@ -62,7 +63,7 @@ def halved_view(
     render_scene: RenderScene, rig: Rig, k: int, l: int, samples_per_pixel: int, seed: int, cfa: str | None
 ) -> HalvedView:
     """Radiance of camera (k, l) with as many samples per pixel, or one more; `seed` is that of the draw."""
-    number, samples = k * rig.grid.cols + l, samples_of_half(samples_per_pixel)
+    number, samples = k * rig.grid.cols + l, math.ceil(samples_per_pixel / 2)
     one, other = (
         render_view(
             render_scene,
@@ -78,11 +79,6 @@ def halved_view(
     colours = colour_index(apart.shape[0], apart.shape[1], cfa).ravel()
     variance = np.bincount(colours, (apart**2).ravel() / 4, minlength=channel_count(cfa))
     return HalvedView(((one + other) / 2).astype(np.float32), variance)
-
-
-def samples_of_half(samples_per_pixel: int) -> int:
-    """Samples of each half of at least as many."""
-    return -(-samples_per_pixel // 2)
 
 
 def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:

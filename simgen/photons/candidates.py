@@ -111,8 +111,7 @@ class CandidateSampler(Protocol):
 def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) -> FilmPoints:
     """About `number` points: one in each cell of a lattice over the film.
 
-    Views take turns. Points come in random order, so that
-    the first of them are spread over the film as all are.
+    Views take turns. Points come in random order, so that the first of them are spread as all are.
     """
     rows = max(1, round(np.sqrt(number * grid.height / grid.width)))
     cols = max(1, round(number / rows))

@@ -25,7 +25,7 @@ errs by a hundredth of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class FilmPoints:
+class ShiningPoints:
     """Points (N,) that shine, the lens points that they are seen from, and where they fall on the film.
 
     `sent` times the radiance is what is sent per mm^2, in radiance px, and at most `bound`; 0 if the point
@@ -70,6 +70,8 @@ class EmissionSampler:
     def __init__(self, setup: Setup) -> None:
         self.setup, self.surfaces = setup, setup.render_scene.shining
         self.mass = 0.0
+        self.numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
+        self.is_ball = np.array([one.ball is not None for one in self.surfaces])
         if not self.surfaces:
             return
         self.look = look_of(self.surfaces, setup.cfa, setup.render_scene.filters is not None)
@@ -90,14 +92,13 @@ class EmissionSampler:
         for number, own in enumerate(cells):
             is_wanted[number, own] = True
         kept = kept.take(is_wanted[group[kept.candidate], kept.row % 2 * 2 + kept.col % 2])
-        numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
         photons = PhotonTable(
             k=view[kept.candidate] // self.setup.grid.cols,
             l=view[kept.candidate] % self.setup.grid.cols,
             i=kept.row,
             j=kept.col,
             n=np.ones(kept.row.size, dtype=np.int64),
-            object_id=numbers[kept.surface],
+            object_id=self.numbers[kept.surface],
             z_mm=kept.z_mm,
         )
         return replace(nothing(self.setup.channels), photons=photons, candidate=kept.candidate)
@@ -115,13 +116,11 @@ class EmissionSampler:
         which, row, col, radiance = which[kept], row[kept], col[kept], radiance[kept]
         surface, point_mm = found.surface[which], found.point_mm[which]
         before = standing_before(self.setup.render_scene, found.camera_mm[which], point_mm, SHY_OF_SURFACE)
-        numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
-        is_ball = np.array([one.ball is not None for one in self.surfaces])
-        seen = (before < 0) | (is_ball[surface] & (before == numbers[surface]))
+        seen = (before < 0) | (self.is_ball[surface] & (before == self.numbers[surface]))
         return Arriving(which, row, col, surface, radiance, point_mm[:, 2]).take(seen)
 
-    def film_points(self, view: np.ndarray, rng: np.random.Generator) -> FilmPoints:
+    def film_points(self, view: np.ndarray, rng: np.random.Generator) -> ShiningPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""
         rig, pieces = self.setup.rig, self.pieces
         piece = np.searchsorted(self.running, rng.random(view.size) * self.mass, side="right")
@@ -157,7 +156,7 @@ class EmissionSampler:
         scale_px = self.setup.grid.focal_mm / self.setup.grid.pixel_mm
         axis_px = rig.axis_px[k, l]
         sent = scale_px**2 * stretch * np.maximum(-(normal * away).sum(axis=1), 0) / z**3
-        return FilmPoints(
+        return ShiningPoints(
             surface=surface,
             point_mm=point_mm,
             camera_mm=camera_mm,

@@ -143,9 +143,8 @@ def _openings(
     Rays that are followed no further find openings in some view. An opening moves from view to view with what
     is around it, at one of the depths that are known, so it is looked for in every view at such places.
     """
-    nothing_found = known.take(np.zeros(0, np.int64))
     if contrast < LEAST_CONTRAST or is_scalar(setup.render_scene.mi):
-        return nothing_found, 0
+        return known.take(np.zeros(0, np.int64)), 0
     rays = int(min(RAYS_PER_CONTRAST * contrast, MOST_OPENING_RAYS))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=3)
     found = _misses(sampler, _evenly(setup, rays, path_seed), path_seed)
