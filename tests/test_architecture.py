@@ -43,8 +43,6 @@ ROOMS = {
         "spectral",
         "spec",
         "assets",
-        "mitsuba_xml",
-        "gltf",
         "importing",
         "cameras",
         "renderer",

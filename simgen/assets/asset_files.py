@@ -78,7 +78,11 @@ def read_assets(scene: BaseModel, folder: Path) -> Assets:
     not even started for a scene without files.
     """
     found: dict[str, dict[str, Any]] = {kind: {} for kind in _KINDS.values()}
-    wanted = {(_KINDS[type(name)], str(name)): asset(folder, name, w) for w, name in named_files(scene)}
+    wanted = {
+        (_KINDS[type(name)], str(name)): asset(folder, name, w)
+        for w, name in named_files(scene)
+        if type(name) in _KINDS
+    }
     if wanted:
         total = 0
         with _Worker() as worker:

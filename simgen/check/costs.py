@@ -52,8 +52,8 @@ def cost_findings(facts: Facts) -> list[Finding]:
         way = f"photons one by one (thinning){kept}"
         if not facts.plan.thins:
             way = f"counts drawn from views of {facts.plan.samples} samples per pixel"
-            if facts.plan.is_unbounded:
-                way += ", since rare light paths, as by mirrors, are too bright for single photons"
+            if facts.plan.why_rendered:
+                way += f", since {facts.plan.why_rendered}"
     if facts.needs.products.radiance != "none":
         way += f"{', ' if way else ''}full-light images"
     way = f"{way}; " if way else ""

@@ -134,6 +134,8 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
     unseen_behind = (
         () if here.any() else hidden_by(look.render_scene, target.scene, number, look.alone, look.together)
     )
+    own = target.scene.objects
+    stands_at_mm = own[number - 1].position_mm[2] if number <= len(own) else np.inf
     return ObjectFacts(
         name=name,
         z_mm=look.centre.z_mm[here].astype(np.float64),
@@ -144,10 +146,10 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
         corners_cut=sum(_at_border(mask) for mask in masks.values()),
         centre_cut=_at_border(here),
         body_z_mm=(0.0, 0.0) if box is None else (float(box[0, 2]), float(box[1, 2])),
-        stands_at_mm=target.scene.objects[number - 1].position_mm[2],
+        stands_at_mm=stands_at_mm,
         hidden_by=unseen_behind,
         on_film=None if box is None else on_film(box, target.recipe.grid.camera_grid()),
-        shines=target.scene.objects[number - 1].material.emission is not None,
+        shines=any(number == one.number for one in look.render_scene.shining),
         encloses_camera=box is not None and any(_holds(box, look.grid, *camera) for camera in full),
     )
 
@@ -179,7 +181,9 @@ def _boxes(render_scene: RenderScene) -> dict[int, np.ndarray]:
         backend.shape_numbers(render_scene.scene), render_scene.scene.shapes(), strict=True
     ):
         bounds: Any = shape.bbox()
-        box = np.array([np.ravel(bounds.min), np.ravel(bounds.max)], dtype=np.float64)
+        corners = np.array([np.ravel(bounds.corner(number)) for number in range(8)], dtype=np.float64)
+        corners_mm = render_scene.frame.points_mm(corners)
+        box = np.array([corners_mm.min(axis=0), corners_mm.max(axis=0)])
         parts.setdefault(int(render_scene.object_of_shape[number]), []).append(box)
     return {
         number: np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])

@@ -3,21 +3,27 @@
 Sections 3.9 and 5.19 of the specification, and KHR_materials_*. Factors multiply pictures in linear light.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from pcii.base.srgb import linear_to_srgb, srgb_to_linear
+from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
+from simgen.assets.cutouts import cut_out
+from simgen.assets.mesh_points import bears_pictures_once
+from simgen.assets.triangles import Triangles
 from simgen.base.srgb import srgb_of
-from simgen.gltf.gltf_file import GltfFile
-from simgen.gltf.gltf_surfaces import Material, MaterialExtensions, Texture, TextureInfo
-from simgen.importing.foreign_scene import ForeignScene, light_values
+from simgen.importing.foreign_scene import ForeignScene
+from simgen.importing.gltf_file import GltfFile
+from simgen.importing.gltf_models import Material, MaterialExtensions, Texture, TextureInfo
 from simgen.importing.gltf_pictures import pictures_of
 from simgen.spec.materials import LEAST_INDEX, MOST_INDEX
 
 HALF = 0.5
+BORDER = 1e-4
+"""Texture coordinates may pass the borders of a picture by this much."""
 REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
 """How pictures go on beyond their borders, as OpenGL numbers it."""
 OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
@@ -261,3 +267,38 @@ def _stored(shares: np.ndarray) -> np.ndarray:
 def _gloss(roughness: float) -> float:
     """The gloss g with the same GGX alpha: ours goes from 0.1 to 0.001 linearly, theirs is roughness^2."""
     return round(float(np.clip((0.1 - roughness**2) / 0.099, 0, 1)), 6)
+
+
+def fitted(
+    made: Mapping[str, Any], triangles: Triangles, scene: ForeignScene, *, pictures_repeat: bool
+) -> dict[str, Any] | None:
+    """The material on this mesh: repeated where pictures are passed, shining where each part of them is
+    there once, with holes that leave something of it; None if they leave nothing.
+
+    What is lost by it is said in the scene, which also has the pictures.
+    """
+    material = dict(made)
+    uv = triangles.texcoords
+    if uv is not None and pictures_repeat and (uv.min() < -BORDER or uv.max() > 1 + BORDER):
+        material["tiled"] = True
+    if "texture" in material.get("emission", {}) and not bears_pictures_once(triangles):
+        del material["emission"]
+        scene.lose("pictures that shine, where parts of them are several times on a mesh")
+    if "opacity" in material:
+        stored = scene.images[material["opacity"]]
+        try:
+            if cut_out(triangles, stored / np.iinfo(stored.dtype).max, tiled="tiled" in material) is None:
+                scene.lose("surfaces that are all clear")
+                return None
+        except ValueError:
+            del material["opacity"]
+            scene.lose("holes by pictures that are too fine for their mesh: it is whole")
+    return material
+
+
+def light_values(field: str, rgb: np.ndarray) -> dict[str, Any]:
+    """The values of a light or emission: its luminance, as `field`, and its colour, of linear sRGB (3,)."""
+    values: dict[str, Any] = {field: float(f"{rgb @ LUMINANCE:.9g}")}
+    if np.ptp(rgb):
+        values["illuminant"] = srgb_of(rgb / rgb.max())
+    return values

@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_pictures
-from simgen.gltf.gltf_file import GltfFile
+from simgen.importing.gltf_file import GltfFile
 
 
 def pictures_of(gltf: GltfFile) -> dict[int, np.ndarray]:

@@ -10,15 +10,17 @@ from typing import Any, Literal
 import numpy as np
 
 from simgen.assets.triangles import MOST_FACES, Triangles
-from simgen.gltf.gltf_arrays import triangles_of
-from simgen.gltf.gltf_file import GltfFile, read_gltf
-from simgen.gltf.gltf_models import Node, PunctualLight
-from simgen.importing.fitted_materials import fitted
-from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint, cone_values, light_values
-from simgen.importing.gltf_materials import GltfMaterials
+from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
+from simgen.importing.gltf_arrays import triangles_of
+from simgen.importing.gltf_file import GltfFile, read_gltf
+from simgen.importing.gltf_materials import GltfMaterials, fitted, light_values
+from simgen.importing.gltf_models import Node, PunctualLight
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
+LARGEST_CONE_DEG = 89.0
+LEAST_EDGE_DEG = 0.1
+"""A spot's light falls off within this angle at least."""
 DEEPEST = 500
 """Nodes that may lie within each other."""
 EmissionUnit = Literal["nit", "watt"]
@@ -199,5 +201,12 @@ def _lamp(light: PunctualLight) -> dict[str, Any]:
     values = {"type": light.type, **light_values(field, light.intensity * np.array(light.color))}
     if light.type == "spot":
         beam, cutoff = light.spot.inner_cone_angle, light.spot.outer_cone_angle
-        values |= cone_values(float(np.degrees(beam)), float(np.degrees(cutoff)))
+        values |= _cone_values(float(np.degrees(beam)), float(np.degrees(cutoff)))
     return values
+
+
+def _cone_values(beam_deg: float, cutoff_deg: float) -> dict[str, float]:
+    """The angles of a spot, within what a scene allows."""
+    cutoff_deg = min(max(cutoff_deg, LEAST_EDGE_DEG), LARGEST_CONE_DEG)
+    beam_deg = min(max(beam_deg, 0.0), cutoff_deg - LEAST_EDGE_DEG)
+    return {"beam_deg": round(beam_deg, 6), "cutoff_deg": round(cutoff_deg, 6)}

@@ -1,4 +1,4 @@
-"""A foreign scene as a folder of its own: scene.toml, meshes as PLY, pictures as PNG and OpenEXR."""
+"""A foreign scene as a folder of its own: scene.toml, meshes as PLY, pictures as PNG."""
 
 import re
 from collections import Counter
@@ -10,18 +10,15 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.io.dataset_layout import write_exr_safely
 from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
 from simgen.assets.ply_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, validate
 from simgen.base.toml_layout import toml_text
-from simgen.importing.foreign_scene import ForeignScene, Lamp, Part
-from simgen.importing.placement import Placement, bounds
-from simgen.importing.turned_images import turned
+from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Placement, bounds
+from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
 from simgen.spec.scene import MOST_LIGHTS, MOST_OBJECTS, Scene
-from simgen.spec.shapes import Box, Card, Shape, Sphere
 
 SQUARE = 1e-5
 """Axes of a matrix whose cosine is less than this are square to each other."""
@@ -36,26 +33,33 @@ MOST_TRIANGLES = 1 << 24
 
 @dataclass(frozen=True)
 class ImportedScene:
-    """What was written, and what could not be."""
+    """What was written, and what of the file is not used. A scene by reference is counted in files alone."""
 
     folder: Path
-    objects: int
-    meshes: int
-    triangles: int
-    materials: int
-    lights: int
-    size_mm: tuple[float, float, float]
-    """Of the bounding box of all objects along X, Y and Z."""
-    camera: str | None
-    """The one that became the virtual centre."""
-    camera_angle_deg: float | None
-    """Its horizontal angle of view."""
     left_out: tuple[str, ...]
+    objects: int = 0
+    meshes: int = 0
+    triangles: int = 0
+    materials: int = 0
+    lights: int = 0
+    size_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Of the bounding box of all objects along X, Y and Z."""
+    camera: str | None = None
+    """The one that became the virtual centre."""
+    camera_angle_deg: float | None = None
+    """Its horizontal angle of view."""
+    files: tuple[str, ...] = ()
+    """Files that a scene by reference consists of."""
 
     def lines(self) -> Iterator[str]:
         """The same for people."""
         x, y, z = self.size_mm
         yield f"{self.folder / 'scene.toml'}"
+        if self.files:
+            named = _number(len(self.files) - 1, "file")
+            yield f"refers to {self.files[0]}, copied with {named} that it names"
+            yield from (f"not used: {what}" for what in self.left_out)
+            return
         yield (
             f"{_number(self.objects, 'object')} of {_number(self.triangles, 'triangle')} in "
             f"{_number(self.meshes, 'mesh', 'meshes')}, {_number(self.materials, 'material')}, "
@@ -88,7 +92,7 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
         )
     if len(scene.lamps) > MOST_LIGHTS:
         raise InputError(f"it has {len(scene.lamps)} lights, and a scene at most {MOST_LIGHTS}")
-    triangles = sum(len(part.shape.faces) for part in scene.parts if isinstance(part.shape, Triangles))
+    triangles = sum(len(part.triangles.faces) for part in scene.parts)
     if triangles > MOST_TRIANGLES:
         raise InputError(
             f"its objects have {triangles} triangles in all; at most {MOST_TRIANGLES} are rendered"
@@ -98,11 +102,6 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
     objects = [_object(part, name, placement, meshes) for part, name in zip(scene.parts, names, strict=True)]
     lights = [_light(lamp, placement, scene.mm) for lamp in scene.lamps]
     left_out = list(scene.left_out)
-    environment = None
-    if scene.surroundings is not None:
-        environment, turn_deg = turned(scene.surroundings, placement.rotation)
-        light = {"type": "environment", "file": "surroundings.exr", "turn_deg": turn_deg}
-        lights.append(light | {"luminance_cd_m2": scene.surroundings.luminance_cd_m2})
     lit = any("emission" in part.material for part in scene.parts)
     if not lights and not lit:
         lights.append(EVEN_LIGHT)
@@ -120,8 +119,6 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
             (new / name).write_bytes(ply_bytes(mesh))
         for name, pixels in scene.images.items():
             write_png(new / name, pixels)
-        if environment is not None:
-            write_exr_safely(new / "surroundings.exr", environment)
     box = placement.scale * np.ptp(bounds(scene.parts, placement.rotation), axis=0)
     materials = {repr(sorted(part.material.items(), key=str)) for part in scene.parts}
     view = placement.camera
@@ -137,6 +134,25 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
         camera_angle_deg=None if view is None else view.angle_deg,
         left_out=tuple(left_out),
     )
+
+
+def copy_reference(path: Path, file: MitsubaFile, out: Path) -> ImportedScene:
+    """Make the folder of a scene that refers to a Mitsuba file, a copy with all files that it names.
+
+    Raises `InputError` for a file that names others outside its folder, or that are missing.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    names = [path.name, *files_named_by(path.parent, path.name)]
+    scene = Scene(title=shorten(path.stem, LONGEST_TITLE), mitsuba=file)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with new_folder_safely(out) as new:
+        (new / "scene.toml").write_bytes(toml_text(scene, [f"Refers to {path.name}."]).encode())
+        for name in names:
+            (new / name).parent.mkdir(parents=True, exist_ok=True)
+            (new / name).write_bytes((path.parent / name).read_bytes())
+    unused = ("sensors but for where they stand, films, samplers and integrators, which recipes have",)
+    return ImportedScene(folder=out, left_out=unused, files=tuple(names))
 
 
 class _Meshes:
@@ -167,35 +183,20 @@ def _object(part: Part, name: str, placement: Placement, meshes: _Meshes) -> dic
     linear = matrix[:3, :3]
     parts = _rotation_and_scales(linear)
     rotation, scales = (np.eye(3), np.ones(3)) if parts is None else parts
-    if isinstance(part.shape, Triangles):
-        file = meshes.name(part.file, part.shape, linear if parts is None else None)
-        shape: dict[str, Any] = {"type": "mesh", "file": file}
-        if parts is not None:
-            alike = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
-            shape["scale"] = _significant(scales[0]) if alike else [_significant(one) for one in scales]
-    else:
-        shape = _sized(part.shape, np.abs(scales))
+    shape: dict[str, Any] = {
+        "type": "mesh",
+        "file": meshes.name(part.file, part.triangles, linear if parts is None else None),
+    }
+    if parts is not None:
+        alike = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
+        shape["scale"] = _significant(scales[0]) if alike else [_significant(one) for one in scales]
     return {
         "name": name,
         "position_mm": _rounded(matrix[:3, 3]),
-        "rotation_deg": [0.0] * 3 if isinstance(part.shape, Sphere) else _angles_deg(rotation),
+        "rotation_deg": _angles_deg(rotation),
         "shape": shape,
         "material": part.material,
     }
-
-
-def _sized(shape: Shape, scales: np.ndarray) -> dict[str, Any]:
-    match shape:
-        case Sphere():
-            sizes = {"radius_mm": shape.radius_mm * scales[0]}
-        case Card():
-            sizes = {"width_mm": shape.width_mm * scales[0], "height_mm": shape.height_mm * scales[1]}
-        case Box():
-            sizes = {"width_mm": shape.width_mm * scales[0], "height_mm": shape.height_mm * scales[1]}
-            sizes["depth_mm"] = shape.depth_mm * scales[2]
-        case _:
-            raise AssertionError(shape)
-    return {"type": shape.type} | {name: _significant(size) for name, size in sizes.items()}
 
 
 def _rotation_and_scales(linear: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

@@ -18,6 +18,7 @@ PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 `make bench` on two cores; only their ratios matter."""
 SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST = 77.0, 0.3
 """The same without a compiled backend."""
+UNBOUNDED = "rare light paths, as by mirrors, are too bright for single photons"
 PROBE_SEED = 0
 """The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
 nothing else are made alike: all with the origins of photons or all without."""
@@ -58,8 +59,8 @@ class Plan:
     photons_per_view: float
     keeps_origins: bool = True
     """Whether photons are few enough to be kept one by one, each with its origin, if they are thinned."""
-    is_unbounded: bool = False
-    """Whether views are rendered since rare paths bring more light than any bound that thinning can use."""
+    why_rendered: str = ""
+    """A clause on why photons cannot be thinned, whatever that costs; "" if they could be."""
     noise: float = 0.0
     """Variance that rendering adds to dense counts, as a share of their Poisson variance."""
     normaliser_error: float = 0.0
@@ -88,17 +89,19 @@ def plan(
     any case have `least_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and
     for more photons than can be made in either way.
     """
-    made = _cheaper_way(capture, setup, kind, least_samples, is_unbounded=False)
+    if setup.render_scene.why_rendered:
+        return _cheaper_way(capture, setup, kind, least_samples, why_rendered=setup.render_scene.why_rendered)
+    made = _cheaper_way(capture, setup, kind, least_samples)
     if not made.thins or not may_explore(made):
         return made
     explored = explore(setup, capture.photons, capture.photons_per_radiance)
     if not explored.is_bounded:
-        return _cheaper_way(capture, setup, kind, least_samples, is_unbounded=True)
+        return _cheaper_way(capture, setup, kind, least_samples, why_rendered=UNBOUNDED)
     return replace(made, explored=explored)
 
 
 def _cheaper_way(
-    capture: Capture, setup: Setup, kind: str, least_samples: int, *, is_unbounded: bool
+    capture: Capture, setup: Setup, kind: str, least_samples: int, why_rendered: str = ""
 ) -> Plan:
     render_scene = setup.render_scene
     grid = capture.grid
@@ -116,7 +119,7 @@ def _cheaper_way(
     per_view = _budget_per_view(capture)
     if (
         per_view is not None
-        and not is_unbounded
+        and not why_rendered
         and are_few(per_view)
         and is_cheaper(per_view, least_samples)
     ):
@@ -132,7 +135,7 @@ def _cheaper_way(
             f"at most {MOST_SINGLE_PHOTONS} can be"
         )
     # Where the virtual centre sees no light there may be none at all, which rendered views show at once.
-    may_thin = not is_unbounded and probed.mean > 0
+    may_thin = not why_rendered and probed.mean > 0
     most_thinned = MOST_THINNED_PHOTONS / grid.view_count if may_thin else 0.0
     most_samples = (MOST_PATHS - 1) // pixels
     is_better = is_cheaper(per_view, samples) or samples > most_samples
@@ -144,7 +147,7 @@ def _cheaper_way(
         samples=samples,
         photons_per_view=per_view,
         keeps_origins=are_few(per_view),
-        is_unbounded=is_unbounded,
+        why_rendered=why_rendered,
         noise=probed.photon_noise(gain, samples),
         normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
         depths_mm=first_hit_depths_mm(render_scene, grid) if thins else (),

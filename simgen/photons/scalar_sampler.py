@@ -163,7 +163,8 @@ class ScalarSampler:
         for number, ray in enumerate(self._traced(candidates)):
             hit = intersect(ray)
             if hit.is_valid():
-                object_id[number], z_mm[number] = ids[hit.shape.id()], hit.p.z
+                object_id[number] = ids[(hit.instance or hit.shape).id()]
+                z_mm[number] = render_scene.frame.z_mm(hit.p)
         return object_id, z_mm
 
     def _follow(self, candidates: _Candidates, rng: np.random.Generator, seed: int) -> np.ndarray:
@@ -203,6 +204,8 @@ class ScalarSampler:
         origins, directions = self.setup.rig.rays(
             candidates.k, candidates.l, candidates.row_px, candidates.col_px, lens_point
         )
+        frame = self.setup.render_scene.frame
+        origins, directions = frame.points(origins), frame.directions(directions)
         for ray in rows_of(np.concatenate([origins, directions], axis=1)):
             yield mi.RayDifferential3f(mi.Point3f(ray[:3]), mi.Vector3f(ray[3:]))
 

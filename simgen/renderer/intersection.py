@@ -7,7 +7,7 @@ import numpy as np
 
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.device_arrays import floats
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.mitsuba_scene import RenderScene, shape_number
 
 SHY_OF_TARGET = 1e-4
 """A ray to a target stops this share of its length before it."""
@@ -19,20 +19,21 @@ def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: n
     """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
     mi, scene = render_scene.mi, render_scene.scene
     unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+    unit, origin = render_scene.frame.directions(unit), render_scene.frame.points(origin_mm)
     if is_scalar(mi):
         ids = objects_by_shape(render_scene)
         found = np.zeros(len(unit), dtype=np.int16)
-        origin = mi.Point3f(*origin_mm)
+        start = mi.Point3f(*origin)
         for number, towards in enumerate(rows_of(unit)):
-            hit = scene.ray_intersect(mi.RayDifferential3f(origin, mi.Vector3f(towards)))
+            hit = scene.ray_intersect(mi.RayDifferential3f(start, mi.Vector3f(towards)))
             if hit.is_valid():
-                found[number] = ids[hit.shape.id()]
+                found[number] = ids[(hit.instance or hit.shape).id()]
         return found
     dr = load_drjit()
-    origins = np.broadcast_to(origin_mm, unit.shape)
+    origins = np.broadcast_to(origin, unit.shape)
     ray = mi.Ray3f(_vectors(mi, mi.Point3f, origins), _vectors(mi, mi.Vector3f, unit))
     hit = scene.ray_intersect_preliminary(ray)
-    shape = dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0)
+    shape = dr.select(hit.is_valid(), shape_number(render_scene, hit), 0)
     return render_scene.object_of_shape[np.array(shape)]
 
 
@@ -40,9 +41,9 @@ def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndar
     """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
     mi, scene = render_scene.mi, render_scene.scene
     if is_scalar(mi):
-        rays = _scalar_rays(mi, origin_mm, target_mm, SHY_OF_TARGET)
+        rays = _scalar_rays(render_scene, origin_mm, target_mm, SHY_OF_TARGET)
         return np.fromiter((scene.ray_test(ray) for ray in rays), dtype=bool, count=len(origin_mm))
-    return np.array(scene.ray_test(_rays_to(mi, origin_mm, target_mm, SHY_OF_TARGET)))
+    return np.array(scene.ray_test(_rays_to(render_scene, origin_mm, target_mm, SHY_OF_TARGET)))
 
 
 def standing_before(
@@ -57,31 +58,43 @@ def standing_before(
         return np.zeros(0, dtype=np.int16)
     if is_scalar(mi):
         ids, hits = objects_by_shape(render_scene), []
-        for ray in _scalar_rays(mi, origin_mm, target_mm, shy_of_target):
+        for ray in _scalar_rays(render_scene, origin_mm, target_mm, shy_of_target):
             hit = scene.ray_intersect(mi.RayDifferential3f(ray))
-            hits.append(ids[hit.shape.id()] if hit.is_valid() else -1)
+            hits.append(ids[(hit.instance or hit.shape).id()] if hit.is_valid() else -1)
         return np.array(hits, dtype=np.int16)
     dr = load_drjit()
-    hit = scene.ray_intersect_preliminary(_rays_to(mi, origin_mm, target_mm, shy_of_target))
-    shape = np.array(dr.select(hit.is_valid(), dr.reinterpret_array(mi.UInt32, hit.shape), 0))
+    hit = scene.ray_intersect_preliminary(_rays_to(render_scene, origin_mm, target_mm, shy_of_target))
+    shape = np.array(dr.select(hit.is_valid(), shape_number(render_scene, hit), 0))
     return np.where(shape > 0, render_scene.object_of_shape[shape], np.int16(-1))
 
 
-def _rays_to(mi: Any, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float) -> Any:
-    away = target_mm - origin_mm
-    length = np.linalg.norm(away, axis=-1)
-    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin_mm), _vectors(mi, mi.Vector3f, away / length[:, None]))
+def _rays_to(
+    render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
+) -> Any:
+    mi = render_scene.mi
+    origin, unit, length = _segments(render_scene, origin_mm, target_mm)
+    ray = mi.Ray3f(_vectors(mi, mi.Point3f, origin), _vectors(mi, mi.Vector3f, unit))
     ray.maxt = floats(mi, length * (1 - shy_of_target))
     return ray
 
 
 def _scalar_rays(
-    mi: Any, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
+    render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
 ) -> Iterator[Any]:
+    mi = render_scene.mi
+    origin, unit, length = _segments(render_scene, origin_mm, target_mm)
+    rows = rows_of(np.column_stack([origin, unit, length * (1 - shy_of_target)]))
+    return (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
+
+
+def _segments(
+    render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Origins, unit directions and lengths in the renderer's axes and unit, of segments in the world."""
     away = target_mm - origin_mm
     length = np.linalg.norm(away, axis=-1)
-    rows = rows_of(np.column_stack([origin_mm, away / length[:, None], length * (1 - shy_of_target)]))
-    return (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
+    frame = render_scene.frame
+    return frame.points(origin_mm), frame.directions(away / length[:, None]), length * frame.unit
 
 
 def _vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:

@@ -11,23 +11,24 @@ from simgen.cameras.rig import Camera, Rig
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.world_frame import WorldFrame
 
 # The pinhole is the origin of every ray, so nothing nearer than this is ever cut away in practice.
 NEAR_CLIP_MM = 0.01
 FAR_CLIP_MM = 1e7
 
 
-def sensor_plugin(mi: Any, camera: Camera, sampler: dict[str, Any]) -> dict[str, Any]:
+def sensor_plugin(mi: Any, camera: Camera, sampler: dict[str, Any], frame: WorldFrame) -> dict[str, Any]:
     """A camera as Mitsuba's sensor, whose own axes point left, up and forward."""
     grid, to_world = camera.grid, np.eye(4)
-    to_world[:3, :3] = camera.rotation * (-1.0, -1.0, 1.0)
-    to_world[:3, 3] = camera.position_mm
+    to_world[:3, :3] = frame.directions((camera.rotation * (-1.0, -1.0, 1.0)).T).T
+    to_world[:3, 3] = frame.points(camera.position_mm)
     plugin = {
         "type": "perspective",
         "fov": 2 * math.degrees(math.atan(grid.width * grid.pixel_mm / (2 * grid.focal_mm))),
         "fov_axis": "x",
-        "near_clip": NEAR_CLIP_MM,
-        "far_clip": FAR_CLIP_MM,
+        "near_clip": NEAR_CLIP_MM * frame.unit,
+        "far_clip": FAR_CLIP_MM * frame.unit,
         "to_world": mi.ScalarTransform4f(to_world + 0.0),  # adding 0 turns -0 into 0
         "film": {
             "type": "hdrfilm",
@@ -43,8 +44,8 @@ def sensor_plugin(mi: Any, camera: Camera, sampler: dict[str, Any]) -> dict[str,
         radius_mm = camera.lens.aperture_mm / 2
         return plugin | {
             "type": "thinlens",
-            "aperture_radius": radius_mm,
-            "focus_distance": camera.lens.focus_mm,
+            "aperture_radius": radius_mm * frame.unit,
+            "focus_distance": camera.lens.focus_mm * frame.unit,
         }
     # In shares of the film, and positive where the axis is left of (above) the film's centre.
     return plugin | {
@@ -79,7 +80,7 @@ def film_rays(
         x, y = slopes_behind_lens((x, y), rig.lens, (lens_point.x, lens_point.y))
         origin += mi.Vector3f(*turned(lens_point.x, lens_point.y))
     direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
-    return mi.RayDifferential3f(mi.Ray3f(origin, direction))
+    return mi.RayDifferential3f(mi.Ray3f(*render_scene.frame.placed(origin, direction)))
 
 
 def _dot(row: Sequence[Any], vector: Sequence[Any]) -> Any:

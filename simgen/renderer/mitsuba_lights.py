@@ -5,6 +5,7 @@ is in cd/m^2; in spectral mode see `spectra`.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.renderer.mitsuba_colours import light_spectrum, radiance_plugin
+from simgen.renderer.mitsuba_shapes import placed
+from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.lights import (
     AreaLight,
     DirectionalLight,
@@ -29,38 +32,42 @@ NODES = 32
 """Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
 
 
-def light_plugin(mi: Any, light: Light, gain: float, surroundings: np.ndarray | None) -> dict[str, Any]:
+def light_plugin(
+    mi: Any, light: Light, gain: float, surroundings: np.ndarray | None, frame: WorldFrame
+) -> dict[str, Any]:
     """The Mitsuba emitter of a light that is `gain` times as bright as it says.
 
-    `surroundings` (H, W, 3) are the pixels of an environment light's image.
+    `surroundings` (H, W, 3) are the pixels of an environment light's image; `frame` is that of the renderer.
     """
+    per_cd = 1e6 * frame.unit**2  # in cd = cd/m^2 m^2, with lengths in the renderer's unit
     match light:
         case UniformLight():
             radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
             return {"type": "constant", "radiance": radiance}
         case PointLight():
-            # In cd = cd/m^2 m^2, with lengths in mm.
-            intensity = radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant)
-            return {"type": "point", "position": list(light.position_mm), "intensity": intensity}
+            intensity = radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant)
+            position = frame.points(np.array(light.position_mm)).tolist()
+            return {"type": "point", "position": position, "intensity": intensity}
         case SpotLight():
             return {
                 "type": "spot",
-                "to_world": mi.ScalarTransform4f(_facing(light)),
-                "intensity": radiance_plugin(mi, gain * light.intensity_cd * 1e6, light.illuminant),
+                "to_world": mi.ScalarTransform4f(_rigid(frame, _facing(light))),
+                "intensity": radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant),
                 "beam_width": light.beam_deg,
                 "cutoff_angle": light.cutoff_deg,
             }
         case DirectionalLight():
             irradiance = radiance_plugin(mi, gain * light.illuminance_lux, light.illuminant)
-            return {"type": "directional", "direction": list(light.direction), "irradiance": irradiance}
+            direction = frame.directions(np.array(light.direction)).tolist()
+            return {"type": "directional", "direction": direction, "irradiance": irradiance}
         case EnvironmentLight():
             assert surroundings is not None
-            return _environment(mi, light, gain, surroundings)
+            return _environment(mi, light, gain, surroundings, frame)
         case AreaLight():
             radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
             return {
                 "type": "rectangle",
-                "to_world": mi.ScalarTransform4f(area_light_pose(light)),
+                "to_world": placed(mi, frame, mi.ScalarTransform4f(area_light_pose(light))),
                 "emitter": {"type": "area", "radiance": radiance},
                 "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
             }
@@ -84,7 +91,18 @@ def _facing(light: AreaLight | SpotLight) -> np.ndarray:
     return pose
 
 
-def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarray) -> dict[str, Any]:
+def _rigid(frame: WorldFrame, pose: np.ndarray) -> np.ndarray:
+    """A pose without a size in the world as one in the renderer's axes."""
+    if frame.is_world:
+        return pose
+    placed_pose = frame.matrix @ pose
+    placed_pose[:3, :3] /= frame.unit
+    return placed_pose
+
+
+def _environment(
+    mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarray, frame: WorldFrame
+) -> dict[str, Any]:
     bitmap = mi.Bitmap(np.ascontiguousarray(pixels, dtype=np.float32))
     bitmap.set_srgb_gamma(False)
     T = mi.ScalarTransform4f
@@ -95,7 +113,7 @@ def _environment(mi: Any, light: EnvironmentLight, gain: float, pixels: np.ndarr
         "type": "envmap",
         "bitmap": bitmap,
         "scale": gain * light.luminance_cd_m2,
-        "to_world": to_world,
+        "to_world": placed(mi, replace(frame, unit=1.0, origin=np.zeros(3)), to_world),
     }
 
 

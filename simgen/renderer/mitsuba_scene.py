@@ -1,5 +1,6 @@
 """From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never names one."""
 
+from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,10 +15,12 @@ from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import ShiningSurface, emission_plugin, object_lux, shining_surfaces
 from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
-from simgen.renderer.mitsuba_shapes import card_pose, placed_shape
+from simgen.renderer.mitsuba_reference import reference_to
+from simgen.renderer.mitsuba_shapes import card_pose, placed, placed_shape
 from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_key, surface_plugin, two_sided
+from simgen.renderer.world_frame import WORLD, WorldFrame
 from simgen.spec.lights import EnvironmentLight
-from simgen.spec.scene import Scene, SceneObject
+from simgen.spec.scene import MOST_OBJECTS, Scene, SceneObject
 from simgen.spec.shapes import Mesh, Sphere
 from simgen.spectral.filters import Filters, filters_for
 
@@ -41,6 +44,12 @@ class RenderScene:
     """By how much lights are brighter than they say, for the scene's level."""
     shining: tuple[ShiningSurface, ...] = ()
     """All that shines and can be seen, but for what shines from all around."""
+    why_rendered: str = ""
+    """A clause on what the tracer of single photons does not cover, so that views have to be rendered."""
+    frame: WorldFrame = WORLD
+    """Where the world is in the renderer's own axes."""
+    has_instances: bool = False
+    """Whether some objects are instances of a group of shapes."""
 
 
 def build(
@@ -60,18 +69,22 @@ def build(
     if not is_scalar(mi):
         load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
     assets = assets or read_assets(scene, folder)
-    names = {number: thing.name for number, thing in enumerate(scene.objects, start=1)}
-    plugins: dict[str, Any] = {
-        "type": "scene",
-        "integrator": {"type": "path", "max_depth": max_depth},
-    }
+    reference = None if scene.mitsuba is None else reference_to(mi, scene.mitsuba, folder)
+    own_names = [thing.name for thing in scene.objects]
+    names = dict(enumerate((*own_names, *(reference.names if reference else ())), start=1))
+    _check_names(names, folder)
+    frame = WORLD if reference is None else reference.frame
+    plugins: dict[str, Any] = {}
     around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
     surroundings = None if around is None else assets.environment(around.file)
     gain = gain_for(
         scene.level,
         scene.lights,
         surroundings,
-        lambda z_mm: sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects),
+        lambda z_mm: (
+            sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects)
+            + (reference.illuminance_lux(z_mm) if reference else 0.0)
+        ),
     )
     patterns, surfaces, reach_mm = (
         painted_patterns(scene.objects),
@@ -79,27 +92,62 @@ def build(
         _reach_mm(scene, assets),
     )
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces, reach_mm)
+        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces, reach_mm, frame)
     if scene.backdrop is not None:
         wall, half = scene.backdrop, scene.backdrop.half_width_mm
-        facing = mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm])
+        facing = placed(mi, frame, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
         plugins[BACKDROP] = {
             "type": "rectangle",
             "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
             "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
         }
     for number, light in enumerate(scene.lights, start=1):
-        plugins[f"{LIGHT}{number}"] = light_plugin(mi, light, gain, surroundings)
+        plugins[f"{LIGHT}{number}"] = light_plugin(mi, light, gain, surroundings, frame)
+    scatters = reference is not None and reference.has_media
+    integrator = {"type": "volpath" if scatters else "path", "max_depth": max_depth}
+    if reference is not None:
+        loaded = reference.build(plugins, integrator, gain)
+    else:
+        loaded = _loaded(mi, {"integrator": integrator} | plugins, folder)
+    filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
+    shining, why_rendered = list(shining_surfaces(mi, scene, assets, gain, filters)), ""
+    if reference is not None:
+        of_reference, why_rendered = reference.shining(loaded, 1 + len(own_names), filters)
+        shining += of_reference
+    ids = {f"{OBJECT}{number}": number for number in range(1, len(own_names) + 1)}
+    ids |= {name: number for number, name in names.items() if number > len(own_names)}
+    return RenderScene(
+        mi,
+        loaded,
+        _object_of_shape(loaded, ids),
+        names,
+        filters,
+        gain,
+        tuple(shining),
+        why_rendered,
+        frame,
+        reference is not None and reference.has_instances,
+    )
+
+
+def _loaded(mi: Any, plugins: dict[str, Any], folder: Path) -> Any:
     try:
         # Without optimisation: it merges shapes, and merged shapes lose their names. One after the other:
         # things are numbered as they come, and kernels that know them by other numbers are compiled anew.
-        loaded = mi.load_dict(plugins, parallel=False, optimize=False)
+        loaded = mi.load_dict({"type": "scene"} | plugins, parallel=False, optimize=False)
     except RuntimeError as fault:
         raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
     _numbers_as_data(mi, loaded)
-    filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
-    shining = tuple(shining_surfaces(mi, scene, assets, gain, filters))
-    return RenderScene(mi, loaded, _object_of_shape(loaded), names, filters, gain, shining)
+    return loaded
+
+
+def _check_names(names: Mapping[int, str], folder: Path) -> None:
+    """`InputError` for too many objects, and for one that is called like a shape of the Mitsuba file."""
+    twice = [name for name, count in Counter(names.values()).items() if count > 1]
+    if twice:
+        raise InputError(f"{folder}: an object and a shape of the Mitsuba file are both named '{twice[0]}'")
+    if len(names) > MOST_OBJECTS:
+        raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
 
 
 def _reach_mm(scene: Scene, assets: Assets) -> float:
@@ -129,11 +177,24 @@ def not_finite(render_scene: RenderScene, number: int) -> str:
 
 def alone(render_scene: RenderScene, number: int, *, with_lamps: bool) -> RenderScene:
     """The same without backdrop and objects but for `number` (from 1), with or without area lights."""
-    shapes = {shape.id(): shape for shape in render_scene.scene.shapes()}
-    lamps = {name: shape for name, shape in shapes.items() if with_lamps and name.startswith(LIGHT)}
-    name = f"{OBJECT}{number}"
-    scene = render_scene.mi.load_dict({"type": "scene", name: shapes[name], **lamps}, optimize=False)
-    return replace(render_scene, scene=scene, object_of_shape=_object_of_shape(scene))
+    numbers = render_scene.object_of_shape[shape_numbers(render_scene.scene)]
+    shapes = {
+        f"{OBJECT}{place}": shape
+        for place, (shape, own) in enumerate(zip(render_scene.scene.shapes(), numbers, strict=True))
+        if own == number or (with_lamps and own == 0 and shape.is_emitter())
+    }
+    scene = render_scene.mi.load_dict({"type": "scene"} | shapes, optimize=False)
+    return replace(render_scene, scene=scene)
+
+
+def shape_number(render_scene: RenderScene, hit: Any) -> Any:
+    """Mitsuba's number of the shapes that rays hit in compiled modes: of the instance, where it is one."""
+    mi, dr = render_scene.mi, load_drjit()
+    number = dr.reinterpret_array(mi.UInt32, hit.shape)
+    if not render_scene.has_instances:
+        return number
+    instance = dr.reinterpret_array(mi.UInt32, hit.instance)
+    return dr.select(instance != 0, instance, number)
 
 
 def _numbers_as_data(mi: Any, loaded: Any) -> None:
@@ -153,16 +214,12 @@ def _numbers_as_data(mi: Any, loaded: Any) -> None:
     parameters.update()
 
 
-def _object_of_shape(loaded: Any) -> np.ndarray:
+def _object_of_shape(loaded: Any, ids: Mapping[str, int]) -> np.ndarray:
     numbers = shape_numbers(loaded)
     table = np.zeros(max(numbers, default=0) + 1, dtype=np.int16)
     for number, shape in zip(numbers, loaded.shapes(), strict=True):
-        table[number] = _object_id(shape.id())
+        table[number] = ids.get(shape.id(), 0)
     return table
-
-
-def _object_id(shape_id: str) -> int:
-    return int(shape_id.removeprefix(OBJECT)) if shape_id.startswith(OBJECT) else 0
 
 
 def _object(
@@ -173,6 +230,7 @@ def _object(
     gain: float,
     surfaces: dict[Hashable, Any],
     reach_mm: float,
+    frame: WorldFrame,
 ) -> Any:
     """The shape of an object; `surfaces` are those made so far, which objects that look alike share."""
     try:
@@ -180,7 +238,7 @@ def _object(
         if key not in surfaces:
             surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
         emitter = emission_plugin(mi, thing, assets, gain)
-        return placed_shape(mi, thing, assets, surfaces[key], emitter, reach_mm)
+        return placed_shape(mi, thing, assets, surfaces[key], emitter, reach_mm, frame)
     except InputError as fault:
         raise InputError(f"object '{thing.name}', {fault}") from None
 

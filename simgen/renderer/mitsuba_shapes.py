@@ -10,6 +10,7 @@ from simgen.assets.asset_files import Assets
 from simgen.assets.cutouts import cut_out
 from simgen.assets.solids import globe, triangles_of
 from simgen.assets.triangles import Triangles
+from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.materials import Material
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Card, Mesh, Shape, Sphere
@@ -34,6 +35,11 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose
 
 
+def placed(mi: Any, frame: WorldFrame, pose: Any) -> Any:
+    """A pose in the world as one in the renderer's axes."""
+    return pose if frame.is_world else mi.ScalarTransform4f(frame.matrix) @ pose
+
+
 def placed_shape(
     mi: Any,
     thing: SceneObject,
@@ -41,13 +47,14 @@ def placed_shape(
     surface: Any,
     emitter: dict[str, Any] | None,
     reach_mm: float,
+    frame: WorldFrame,
 ) -> Any:
     """The Mitsuba shape (or the plugin that makes it) of an object with a Mitsuba surface and emitter.
 
     No two things of the scene are farther from each other than `reach_mm`. Raises `InputError` for a ball
     that shines and is smaller than single precision can tell where it stands.
     """
-    T, pose, shape = mi.ScalarTransform4f, pose_of(mi, thing), thing.shape
+    T, pose, shape = mi.ScalarTransform4f, placed(mi, frame, pose_of(mi, thing)), thing.shape
     plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
     matrix = np.array(pose.matrix, dtype=np.float64)
     if thing.material.opacity is None:
@@ -56,7 +63,7 @@ def placed_shape(
             and emitter is not None
             and shape.radius_mm < SMALL_BALL_SHARE * reach_mm
         ):
-            return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3]), matrix, plain)
+            return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3] / frame.unit), matrix, plain)
         if isinstance(shape, Sphere):
             return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | plain
         if isinstance(shape, Card):

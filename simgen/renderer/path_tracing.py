@@ -14,7 +14,7 @@ import numpy as np
 
 from simgen.renderer.backend import is_scalar, load_drjit
 from simgen.renderer.device_arrays import floats
-from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.mitsuba_scene import RenderScene, shape_number
 from simgen.renderer.wavelengths import Light
 
 STRATA = 2
@@ -54,8 +54,8 @@ def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) ->
     record = render_scene.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
     found = active & hit.is_valid()
-    shape = dr.select(found, dr.reinterpret_array(mi.UInt32, hit.shape), 0)
-    z_mm = dr.select(found, hit.p.z, dr.inf)
+    shape = dr.select(found, shape_number(render_scene, hit), 0)
+    z_mm = dr.select(found, render_scene.frame.z_mm(hit.p), dr.inf)
     missed = active & ~found
     guess = hit.emitter(render_scene.scene, missed).eval(hit, missed)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
@@ -102,12 +102,12 @@ def bright_directions(render_scene: RenderScene, number: int, seed: int) -> np.n
     if is_scalar(mi):
         seen_from = mi.Interaction3f()
         drawn = (around[0].sample_direction(seen_from, mi.Point2f(point))[0] for point in points.tolist())
-        return np.array([np.ravel(sample.d) for sample in drawn])
+        return render_scene.frame.world_directions(np.array([np.ravel(sample.d) for sample in drawn]))
     seen_from = load_drjit().zeros(mi.Interaction3f, number)
     sample, _ = around[0].sample_direction(
         seen_from, mi.Point2f(*(floats(mi, column) for column in points.T))
     )
-    return np.array(sample.d).T.astype(np.float64)
+    return render_scene.frame.world_directions(np.array(sample.d).T.astype(np.float64))
 
 
 def _lamps(scene: Any) -> list[Any]:

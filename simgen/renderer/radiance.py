@@ -78,7 +78,8 @@ def _mean_of_paths(
     own_seeds: Iterator[int],
 ) -> np.ndarray:
     """The film of a camera, (H, W, C) float32; each part of its samples takes the next seed."""
-    mi, plugin = render_scene.mi, sensor_plugin(render_scene.mi, camera, sampler)
+    mi = render_scene.mi
+    plugin = sensor_plugin(mi, camera, sampler, render_scene.frame)
     if render_scene.filters is not None:
         plugin["film"] = _film(plugin["film"], render_scene.filters)
     sensor = mi.load_dict(plugin)
@@ -109,7 +110,7 @@ def _object_boxes_mm(render_scene: RenderScene) -> np.ndarray:
     objects = render_scene.object_of_shape[shape_numbers(scene)] > 0
     boxes = [shape.bbox() for shape, is_object in zip(scene.shapes(), objects, strict=True) if is_object]
     corners = [[box.corner(number) for number in range(8)] for box in boxes]
-    return np.array(corners, dtype=np.float64).reshape(-1, 8, 3)
+    return render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
 
 
 def _parts(samples: int) -> list[int]:

@@ -11,7 +11,7 @@ drawn_values      Values of a TOML file that are drawn: the numbers, choices and
 lights            Lamps and what shines from all around: where they stand, how bright and of what
                   colour they are.
 materials         What surfaces do with light: a colour, by a reflectance or a texture, and a finish.
-publication       Terms of publication, as a recipe states them.
+mitsuba_file      A Mitsuba scene that a scene.toml refers to: where it stands, and which files it names.
 recipe            Recipes: one TOML file a dataset, resolved and validated before anything is rendered.
 scene             Scenes: the world as an object or in a TOML file, in millimetres; no camera in it.
 scene_generators  Scenes that Python functions draw: those that ship, and those that other packages

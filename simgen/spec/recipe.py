@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base.errors import InputError
 from pcii.core.bayer import PATTERNS
 from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
+from pcii.exporting.publication_terms import Terms
 from simgen.base.locations import find, recipe_roots
 from simgen.base.overrides import override
 from simgen.base.strict_models import (
@@ -27,7 +28,6 @@ from simgen.base.strict_models import (
     validate,
 )
 from simgen.spec.camera_grid import Grid
-from simgen.spec.publication import Publication
 from simgen.spectral.camera_curves import camera_names
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
@@ -53,6 +53,23 @@ SEED_LIMIT = 1 << 63
 APERTURE_TOLERANCE = 0.01
 """F-numbers are rounded by about so much."""
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
+
+
+class Publication(Strict):
+    """Terms under which the data may be used. Only the dataset's card says them: no data depend on them."""
+
+    licence: Annotated[Title, Field(min_length=1)] = Terms.licence
+    """Name of a licence in the SPDX list, such as "CC-BY-4.0", or the URL of another one."""
+    creators: Annotated[tuple[Title, ...], Field(min_length=1)] = Terms.creators
+    """Who made the data."""
+    citation: Title = Terms.citation
+    """How to cite the data."""
+    url: Title = ""
+    """Where the data are."""
+
+    def terms(self) -> Terms:
+        """The same as the type that cards are written with."""
+        return Terms(**self.model_dump())
 
 
 class FullLight(Strict):

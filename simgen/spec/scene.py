@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
 
 from pcii.base.errors import InputError
 from pcii.store.folder_kind import entries
@@ -37,6 +37,7 @@ from simgen.base.toml_layout import toml_text
 from simgen.spec.distributions import is_distribution
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
+from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
 from simgen.spec.scene_lookup import find_scene, named_values
 from simgen.spec.shapes import Shape
 
@@ -144,6 +145,9 @@ class Scene(Strict):
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
     """A wall behind the objects, which is no object itself."""
+    mitsuba: MitsubaFile | None = None
+    """A Mitsuba scene by the name of its XML file, or a table that says where it stands, too. All that it has
+    is part of the scene, beside objects and lights of its own."""
     planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES), at_most(MOST_PLANES)] = ()
     """Depths at which something is in focus; what a recipe without `analysis.z_mm` looks at."""
 
@@ -165,12 +169,19 @@ class Scene(Strict):
 
     @model_validator(mode="after")
     def _is_lit(self) -> Self:
-        if not self.lights and not any(thing.material.emission for thing in self.objects):
+        shines = any(thing.material.emission for thing in self.objects) or self.mitsuba is not None
+        if not self.lights and not shines:
             raise ValueError(
                 "'lights': nothing shines; give a light, such as { type = \"uniform\", luminance_cd_m2 = "
                 "100.0 }, or an object a material.emission"
             )
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_what_is_not_there(self, serialize: Any) -> dict[str, Any]:
+        """Scenes without a Mitsuba file keep their digests, and so their photons."""
+        values = serialize(self)
+        return {name: value for name, value in values.items() if name != "mitsuba" or value is not None}
 
     def __eq__(self, other: Any) -> bool:
         return isinstance(other, Scene) and dict(self) == dict(other)
@@ -297,3 +308,6 @@ def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
         for where, name in named_files(thing):
             yield f"object '{thing.name}', {where}", name
     yield from named_files(scene.model_copy(update={"objects": ()}))
+    if scene.mitsuba is not None and scene.folder is not None:
+        for name in files_named_by(scene.folder, scene.mitsuba.file):
+            yield f"mitsuba, {scene.mitsuba.file}", AssetName(name)

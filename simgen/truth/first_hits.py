@@ -7,6 +7,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, Cameras, as_rig, centre_camera
+from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
 
@@ -56,13 +57,19 @@ def _first_hits(render_scene: RenderScene, camera: Camera) -> FirstHits:
     # ray goes through each pixel's centre (stratified without jitter) and gives the hit's position.
     mi = render_scene.mi
     centre_ray = {"type": "stratified", "sample_count": 1, "jitter": False}
-    sensor = mi.load_dict(sensor_plugin(mi, camera, centre_ray))
+    sensor = mi.load_dict(sensor_plugin(mi, camera, centre_ray, render_scene.frame))
     aovs = "hit:position,normal:geo_normal,shape:shape_index"
     integrator = mi.load_dict({"type": "aov", "aovs": aovs})
     passes = np.array(mi.render(render_scene.scene, sensor=sensor, integrator=integrator, spp=1, seed=0))
     point, normal, shape = passes[..., -7:-4], passes[..., -4:-1], passes[..., -1].astype(np.int64)
-    hit = shape > 0  # shape 0 is a miss
+    point, normal = render_scene.frame.points_mm(point), render_scene.frame.world_directions(normal)
+    hit = (normal != 0).any(axis=-1)
     along = ((point - camera.position_mm) * normal).sum(axis=-1)
     facing = normal * np.where(hit, -np.sign(along), 0)[..., None]
     z_mm = np.where(hit, point[..., 2], np.inf)
-    return FirstHits(z_mm.astype(np.float32), render_scene.object_of_shape[shape], facing.astype(np.float32))
+    if render_scene.has_instances:  # the renderer's output has the shape within the instance
+        towards = camera.towards(*np.indices(hit.shape).reshape(2, -1))
+        object_id = first_objects(render_scene, camera.position_mm, towards).reshape(hit.shape)
+    else:
+        object_id = render_scene.object_of_shape[shape]
+    return FirstHits(z_mm.astype(np.float32), object_id, facing.astype(np.float32))

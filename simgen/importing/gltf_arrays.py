@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
-from simgen.gltf.gltf_file import GltfFile
-from simgen.gltf.gltf_models import Accessor, Primitive
+from simgen.importing.gltf_file import GltfFile
+from simgen.importing.gltf_models import Accessor, Primitive
 
 _DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}

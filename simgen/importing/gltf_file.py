@@ -13,7 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from simgen.base.asset_names import LARGEST_FILE_BYTES, asset
 from simgen.base.strict_models import LONGEST_PART, shorten, validate
-from simgen.gltf.gltf_models import Document
+from simgen.importing.gltf_models import Document
 
 LARGEST_JSON_BYTES = 1 << 26
 MOST_JSON_PARTS = 2_000_000

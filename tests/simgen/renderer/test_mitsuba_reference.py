@@ -1,0 +1,242 @@
+"""Scenes that refer to a Mitsuba file look as Mitsuba renders it, and read nothing outside their folder."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import simgen
+from pcii.base.errors import InputError
+from pcii.core.camera_grid import CameraGrid
+from simgen.renderer import backend
+
+SIDE, TILES, REPEATS, SAMPLES, DEPTH = 64, 8, 6, 64, 5
+ANGLE_DEG, FOCAL_MM = 35.0, 50.0
+GRID = CameraGrid(
+    rows=1,
+    cols=1,
+    pitch_mm=(1.0, 1.0),
+    focal_mm=FOCAL_MM,
+    pixel_mm=2 * FOCAL_MM * np.tan(np.radians(ANGLE_DEG / 2)) / SIDE,
+    height=SIDE,
+    width=SIDE,
+)
+CAMERA = f"""<sensor type="perspective" id="front"><float name="fov" value="{ANGLE_DEG}"/>
+<transform name="to_world"><lookat origin="0.5,0.6,4" target="0,0,0" up="0,1,0"/></transform>
+<film type="hdrfilm"><integer name="width" value="{SIDE}"/><integer name="height" value="{SIDE}"/>
+<string name="pixel_format" value="rgb"/><string name="component_format" value="float32"/>
+<rfilter type="box"/></film></sensor>"""
+ROOM = """<shape type="rectangle" id="floor"><transform name="to_world"><scale value="4"/>
+<rotate x="1" angle="-90"/><translate y="-1"/></transform></shape>
+<shape type="rectangle" id="back"><transform name="to_world"><scale value="6"/>
+<translate z="-3"/></transform></shape>
+<shape type="rectangle" id="lamp"><transform name="to_world"><scale value=".3"/><rotate x="1" angle="20"/>
+<translate y="1" z="-2"/></transform><emitter type="area"><rgb name="radiance" value="9,8,7"/>
+</emitter></shape>"""
+GLOSSY = """<shape type="sphere" id="ball"><point name="center" x="-.7" y="-.3" z="0"/>
+<float name="radius" value=".6"/><bsdf type="principled"><texture type="bitmap" name="base_color">
+<string name="filename" value="picture.png"/><string name="wrap_mode" value="mirror"/>
+<transform name="to_uv">
+<scale x="3" y="2.5"/></transform></texture><float name="metallic" value=".3"/>
+<float name="roughness" value=".4"/>
+</bsdf></shape>
+<shape type="shapegroup" id="group"><shape type="cube"><transform name="to_world">
+<scale value=".2"/></transform>
+</shape><shape type="sphere"><float name="radius" value=".15"/>
+<point name="center" x="0" y=".3" z="0"/></shape></shape>
+<shape type="instance" id="one"><ref id="group"/><transform name="to_world">
+<translate x=".5" y="-.6"/></transform></shape>
+<shape type="instance" id="two"><ref id="group"/><transform name="to_world"><rotate y="1" angle="30"/>
+<scale value="1.5"/><translate x=".9" y=".2" z="-1"/></transform></shape>
+<emitter type="point"><point name="position" x="2" y="3" z="2"/>
+<rgb name="intensity" value="20,18,15"/></emitter>
+<emitter type="spot"><transform name="to_world">
+<lookat origin="-2,2,2" target="0,0,0" up="0,1,0"/></transform>
+<rgb name="intensity" value="15,20,25"/></emitter>"""
+HAIRY = """<shape type="bsplinecurve" id="tuft"><string name="filename" value="tuft.txt"/>
+<bsdf type="hair"/></shape>
+<shape type="sdfgrid" id="blob"><string name="filename" value="ball.vol"/><transform name="to_world">
+<translate x=".1" y="-.9"/></transform></shape><emitter type="constant"/>"""
+FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"/>
+<rgb name="albedo" value=".9,.8,.6"/>
+</medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
+<bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Files that the scenes name."""
+    colours = np.random.default_rng(1).integers(0, 255, (8, 8, 3), dtype=np.uint8)
+    Image.fromarray(colours).save(tmp_path / "picture.png")
+    places = np.stack(np.meshgrid(*[np.linspace(0, 1, 12)] * 3, indexing="ij"), axis=-1)
+    ball = np.linalg.norm(places - 0.5, axis=-1) - 0.35
+    backend.load().VolumeGrid(ball.astype(np.float32)).write(str(tmp_path / "ball.vol"))
+    strands = (
+        "\n".join(f"{0.1 * strand - 0.6} {0.25 * knot - 0.5} {0.02 * knot**2} 0.03" for knot in range(6))
+        for strand in range(12)
+    )
+    (tmp_path / "tuft.txt").write_text("\n\n".join(strands))
+    return tmp_path
+
+
+def scene_of(folder: Path, content: str, **values: Any) -> simgen.Scene:
+    (folder / "scene.xml").write_text(f'<scene version="3.0.0">{content}</scene>')
+    return simgen.load_scene({"title": "by reference", "mitsuba": "scene.xml"} | values, folder=folder)
+
+
+def tiles_of(views: list[np.ndarray]) -> np.ndarray:
+    """Means over tiles (N, T, T, 3)."""
+    size = SIDE // TILES
+    return np.array(views, dtype=np.float64).reshape(-1, TILES, size, TILES, size, 3).mean(axis=(2, 4))
+
+
+@pytest.mark.renders
+@pytest.mark.parametrize(
+    ("content", "names", "is_thinned"),
+    [
+        (GLOSSY, {"ball", "one", "two"}, True),
+        (HAIRY, {"tuft", "blob"}, True),
+        (FOGGY, {"cloud"}, False),
+    ],
+)
+def test_views_truth_and_photons_are_those_of_mitsuba(
+    folder: Path, content: str, names: set[str], is_thinned: bool
+) -> None:
+    scene = scene_of(folder, CAMERA + ROOM + content)
+    counts, truth = simgen.draw_photons(scene, GRID, budget=20_000, cfa=None, seed=1, max_depth=DEPTH)
+    ours = tiles_of(
+        [
+            simgen.render(scene, GRID, samples_per_pixel=SAMPLES, max_depth=DEPTH, seed=seed).view(0, 0)
+            for seed in range(REPEATS)
+        ]
+    )
+    mi = backend.load()
+    file = mi.load_file(str(folder / "scene.xml"), optimize=False)
+    path = mi.load_dict({"type": "path" if is_thinned else "volpath", "max_depth": DEPTH})
+    theirs = tiles_of(
+        [np.array(mi.render(file, integrator=path, spp=SAMPLES, seed=100 + seed)) for seed in range(REPEATS)]
+    )
+    error = np.sqrt((ours.var(axis=0, ddof=1) + theirs.var(axis=0, ddof=1)) / REPEATS)
+    z = (ours.mean(axis=0) - theirs.mean(axis=0)) / error
+    # Of Student's distribution with 10 degrees of freedom the mean square is 1.25, of 192 values to 15 %.
+    assert (z**2).mean() < 1.8
+    assert abs(ours.mean() / theirs.mean() - 1) < 0.005
+    assert (truth.photons is not None) == is_thinned
+    assert set(truth.names.values()) == {"floor", "back", "lamp"} | names
+    luminance = theirs.mean(axis=0) @ [0.2126, 0.7152, 0.0722]
+    expected = luminance / luminance.sum() * counts.total
+    size = SIDE // TILES
+    drawn = counts.to_numpy().reshape(TILES, size, TILES, size).sum(axis=(1, 3))
+    assert ((drawn - expected) ** 2 / expected).sum() / (TILES**2 - 1) < 1.8
+    ray, _ = file.sensors()[0].sample_ray(0.0, 0.0, mi.Point2f(0.27, 0.71), mi.Point2f(0.5))
+    hit = file.ray_intersect(ray)
+    row, column = int(0.71 * SIDE), int(0.27 * SIDE)
+    seen = hit.instance[0] or hit.shape[0]
+    assert truth.names[int(truth.object_id[row, column])] == seen.id()
+
+
+@pytest.mark.renders
+def test_objects_lights_and_level_of_the_scene_stand_beside_the_file(folder: Path) -> None:
+    ball = {"type": "sphere", "radius_mm": 300.0}
+    own = {
+        "objects": [
+            {
+                "name": "ball",
+                "position_mm": [0, 0, 4000],
+                "shape": ball,
+                "material": {"reflectance": [1, 1, 1]},
+            }
+        ],
+        "lights": [{"type": "point", "position_mm": [0, 0, 0], "intensity_cd": 50.0}],
+    }
+    without_light = CAMERA + ROOM[: ROOM.index("<shape", ROOM.index("back"))]
+    scene = scene_of(folder, without_light, **own)
+    view = simgen.render(scene, GRID, samples_per_pixel=16, max_depth=2).view(0, 0)
+    # The nearest point of the ball faces the lamp, 3.7 m away.
+    middle = view[SIDE // 2 - 1 : SIDE // 2 + 1, SIDE // 2 - 1 : SIDE // 2 + 1].mean()
+    assert middle == pytest.approx(50.0 / 3.7**2 / np.pi, rel=0.02)
+    _, truth = simgen.draw_photons(scene, GRID, budget=100, cfa=None)
+    assert truth.z_mm[SIDE // 2, SIDE // 2] == pytest.approx(3700, abs=5)
+    level = {"illuminance_lux": 1000.0, "z_mm": 4000.0}
+    lit_by_file = CAMERA + ROOM + '<emitter type="constant"><rgb name="radiance" value="2"/></emitter>'
+    half = simgen.render(scene_of(folder, lit_by_file), GRID, samples_per_pixel=64, max_depth=2)
+    levelled = simgen.render(
+        scene_of(folder, lit_by_file, level=level), GRID, samples_per_pixel=64, max_depth=2
+    )
+    # A surface gets pi times the luminance of what is around it; the lamp in view shines away from it.
+    assert levelled.view(0, 0).mean() / half.view(0, 0).mean() == pytest.approx(1000 / (2 * np.pi), rel=0.05)
+
+
+@pytest.mark.renders
+def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
+    content = '<shape type="cube" id="box"><transform name="to_world"><scale x="2"/></transform></shape>'
+    place = {"file": "scene.xml", "place_at_mm": [0.0, 0.0, 600.0], "fit_mm": 100.0}
+    scene = scene_of(folder, content, mitsuba=place, lights=[{"type": "uniform", "luminance_cd_m2": 1.0}])
+    grid = CameraGrid(rows=1, cols=1, pitch_mm=(1, 1), focal_mm=50, pixel_mm=50 / 575, height=121, width=121)
+    _, truth = simgen.draw_photons(scene, grid, budget=100, cfa=None)
+    # The face that the camera sees is 100 mm wide and 50 mm high, 575 mm away: a pixel sees a millimetre.
+    assert truth.z_mm[60, 60] == pytest.approx(575)
+    assert (truth.object_id[60].sum(), truth.object_id[:, 60].sum()) == (pytest.approx(100, abs=1), 51)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ('<!DOCTYPE scene [<!ENTITY a "b">]><scene version="3.0.0"/>', "no DOCTYPE"),
+        ('<scene version="3.0.0"><path value="plugins"/></scene>', "<path> is not followed"),
+        ('<scene version="3.0.0"><bsdf type="../../evil"/></scene>', "outside the scene's folder"),
+        ('<scene version="3.0.0"><bsdf type="a.b"/></scene>', "no name of a plugin"),
+        (
+            '<scene version="3.0.0"><default name="d" value="."/><shape type="obj">'
+            '<string name="filename" value="$d$d/secret.obj"/></shape></scene>',
+            "outside the scene's folder",
+        ),
+        (
+            '<scene version="3.0.0"><shape type="obj"><string name="filename" value="linked.obj"/>'
+            "</shape></scene>",
+            "outside the scene's folder",
+        ),
+        (
+            '<scene version="3.0.0"><shape type="obj"><string name="filename" value="no.obj"/>'
+            "</shape></scene>",
+            "there is no file",
+        ),
+        (
+            '<scene version="3.0.0"><include filename="scene.xml"/><include filename="scene.xml"/></scene>',
+            "deep",
+        ),
+        ("<scene><broken", "not valid XML"),
+    ],
+)
+def test_files_that_lead_outside_are_refused(tmp_path: Path, content: str, sentence: str) -> None:
+    (tmp_path / "secret.obj").write_text("v 0 0 0")
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    (folder / "linked.obj").symlink_to(tmp_path / "secret.obj")
+    (folder / "scene.xml").write_text(content)
+    with pytest.raises(InputError, match=sentence):
+        simgen.load_scene({"title": "x", "mitsuba": "scene.xml"}, folder=folder)
+
+
+@pytest.mark.renders
+def test_what_mitsuba_refuses_is_one_sentence(tmp_path: Path) -> None:
+    wrong = '<shape type="sphere"><float name="radios" value="1"/></shape>'
+    for content, sentence in (
+        (CAMERA + wrong, "radios"),
+        (CAMERA + '<shape type="spher"/>', "spher"),
+        ("<shape/>", "cannot read"),
+        (ROOM, "it has 0 sensors; give mitsuba.camera"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            simgen.render(scene_of(tmp_path, content), GRID, samples_per_pixel=1)
+
+
+def test_an_import_copies_what_the_file_names(folder: Path) -> None:
+    scene_of(folder, CAMERA + ROOM + GLOSSY)
+    imported = simgen.import_scene(folder / "scene.xml", folder / "copy", unit="mm", fit_mm=200.0)
+    assert imported.files == ("scene.xml", "picture.png")
+    scene = simgen.load_scene(folder / "copy")
+    assert scene.mitsuba is not None
+    assert (scene.mitsuba.unit_mm, scene.mitsuba.fit_mm) == (1.0, 200.0)
