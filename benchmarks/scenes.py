@@ -7,7 +7,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 
 
 def setup_of(recipe: Recipe) -> Setup:

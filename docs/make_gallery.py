@@ -5,7 +5,7 @@ from pathlib import Path
 from simgen.check.targets import load_target
 from simgen.figures.preview_picture import draw_preview
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import is_scene_distribution, load_scene
+from simgen.spec.scene_lookup import load_scene
 
 DOCS = Path(__file__).resolve().parent
 SCENES, RECIPES = DOCS.parent / "scenes", DOCS.parent / "data_recipes"
@@ -18,8 +18,8 @@ HEAD = """# Scenes
 What ships in `scenes/`: `simgen check NAME` and `simgen preview NAME -o look.png` take a scene by its name,
 `simgen generate data_recipes/NAME.toml -o out/NAME` makes the data of a recipe. Each scene.toml has comments
 to learn from. Pictures from the virtual centre of the paper's camera grid; the frame in the left one is what
-the others show enlarged. Of a [distribution of scenes](scenes.md#scenes-by-distribution) draw 0 is shown. All
-of this page is made by `make gallery`.
+the others show enlarged. All of
+this page is made by `make gallery`.
 """
 
 
@@ -27,11 +27,6 @@ def scene_names() -> list[str]:
     """Of the scenes that ship, the paper's first."""
     names = {file.parent.name for file in SCENES.glob("*/scene.toml")}
     return sorted(names, key=lambda name: (name != "two_objects", name))
-
-
-def shown_draw(name: str) -> int | None:
-    """Which draw of a scene is shown: none of a scene that is one."""
-    return 0 if is_scene_distribution(str(SCENES / name)) else None
 
 
 def page() -> str:
@@ -42,7 +37,7 @@ def page() -> str:
         recipes.setdefault(recipe.scene, []).append(f"`{file.stem}`")
     parts = [HEAD]
     for name in scene_names():
-        scene, _ = load_scene(str(SCENES / name), number=shown_draw(name))
+        scene, _ = load_scene(str(SCENES / name))
         purpose = " ".join(scene.description.split())
         made = f" Recipes: {', '.join(recipes[name])}." if name in recipes else ""
         parts.append(f"## {name}\n\n{purpose}{made}\n\n![{scene.title}](gallery/{name}.jpg)\n")
@@ -54,7 +49,7 @@ def main() -> None:
     folder = DOCS / "gallery"
     folder.mkdir(exist_ok=True)
     for name in scene_names():
-        target = load_target(str(SCENES / name), scene_number=shown_draw(name))
+        target = load_target(str(SCENES / name))
         draw_preview(target, SAMPLES_PER_PIXEL).write(folder / f"{name}.jpg", DOTS_PER_INCH)
     (DOCS / "gallery.md").write_text(page(), encoding="utf-8")
 

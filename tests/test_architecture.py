@@ -39,9 +39,9 @@ ROOMS = {
     ],
     "simgen": [
         "base",
-        "drawn",
         "spectral",
         "spec",
+        "drawn",
         "assets",
         "importing",
         "cameras",

@@ -298,7 +298,6 @@ def test_a_budget_that_is_not_there_is_refused(
         (simgen_cli.app, "check drawn_room --scene"),
         (simgen_cli.app, "preview drawn_room --scene"),
         (simgen_cli.app, "preview drawn_room --samples-per-pixel"),
-        (simgen_cli.app, "draw drawn_room --scene"),
         (pcii_cli.app, "evaluate somewhere --workers"),
     ],
 )

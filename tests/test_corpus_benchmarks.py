@@ -11,8 +11,8 @@ from benchmarks.drawn import KINDS, write_recipe
 from benchmarks.removal import mean_iou, report
 from pcii.base.errors import InputError
 from simgen.dataset.prepared import prepare
-from simgen.drawn import GENERATORS
 from simgen.spec.recipe import load_recipe
+from simgen.spec.scene_lookup import drawn_scenes
 
 
 def test_the_corpus_is_of_recipes_that_ship(tmp_path: Path) -> None:
@@ -38,7 +38,7 @@ def test_a_corpus_that_is_told_wrongly_is_refused(tmp_path: Path) -> None:
 
 
 def test_every_kind_of_drawn_scene_is_seen_by_the_papers_cameras(tmp_path: Path) -> None:
-    assert {f"drawn_{kind}" for kind in KINDS} == GENERATORS.keys()
+    assert {f"drawn_{kind}" for kind in KINDS} <= drawn_scenes().keys()
     for kind in KINDS:
         recipe, near = load_recipe(str(write_recipe(tmp_path, kind, 7)))
         paper, _ = load_recipe("paper")

@@ -4,9 +4,6 @@ authoring_commands   Commands that write scenes and recipes: to start from, one 
                      program's file.
 benchmark_commands   The command `simgen benchmark`.
 commands             The `simgen` command.
-distribution_schema  The JSON Schema of scene files: that of one scene, and a distribution wherever a
-                     value may be drawn.
-draw_files           One draw of a distribution of scenes, written as a scene of its own.
 listings             Lists of the scenes and recipes that ship or stand in the working directory.
 library              What the commands do, as functions: scenes and recipes by name, datasets, pictures.
 scene_commands       Commands about scenes and recipes: list, describe, check, look at.

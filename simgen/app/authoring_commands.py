@@ -1,4 +1,4 @@
-"""Commands that write scenes and recipes: to start from, one draw of many, from another program's file."""
+"""Commands that write scenes and recipes: to start from, or from another program's file."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -50,28 +50,6 @@ def new_recipe(name: str, *, scene: str | None = None) -> None:
     path = write_new_recipe(name, scene)
     say(f"{path}")
     say_next("simgen", "check", path)
-
-
-def draw(target: str, *, scene: int, out: Out) -> None:
-    """Write one draw of a distribution of scenes as a scene of its own, with the files that it names.
-
-    Example of use:
-
-        simgen draw drawn_solids --scene 17 -o scenes/mine
-
-    Parameters
-    ----------
-    target
-        The distribution, by name or path.
-    scene
-        Which draw of it.
-    out
-        Folder for scene.toml, new or empty.
-    """
-    from simgen.app.draw_files import write_drawn_scene
-
-    say(f"{write_drawn_scene(target, scene, out)}")
-    say_next("simgen", "check", out)
 
 
 def import_scene(

@@ -9,7 +9,7 @@ from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from simgen.app.authoring_commands import draw, import_scene, new_recipe, new_scene
+from simgen.app.authoring_commands import import_scene, new_recipe, new_scene
 from simgen.app.benchmark_commands import benchmark
 from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
 
@@ -25,7 +25,6 @@ for command in (
     preview,
     new_scene,
     new_recipe,
-    draw,
     import_scene,
     benchmark,
 ):
@@ -76,6 +75,7 @@ def generate(
     set: Overrides = (),
     seeds: int | None = None,
     scenes: int | None = None,
+    trust_python: bool = False,
     executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
@@ -103,7 +103,9 @@ def generate(
         Make so many datasets, of the recipe's seed and those that follow. Each is whole; radiance is rendered
         for each, so leave it out where nothing needs it.
     scenes
-        Make datasets of so many draws of a scene that is a distribution, from the recipe's scene_number on.
+        Make datasets of this many drawn scenes, from the recipe's scene_number on.
+    trust_python
+        Run the Python function that a recipe file names as its scene: only if you trust its author.
     """
     from pcii.exporting.card_files import write_card
     from simgen.collection.whole_collection import generate_collection
@@ -111,7 +113,7 @@ def generate(
     from simgen.renderer import backend
     from simgen.spec.sweeps import load_sweep
 
-    sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes)
+    sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes, trust_python=trust_python)
     terms = sweep.recipe(0).publication.terms()
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:

@@ -16,10 +16,9 @@ from simgen.dataset import generation
 from simgen.figures.picture_parts import check_picture_path
 from simgen.figures.preview_picture import Preview, draw_preview
 from simgen.spec import recipe as recipes
-from simgen.spec import scene as scenes
+from simgen.spec import scene_lookup
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import Scene
-from simgen.spec.scene_lookup import plain_values
+from simgen.spec.scene import Scene, scene_of
 from simgen.spec.sweeps import load_sweep
 
 
@@ -36,9 +35,9 @@ def load_scene(
 ) -> Scene:
     """A scene by the name of one that ships, by the path of its folder or scene.toml, or by its values.
 
-    Values are a dict with the fields of a scene.toml; files that they name are in `folder`. Of a distribution
-    of scenes `number` says which one. Raises `pcii.InputError` for a scene that is missing or wrong, with the
-    field at fault.
+    Values are a dict with the fields of a scene.toml; files that they name are in `folder`. Of a scene that a
+    Python function draws, by its registered name or as "module:function" or "file.py:function", `number` says
+    which one. Raises `pcii.InputError` for a scene that is missing or wrong, with the field at fault.
 
     >>> load_scene("two_objects").title
     'Tricoloured ball and toy bird'
@@ -48,24 +47,30 @@ def load_scene(
     'Fog'
     """
     if isinstance(scene, dict):
-        values, source = plain_values(scene, number, "scene")
-        return scenes.scene_of(values, None if folder is None else Path(folder), source)
+        if number is not None:
+            raise InputError(
+                "number: these are values of one scene, of which there are no draws; leave it out"
+            )
+        return scene_of(scene, None if folder is None else Path(folder), "scene")
     if not isinstance(scene, str | Path):
         raise InputError(f"scene: expected a name, a path or a dict, got {type(scene).__name__}")
     if folder is not None:
         raise InputError("folder: a scene by name or path has its own; leave it out")
-    return scenes.load_scene(str(scene), number=number)[0]
+    return scene_lookup.load_scene(str(scene), number=number)[0]
 
 
-def load_recipe(name_or_path: str | Path, overrides: Sequence[str] = ()) -> RecipeFile:
+def load_recipe(
+    name_or_path: str | Path, overrides: Sequence[str] = (), *, trust_python: bool = False
+) -> RecipeFile:
     """A recipe by the name of one that ships or by path; `overrides` such as "photons.budget=300".
 
+    A file that names a Python function as its scene is read only if its author is trusted, `trust_python`.
     Raises `pcii.InputError` for a recipe that is missing or wrong, with the field at fault.
 
     >>> load_recipe("paper", ["photons.budget=300"]).recipe.photons.budget
     300.0
     """
-    return RecipeFile(*recipes.load_recipe(str(name_or_path), overrides))
+    return RecipeFile(*recipes.load_recipe(str(name_or_path), overrides, trust_python=trust_python))
 
 
 def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> dict[str, Any]:
@@ -108,6 +113,7 @@ def generate_collection(
     *,
     seeds: int | None = None,
     scenes: int | None = None,
+    trust_python: bool = False,
     executor: Executor = ALONE,
     report: Report = silent,
 ) -> Collection:
@@ -121,7 +127,7 @@ def generate_collection(
     ...                                  executor=Executor(workers=2))                      # doctest: +SKIP
     >>> [dataset.counts.total for dataset in collection.where(budget=100)]          # doctest: +SKIP
     """
-    sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes)
+    sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes, trust_python=trust_python)
     if not sweep.axes:
         raise InputError(f"{sweep.source}: no field has several values; use simgen.generate for one dataset")
     faults = collections.generate_collection(sweep, Path(out), executor, report)
@@ -142,7 +148,7 @@ def preview(
     """A picture of a scene from the virtual centre, with depth and objects, which notebooks show.
 
     With `out` it is written too, as PNG or JPEG. The scene, or a recipe with its scene, may be given by name
-    or path; of a distribution of scenes `scene_number` says which one. It takes seconds.
+    or path; of a drawn scene `scene_number` says which one. It takes seconds.
 
     Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
 

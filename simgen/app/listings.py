@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from pcii.base.errors import InputError
 from simgen.base.locations import recipe_roots
 from simgen.base.strict_models import shorten
-from simgen.spec.scene import is_scene_distribution, load_scene
-from simgen.spec.scene_generators import generators
-from simgen.spec.scene_lookup import scene_names
+from simgen.spec.scene_lookup import drawn_scenes, load_scene, scene_names
 from simgen.spec.sweeps import load_sweep
 
 LONGEST_FAULT = 100
@@ -17,20 +15,20 @@ MOST_NAMED = 6
 
 @dataclass(frozen=True)
 class ListedScene:
-    """A scene by name; of a distribution its first draw. `fault` says what is wrong with its file."""
+    """A scene by name. `fault` says what is wrong with its file."""
 
     name: str
     title: str | None
     objects: tuple[str, ...] | None
-    is_distribution: bool
+    is_drawn: bool
     fault: str | None = None
 
     def line(self) -> str:
         """One line for people."""
         if self.fault is not None:
             return f"{self.name:20} not valid: {shorten(self.fault, LONGEST_FAULT)}"
-        if self.is_distribution:
-            return f"{self.name:20} {self.title} (a distribution)"
+        if self.is_drawn:
+            return f"{self.name:20} {self.title} (drawn by number)"
         names = list(self.objects or ())
         if len(names) > MOST_NAMED:
             names = [*names[: MOST_NAMED - 1], f"{len(names) - MOST_NAMED + 1} more"]
@@ -61,17 +59,16 @@ class ListedRecipe:
 def list_scenes() -> list[ListedScene]:
     """Every scene by name, then those that Python functions draw."""
     return [_listed_scene(name) for name in scene_names()] + [
-        ListedScene(name, line.removesuffix("."), None, True) for name, line in generators().items()
+        ListedScene(name, f"Made by {package}", None, True) for name, package in drawn_scenes().items()
     ]
 
 
 def _listed_scene(name: str) -> ListedScene:
     try:
-        drawn = is_scene_distribution(name)
-        scene, _ = load_scene(name, number=0 if drawn else None)
+        scene, _ = load_scene(name)
     except InputError as fault:
         return ListedScene(name, None, None, False, str(fault))
-    return ListedScene(name, scene.title, tuple(thing.name for thing in scene.objects), drawn)
+    return ListedScene(name, scene.title, tuple(thing.name for thing in scene.objects), False)
 
 
 def list_recipes() -> list[ListedRecipe]:

@@ -16,7 +16,7 @@ Overrides = Annotated[tuple[str, ...], Parameter(name="--set")]
 def scenes(*, json: Json = False) -> None:
     """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
 
-    Of a distribution of scenes a number says which one is meant: `--scene 17`.
+    Of drawn scenes a number says which one is meant: `--scene 17`.
 
     Examples of use:
 
@@ -76,11 +76,11 @@ def schema(what: Literal["scene", "recipe"]) -> None:
     what
         Which kind of file.
     """
-    from simgen.app.distribution_schema import scene_schema
     from simgen.base.strict_models import schema_of
     from simgen.spec.recipe import Recipe
+    from simgen.spec.scene import Scene
 
-    answer_json(scene_schema() if what == "scene" else schema_of(Recipe))
+    answer_json(schema_of(Scene if what == "scene" else Recipe))
 
 
 def check(
@@ -88,6 +88,7 @@ def check(
     *,
     set: Overrides = (),
     scene: int | None = None,
+    trust_python: bool = False,
     json: Json = False,
 ) -> int:
     """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
@@ -100,7 +101,7 @@ def check(
 
         simgen check two_objects
         simgen check paper --set grid.pitch_mm=[2.5,2.5]
-        simgen check drawn_solids --scene 17
+        simgen check drawn_room --scene 17
 
     Parameters
     ----------
@@ -109,13 +110,15 @@ def check(
     set
         Override one value of the recipe, such as photons.budget=300; may be repeated.
     scene
-        Which draw of a distribution of scenes; without it the first 20 are looked at, less closely.
+        Which scene of those that a Python function draws; the first unless you say.
+    trust_python
+        Run the Python function that a recipe file names as its scene: only if you trust its author.
     json
         Print the findings as JSON.
     """
     from simgen.check.linter import lint
 
-    line, findings = lint(target, set, scene)
+    line, findings = lint(target, set, scene, trust_python=trust_python)
     bad = sum(finding.verdict == "bad" for finding in findings)
     if json:
         answer_json([asdict(finding) for finding in findings])
@@ -136,6 +139,7 @@ def preview(
     out: Out,
     set: Overrides = (),
     scene: int | None = None,
+    trust_python: bool = False,
     samples_per_pixel: int = 32,
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
@@ -146,7 +150,7 @@ def preview(
     Examples of use:
 
         simgen preview two_objects -o look.png
-        simgen preview drawn_solids --scene 17 -o look.png
+        simgen preview drawn_room --scene 17 -o look.png
 
     Parameters
     ----------
@@ -157,7 +161,9 @@ def preview(
     set
         Override one value of the recipe, such as grid.pixel_mm=0.02; may be repeated.
     scene
-        Which draw of a distribution of scenes.
+        Which scene of those that a Python function draws.
+    trust_python
+        Run the Python function that a recipe file names as its scene: only if you trust its author.
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
@@ -168,7 +174,7 @@ def preview(
     from simgen.spec.scene_lookup import is_scene
 
     check_picture_path(out)
-    draw_preview(load_target(target, set, scene), samples_per_pixel).write(out)
+    draw_preview(load_target(target, set, scene, trust_python=trust_python), samples_per_pixel).write(out)
     say(f"{out}")
     if is_scene(target) and scene is None:
         name = _name_of(target)
@@ -180,15 +186,14 @@ def preview(
 
 def _say_next_after_check(target: str, overrides: tuple[str, ...], scene: int | None) -> None:
     """Of a scene: look at it. Of a recipe: make it."""
-    from simgen.spec.scene import is_scene_distribution
-    from simgen.spec.scene_lookup import is_scene
+    from simgen.spec.scene_lookup import is_drawn, is_scene
 
     name = _name_of(target)
     if not is_scene(target):
         values = [word for text in overrides for word in ("--set", text)]
         say_next("simgen", "generate", target, "-o", f"out/{name}", *values)
         return
-    if scene is None and is_scene_distribution(target):
+    if scene is None and is_drawn(target):
         scene = 0
     number = [] if scene is None else ["--scene", scene]
     say_next("simgen", "preview", target, *number, "-o", f"{name}.png")

@@ -14,9 +14,8 @@ from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
 from simgen.check.scene_probe import probe_scene
 from simgen.check.targets import load_target
 from simgen.spec.recipe import recipe_file
-from simgen.spec.scene import NAME, is_scene_distribution, load_scene
-from simgen.spec.scene_generators import generators
-from simgen.spec.scene_lookup import is_scene, scene_names
+from simgen.spec.scene import NAME
+from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 ONE_PLANE_MM = 10.0
@@ -53,7 +52,7 @@ def write_new_recipe(name: str, scene: str | None = None) -> Path:
     """Write data_recipes/`name`.toml in the working directory, and return its path.
 
     A commented recipe of `scene`, by default of the scene `name` or, if there is none, of `FALLBACK_SCENE`.
-    Of a distribution of scenes it is the first draw. Raises `InputError` for a name that is taken or no name,
+    Of drawn scenes it is the first. Raises `InputError` for a name that is taken or no name,
     and for a scene that is missing or wrong.
     """
     _check_name(name)
@@ -64,13 +63,13 @@ def write_new_recipe(name: str, scene: str | None = None) -> Path:
         raise InputError(f"{name!r} is the name of a recipe that ships; choose another")
     chosen = scene or (name if is_scene(name) else FALLBACK_SCENE)
     named = chosen if Path(chosen).name == chosen else os.path.relpath(chosen, path.parent)
-    number = 0 if is_scene_distribution(chosen) else None
+    number = 0 if is_drawn(chosen) else None
     z_mm = "# z_mm = [540, 620]            # sections; default: planes_mm of the scene"
     if not load_scene(chosen, number=number)[0].planes_mm:
         z_mm = f"z_mm = {json.dumps(_depths_mm(chosen, number))}"
     quoted = json.dumps(named)
     if number is not None:
-        quoted += f"\nscene_number = {number}               # which draw of it"
+        quoted += f"\nscene_number = {number}               # which scene of those that it draws"
     text = _filled("recipe.toml", {"SCENE": quoted, "NAME": name, "FILE": str(path), "Z_MM": z_mm})
     path.parent.mkdir(exist_ok=True)
     write_bytes_safely(path, text.encode())
@@ -96,10 +95,10 @@ def _scene_to_copy(shipped: str, name: str) -> Path:
     for root in scene_roots():
         if (root / shipped / "scene.toml").is_file() and shipped in scene_names():
             return root / shipped
-    if shipped in generators():
+    if shipped in drawn_scenes():
         raise InputError(
-            f"--from: {shipped!r} is drawn by Python, not a file; write one of its draws by "
-            f"`simgen draw {shipped} --scene 0 -o scenes/{name}`"
+            f"--from: {shipped!r} is drawn by Python, not a file; write one of its scenes by "
+            f"simgen.load_scene({shipped!r}, 0).save('scenes/{name}') in Python"
         )
     shown = shorten(repr(shipped), LONGEST_PART)
     raise InputError(f"--from: there is no scene {shown}{suggestion(shipped, scene_names())}")

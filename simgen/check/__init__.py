@@ -8,8 +8,6 @@ expected_photons  Findings on photons: who sends them, how many an object and a 
                   come by mistake.
 linter            `simgen check`: what a scene or recipe will give, found without rendering it, but for
                   one coarse probe.
-many_draws        Findings on many draws of a distribution of scenes, by geometry alone: what is out of
-                  view or of focus.
 scene_facts       What a coarse look at a scene shows, and what follows from it: the types of `simgen
                   check`.
 scene_probe       The coarse probe of `simgen check`: what few, large pixels of the centre and of the

@@ -11,8 +11,7 @@ from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.spec.materials import is_clear
 from simgen.spec.recipe import Recipe, Render
 from simgen.spec.scene import Scene
-from simgen.spec.scene_generators import generators
-from simgen.spec.scene_lookup import is_scene, scene_names
+from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, scene_names
 from simgen.spec.sweeps import Sweep, load_sweep
 
 GLASS_DEPTH = 8
@@ -20,21 +19,27 @@ GLASS_DEPTH = 8
 
 
 def load_target(
-    name_or_path: str, overrides: Sequence[str] = (), scene_number: int | None = None
+    name_or_path: str,
+    overrides: Sequence[str] = (),
+    scene_number: int | None = None,
+    *,
+    trust_python: bool = False,
 ) -> Prepared:
-    """A recipe with its scene, from the name or path of either; `scene_number` says which draw of a scene.
+    """A recipe with its scene, from the name or path of either; `scene_number` says which drawn scene.
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
     longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
     .toml at its end, the recipe. Of fields with several values the first is taken. Raises `InputError` for
     what is missing or not valid.
     """
-    return target_of(*target_sweep(name_or_path, overrides), scene_number)
+    return target_of(*target_sweep(name_or_path, overrides, trust_python=trust_python), scene_number)
 
 
 def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None = None) -> Prepared:
     """The recipe of a sweep's first values with its scene; see `load_target`."""
     recipe = sweep.recipe(0)
+    if scene_number is None and recipe.scene_number is None and is_drawn(recipe.scene, recipe_folder):
+        scene_number = 0
     if scene_number is not None:
         recipe = recipe.model_copy(update={"scene_number": scene_number})
     target = prepare(recipe, recipe_folder)
@@ -54,14 +59,16 @@ def _with_long_paths(target: Prepared) -> Prepared:
     return replace(target, recipe=longer)
 
 
-def target_sweep(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Sweep, Path | None]:
+def target_sweep(
+    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
+) -> tuple[Sweep, Path | None]:
     """The recipe that a name or path means, and its folder; of a scene one that says nothing else, and None.
 
     Raises `InputError` for what is missing or not valid.
     """
     if not is_scene(name_or_path):
         _check_name(name_or_path)
-        sweep = load_sweep(name_or_path, overrides)
+        sweep = load_sweep(name_or_path, overrides, trust_python=trust_python)
         return sweep, sweep.recipe_folder
     if overrides:
         raise InputError(f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe")
@@ -72,5 +79,5 @@ def _check_name(name_or_path: str) -> None:
     path = Path(name_or_path)
     names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
     if not path.is_file() and not (path.parent == Path() and path.name.removesuffix(".toml") in names):
-        hint = suggestion(path.stem, {*names, *scene_names(), *generators()})
+        hint = suggestion(path.stem, {*names, *scene_names(), *drawn_scenes()})
         raise InputError(f"there is no scene or recipe {name_or_path!r}{hint}")

@@ -22,7 +22,8 @@ from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.mosaic import sensitivities
 from simgen.spec.recipe import Analysis, Recipe
-from simgen.spec.scene import Scene, checked_folder, load_scene, scene_files
+from simgen.spec.scene import Scene, checked_folder, scene_files
+from simgen.spec.scene_lookup import load_scene
 
 AROUND_PLANES_MM = 60.0
 """Before and behind the planes of a scene depth maps look so much further, if the recipe doesn't say."""

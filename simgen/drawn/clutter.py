@@ -4,7 +4,6 @@ from random import Random
 
 from simgen.drawn.composition import (
     REFERENCE_MM,
-    Table,
     box_of,
     card,
     drawn_scene,
@@ -14,11 +13,11 @@ from simgen.drawn.composition import (
     two_planes,
 )
 from simgen.drawn.surfaces import colour, noise, pattern, plain
+from simgen.spec.scene import Scene
 
 
-def drawn_cards(number: int) -> Table:
+def drawn_cards(random: Random) -> Scene:
     """16 to 40 small cards at three depths, over and under one another."""
-    random = Random(f"cards {number}")
     planes = [470, 550, 650]
     colours = [colour(random, 0.3, 0.7) for _ in planes]
     objects = []
@@ -34,12 +33,11 @@ def drawn_cards(number: int) -> Table:
         turned = random.uniform(-20, 20), random.uniform(-20, 20), random.uniform(0, 180)
         place = x, y, z + random.uniform(-6, 6)
         objects.append(placed(f"card-{position}", place, turned, shape, material))
-    return drawn_scene(random, f"Drawn: cards {number}", objects, planes)
+    return drawn_scene(random, "Drawn: cards", objects, planes)
 
 
-def drawn_room(number: int) -> Table:
+def drawn_room(random: Random) -> Scene:
     """Two or three solids before a wall of detail, on a desk or not: the film is bright all over."""
-    random = Random(f"room {number}")
     planes, wall = planes_apart(random, random.choice([2, 2, 3])), 760
     objects = []
     for position, z in enumerate(planes):
@@ -53,12 +51,11 @@ def drawn_room(number: int) -> Table:
     if random.random() < 0.5:
         top = noise(random, colour(random, 0.3, 0.7))
         objects.append(placed("desk", (0.0, 205.0, 595.0), upright, box_of(800, 240, 320), top))
-    return drawn_scene(random, f"Drawn: room {number}", objects, [*planes, wall], backdrop=None)
+    return drawn_scene(random, "Drawn: room", objects, [*planes, wall], backdrop=None)
 
 
-def drawn_leaves(number: int) -> Table:
+def drawn_leaves(random: Random) -> Scene:
     """A thing of detail behind 24 to 48 small leaves, all of them of one material."""
-    random = Random(f"leaves {number}")
     near, far = planes = two_planes(random)
     radius, scale = random.uniform(50, 70), far / REFERENCE_MM
     place = random.uniform(-20, 20) * scale, random.uniform(-20, 20) * scale, far + 0.6 * radius * scale
@@ -71,4 +68,4 @@ def drawn_leaves(number: int) -> Table:
         turned = random.uniform(-40, 40), random.uniform(-40, 40), random.uniform(0, 180)
         place = x, y, near + random.uniform(-12, 12)
         objects.append(placed(f"leaf-{position}", place, turned, shape, green))
-    return drawn_scene(random, f"Drawn: leaves {number}", objects, planes)
+    return drawn_scene(random, "Drawn: leaves", objects, planes)

@@ -1,13 +1,14 @@
 """What drawn scenes are composed of: depths, objects that stand there, lamps.
 
-Every function takes the `Random` of the scene; the order of its calls is part of what a number means.
-Lengths are rounded to 0.1 mm.
+The order in which a scene calls its `Random` is part of what a number means. Lengths are rounded to 0.1 mm.
 """
 
 from collections.abc import Sequence
 from itertools import pairwise
 from random import Random
 from typing import Any
+
+from simgen.spec.scene import Scene, scene_of
 
 REFERENCE_MM = 560.0
 """Sizes and places are drawn for this depth and scaled, so that things are as large in the picture."""
@@ -25,14 +26,14 @@ def drawn_scene(
     objects: list[Table],
     planes_mm: Sequence[int],
     backdrop: Table | None = DARK_BACKDROP,
-) -> Table:
+) -> Scene:
     """The scene of these objects, its lamps drawn last."""
     scene = {"title": title, "planes_mm": list(planes_mm), "objects": objects, "lights": _lamps(random)}
-    return scene if backdrop is None else scene | {"backdrop": backdrop}
+    return scene_of(scene if backdrop is None else scene | {"backdrop": backdrop}, None, title)
 
 
 def planes_apart(random: Random, count: int) -> list[int]:
-    """So many depths, in mm, well apart."""
+    """`count` depths, in mm, well apart."""
     while True:
         planes: list[int] = sorted(random.sample(PLANES_MM, count))
         if all(far - near >= LEAST_APART_MM for near, far in pairwise(planes)):

@@ -17,24 +17,25 @@ from simgen.drawn.composition import (
     two_planes,
 )
 from simgen.drawn.surfaces import chessboard, glossy, pattern, plain
+from simgen.spec.scene import Scene
 
 
-def drawn_plain(number: int) -> Table:
+def drawn_plain(random: Random) -> Scene:
     """Two or three solids of one colour each, one before the border of another."""
-    return _side_by_side("plain", number, plain)
+    return _side_by_side(random, "plain", plain)
 
 
-def drawn_textured(number: int) -> Table:
+def drawn_textured(random: Random) -> Scene:
     """Two or three solids with patterns, one before the border of another."""
-    return _side_by_side("textured", number, pattern)
+    return _side_by_side(random, "textured", pattern)
 
 
-def drawn_checks(number: int) -> Table:
+def drawn_checks(random: Random) -> Scene:
     """Two or three solids of coarse checks, one before the middle of the other."""
     # Close together, so that borders run through the middle of what is behind.
     return _side_by_side(
+        random,
         "checks",
-        number,
         partial(chessboard, fewest=2, most=5),
         first_mm=(-30, -45),
         apart_mm=(30, 60),
@@ -43,16 +44,15 @@ def drawn_checks(number: int) -> Table:
     )
 
 
-def drawn_shiny(number: int) -> Table:
+def drawn_shiny(random: Random) -> Scene:
     """Two or three solids of plastic or metal, glossy or dull, each by itself."""
     return _side_by_side(
-        "shiny", number, glossy, first_mm=(-60, -105), apart_mm=(95, 115), radius_mm=(30, 48), high_mm=60
+        random, "shiny", glossy, first_mm=(-60, -105), apart_mm=(95, 115), radius_mm=(30, 48), high_mm=60
     )
 
 
-def drawn_crossing(number: int) -> Table:
+def drawn_crossing(random: Random) -> Scene:
     """Something plain across the middle of something else of nearly the same colour."""
-    random = Random(f"crossing {number}")
     near, far = planes = two_planes(random)
     mean = [random.uniform(0.3, 0.7) for _ in range(3)]
     alike = [[round(part + random.uniform(-0.04, 0.04), 2) for part in mean] for _ in planes]
@@ -70,21 +70,20 @@ def drawn_crossing(number: int) -> Table:
     turned = random.uniform(-8, 8), random.uniform(-8, 8), random.uniform(0, 180)
     place = (x + random.uniform(-25, 25)) * scale, (y + random.uniform(-25, 25)) * scale, near + depth
     objects.append(placed("across", place, turned, shape, across))
-    return drawn_scene(random, f"Drawn: crossing {number}", objects, planes)
+    return drawn_scene(random, "Drawn: crossing", objects, planes)
 
 
 def _side_by_side(
+    random: Random,
     kind: str,
-    number: int,
     material: Callable[[Random], Table],
     *,
     first_mm: tuple[float, float] = (-60, -80),
     apart_mm: tuple[float, float] = (50, 85),
     radius_mm: tuple[float, float] = (36, 58),
     high_mm: float = 25,
-) -> Table:
+) -> Scene:
     """From left to right; the first of two or of three is at `first_mm`, up or down by at most `high_mm`."""
-    random = Random(f"{kind} {number}")
     planes = planes_apart(random, random.choice([2, 2, 3]))
     objects, x = [], first_mm[len(planes) - 2]
     for position, z in enumerate(random.sample(planes, len(planes))):
@@ -92,4 +91,4 @@ def _side_by_side(
         place = x * scale, random.uniform(-high_mm, high_mm) * scale, z + 0.6 * radius * scale
         objects.append(solid(random, f"solid-{position}", place, radius * scale, material(random)))
         x += random.uniform(*apart_mm)
-    return drawn_scene(random, f"Drawn: {kind} {number}", objects, planes)
+    return drawn_scene(random, f"Drawn: {kind}", objects, planes)

@@ -4,11 +4,9 @@ backend           The renderer behind everything: the one place that loads Mitsu
 device_arrays     NumPy's arrays as the renderer's, and parts of those; for compiled backends.
 emission          Objects that shine by themselves: as Mitsuba's emitters, and the light that they give a
                   plane.
-installation      Whether the renderer is installed, which analysis does without.
 intersection      Rays by the million, NumPy in and NumPy out: all at once in compiled modes, one by one
                   in scalar mode.
 mitsuba_camera    Cameras as Mitsuba's: its sensors, and rays through points of their films.
-mitsuba_colours   Colours and spectra as Mitsuba's textures, in the variant that is set.
 mitsuba_lights    Lights as Mitsuba's emitters, and how bright they make a plane.
 mitsuba_reference A Mitsuba scene by reference: its own parser reads it, and Mitsuba builds all that it
                   names, as it stands.
@@ -16,7 +14,8 @@ mitsuba_scene     From a validated scene to Mitsuba's: we alone choose the plugi
                   names one.
 mitsuba_shapes    Shapes as Mitsuba's: its own sphere and rectangle, and meshes built in memory, never
                   from a file.
-mitsuba_surfaces  Materials as Mitsuba's surfaces.
+mitsuba_surfaces  Materials as Mitsuba's surfaces, colours and spectra as its textures, in the variant that is
+                  set.
 path_tracing      Light paths, one for each of many camera rays at once: what is hit first, and unbiased
                   radiance.
 radiance          Dense radiance of one view: every pixel, by path tracing.

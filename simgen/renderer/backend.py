@@ -11,6 +11,7 @@ with the libraries.
 
 import contextlib
 import ctypes.util
+import importlib.util
 import os
 import platform
 import re
@@ -27,8 +28,8 @@ from typing import Any, Literal
 
 from pcii.base.errors import InputError
 from simgen.base.machine_cache import kept
-from simgen.renderer.installation import check_installed
 
+NEEDED = ("mitsuba", "drjit")
 Kind = Literal["cuda", "llvm", "scalar"]
 KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")
 VARIANTS: dict[Kind, str] = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
@@ -287,3 +288,13 @@ def describe(*, spectral: bool = False) -> dict[str, Any]:
     chosen = choose()
     versions = {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
     return asdict(chosen) | {"variant": chosen.variant_for(spectral)} | versions
+
+
+def check_installed() -> None:
+    """Raise `InputError`, with what to type, unless Mitsuba and Dr.Jit are installed."""
+    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
+            "pip install '.[render]'"
+        )

@@ -11,10 +11,9 @@ from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import Assets
 from simgen.assets.mesh_points import bears_pictures_once, surface_points
 from simgen.assets.solids import card_triangles, globe, triangles_of
-from simgen.renderer.mitsuba_colours import is_spectral, light_spectrum, radiance_plugin
 from simgen.renderer.mitsuba_lights import area_light_pose
 from simgen.renderer.mitsuba_shapes import check_texcoords, pose_of, solid_parts
-from simgen.renderer.mitsuba_surfaces import texture_plugin
+from simgen.renderer.mitsuba_surfaces import is_spectral, light_spectrum, radiance_plugin, texture_plugin
 from simgen.spec.lights import AreaLight, Illuminant
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spec.shapes import Card, Sphere

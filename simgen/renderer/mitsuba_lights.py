@@ -12,8 +12,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
-from simgen.renderer.mitsuba_colours import light_spectrum, radiance_plugin
 from simgen.renderer.mitsuba_shapes import placed
+from simgen.renderer.mitsuba_surfaces import light_spectrum, radiance_plugin
 from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.lights import (
     AreaLight,

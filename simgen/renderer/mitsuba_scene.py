@@ -13,11 +13,17 @@ from simgen.assets.asset_files import Assets, read_assets
 from simgen.assets.solids import triangles_of
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import ShiningSurface, emission_plugin, object_lux, shining_surfaces
-from simgen.renderer.mitsuba_colours import reflectance_plugin
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
 from simgen.renderer.mitsuba_reference import reference_to
 from simgen.renderer.mitsuba_shapes import card_pose, placed, placed_shape
-from simgen.renderer.mitsuba_surfaces import matt, painted_patterns, surface_key, surface_plugin, two_sided
+from simgen.renderer.mitsuba_surfaces import (
+    matt,
+    painted_patterns,
+    reflectance_plugin,
+    surface_key,
+    surface_plugin,
+    two_sided,
+)
 from simgen.renderer.world_frame import WORLD, WorldFrame
 from simgen.spec.lights import EnvironmentLight
 from simgen.spec.scene import MOST_OBJECTS, Scene, SceneObject

@@ -12,8 +12,8 @@ from simgen.cameras.rig import Camera, Cameras, as_rig
 from simgen.renderer.backend import shape_numbers
 from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_camera import sensor_plugin
-from simgen.renderer.mitsuba_colours import spectrum_plugin
 from simgen.renderer.mitsuba_scene import RenderScene, not_finite
+from simgen.renderer.mitsuba_surfaces import spectrum_plugin
 from simgen.spectral.filters import Filters
 
 SEED_STEP = 0x9E3779B9

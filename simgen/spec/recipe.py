@@ -24,6 +24,7 @@ from simgen.base.strict_models import (
     Whole,
     completed_by,
     read_toml,
+    shown_value,
     suggestion,
     validate,
 )
@@ -227,9 +228,10 @@ class Recipe(Strict):
     title: Title = ""
     """What reports and pictures call it; the scene's title unless given."""
     scene: Annotated[str, Field(min_length=1)]
-    """Name of a scene that ships, or path of a scene folder (relative paths: to the recipe)."""
+    """Name of a scene that ships, path of a scene folder (relative paths: to the recipe), or a Python
+    function that draws scenes, as "module:function" or "file.py:function"."""
     scene_number: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] | None = None
-    """Which draw of a scene that is a distribution; none for a scene that is not."""
+    """Which scene of those that a Python function draws; none for a single scene."""
     seed: Annotated[Whole, Field(ge=0, lt=SEED_LIMIT)] = 0
     """All that is random follows from it and from what is drawn: the same recipe, the same bytes."""
     grid: Grid = Grid()
@@ -283,24 +285,37 @@ class Recipe(Strict):
         return self.sensor.bayer
 
 
-def load_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[Recipe, Path]:
+def load_recipe(
+    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
+) -> tuple[Recipe, Path]:
     """A recipe by path or shipped name, with `key=value` overrides; and its folder.
 
     A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string. With another scene the
     recipe's title and analysis, which are of its own scene, are dropped but for what is given too.
     Raises `InputError` for a recipe that is missing or wrong.
     """
-    values, source, recipe_folder = read_recipe(name_or_path, overrides)
+    values, source, recipe_folder = read_recipe(name_or_path, overrides, trust_python=trust_python)
     return validate(Recipe, values, source), recipe_folder
 
 
-def read_recipe(name_or_path: str, overrides: Sequence[str] = ()) -> tuple[dict[str, Any], str, Path]:
-    """What a recipe and its overrides say, before it is checked; what to call both; and the folder."""
+def read_recipe(
+    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
+) -> tuple[dict[str, Any], str, Path]:
+    """What a recipe and its overrides say, before it is checked; what to call both; and the folder.
+
+    Raises `InputError` for a file that names a Python function, unless its author is trusted to run code:
+    overrides are the person's own.
+    """
     path = recipe_file(name_or_path)
     if path is None:
         names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
         raise InputError(f"recipe: there is no {name_or_path!r}{suggestion(Path(name_or_path).stem, names)}")
     written = read_toml(path)
+    if not trust_python and ":" in str(written.get("scene", "")):
+        raise InputError(
+            f"{path}: scene: {shown_value(written['scene'])} runs Python code of the recipe's author; "
+            "if you trust it, add --trust-python (in Python trust_python=True)"
+        )
     values = deepcopy(written)
     override(values, overrides)
     if values.get("scene") != written.get("scene"):

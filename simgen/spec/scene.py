@@ -27,18 +27,15 @@ from simgen.base.strict_models import (
     Vector,
     at_most,
     faults_of,
-    read_toml,
     shorten,
     shown_value,
     suggestion,
     validate,
 )
 from simgen.base.toml_layout import toml_text
-from simgen.spec.distributions import is_distribution
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
-from simgen.spec.scene_lookup import find_scene, named_values
 from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
@@ -258,19 +255,6 @@ class Scene(Strict):
         return out / "scene.toml"
 
 
-def load_scene(
-    name_or_path: str, recipe_folder: Path | None = None, number: int | None = None
-) -> tuple[Scene, Path]:
-    """A scene by name or path, and its folder.
-
-    A name is looked up in `recipe_folder`, in the working directory's `scenes/`, among the scenes that ship,
-    then among generators. `number` selects a draw from a distribution of scenes. Raises `InputError` for a
-    scene that is missing or wrong, for a number with a single scene, and for a distribution without one.
-    """
-    values, folder, source = named_values(name_or_path, recipe_folder, number)
-    return scene_of(values, folder, source), folder
-
-
 def scene_of(values: Mapping[str, Any], folder: Path | None, source: str) -> Scene:
     """The scene with these values and its files in this folder; raises `InputError` if anything is wrong."""
     scene = validate(Scene, values, source).change(folder=folder)
@@ -294,12 +278,6 @@ def checked_folder(scene: Scene, source: str = "scene") -> Path:
     if faults:
         raise faults_of(source, faults, len(faults))
     return scene.folder or Path()
-
-
-def is_scene_distribution(name_or_path: str, recipe_folder: Path | None = None) -> bool:
-    """Whether a name or path means a distribution of scenes (a file or a generator), not one scene."""
-    file = find_scene(name_or_path, recipe_folder)
-    return file is None or is_distribution(read_toml(file))
 
 
 def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:

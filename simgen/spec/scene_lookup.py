@@ -1,58 +1,59 @@
-"""Where scenes are found: by name or path, and the values of a scene, drawn where it is a distribution."""
+"""Where scenes are found: scene.toml files by name or path, and Python functions that draw scenes by number.
 
+A drawn scene is a function `(random) -> simgen.Scene` of a `random.Random`, whose sequence Python keeps for
+all time (NumPy's may change). It is named "module:function" or "file.py:function", or registered in the
+pyproject.toml of any package:
+
+    [project.entry-points."simgen.scenes"]
+    my-scenes = "my_package.scenes:draw"
+"""
+
+import importlib
+import inspect
+import runpy
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from random import Random
 
 from pcii.base.errors import InputError
+from pcii.base.extensions import package_of, registered
 from simgen.base.locations import find, scene_roots
 from simgen.base.strict_models import LONGEST_PART, read_toml, shorten, suggestion
-from simgen.spec.distributions import draw, is_distribution
 from simgen.spec.recipe import SEED_LIMIT
-from simgen.spec.scene_generators import generated, generators
+from simgen.spec.scene import Scene, scene_of
+
+GROUP = "simgen.scenes"
 
 
-def named_values(
-    name_or_path: str, recipe_folder: Path | None, number: int | None
-) -> tuple[dict[str, Any], Path, str]:
-    """The values of one scene by name or path as TOML holds them, its folder, and what errors call it.
+def load_scene(
+    name_or_path: str, recipe_folder: Path | None = None, number: int | None = None
+) -> tuple[Scene, Path]:
+    """A scene by name or path, and its folder.
 
-    `number` selects a draw from a distribution. Raises `InputError` for a scene that is missing, for a number
-    with a single scene, and for a distribution without one.
+    A name is looked up in `recipe_folder`, in the working directory's `scenes/`, among the scenes that ship,
+    then among those that Python functions draw; of these `number` says which scene. Raises `InputError` for
+    a scene that is missing or wrong, for a number with a single scene, and for a drawn scene without one.
     """
     file = find_scene(name_or_path, recipe_folder)
-    if file is not None:
-        values, source = plain_values(read_toml(file), number, str(file))
-        return values, file.parent, source
-    draw_number = _checked_number(number, name_or_path)
-    values, folder = generated(name_or_path, draw_number)
-    return values, folder, f"{name_or_path}, draw {number}"
-
-
-def plain_values(values: dict[str, Any], number: int | None, source: str) -> tuple[dict[str, Any], str]:
-    """The values of one scene, drawn by `number` if these are a distribution, and what errors call it.
-
-    Raises `InputError` as `named_values` does.
-    """
-    if is_distribution(values):
-        return draw(values, _checked_number(number, source), source), f"{source}, draw {number}"
+    if file is None:
+        return _draw(name_or_path, recipe_folder, _checked_number(number, name_or_path))
     if number is not None:
-        raise InputError(f"scene_number: {source} is one scene, of which there are no draws; leave it out")
-    return values, source
+        raise InputError(f"scene_number: {file} is one scene, of which there are no draws; leave it out")
+    return scene_of(read_toml(file), file.parent, str(file)), file.parent
 
 
-def _checked_number(number: int | None, source: str) -> int:
-    if number is None:
-        raise InputError(
-            f"scene_number: {source} is a distribution of scenes; say which draw, such as scene_number = 0 "
-            "in a recipe or --scene 0"
-        )
-    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < SEED_LIMIT:
-        raise InputError(f"scene_number: expected a whole number from 0 to 2^63 - 1, got {number!r}")
-    return number
+def is_drawn(name_or_path: str, recipe_folder: Path | None = None) -> bool:
+    """Whether a name means a scene that a Python function draws by number."""
+    return find_scene(name_or_path, recipe_folder) is None
+
+
+def drawn_scenes() -> dict[str, str]:
+    """Names of the drawn scenes that installed packages register, and the package of each."""
+    return {name: package_of(point) for name, point in registered(GROUP, ()).items()}
 
 
 def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | None:
-    """The scene.toml that a name or path means, None for the name of a generator.
+    """The scene.toml that a name or path means, None for a scene that is drawn.
 
     Raises `InputError` with a suggestion if there is neither.
     """
@@ -67,8 +68,8 @@ def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | N
         shipped = None
     if shipped is not None:
         return shipped
-    known = generators()
-    if name_or_path in known:
+    known = drawn_scenes()
+    if ":" in name_or_path or name_or_path in known:
         return None
     shown = shorten(repr(name_or_path), LONGEST_PART)
     raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, [*scene_names(), *known])}")
@@ -79,7 +80,7 @@ def is_scene(name_or_path: str) -> bool:
     path = Path(name_or_path)
     if path.is_file():
         values = read_toml(path)
-        return "scene" not in values and bool({"lights", "objects"} & set(values))
+        return "scene" not in values and bool({"lights", "objects", "mitsuba"} & set(values))
     if path.is_dir():
         return True
     try:
@@ -90,5 +91,44 @@ def is_scene(name_or_path: str) -> bool:
 
 
 def scene_names() -> list[str]:
-    """Names of the scenes that ship or stand in the working directory, generators left out."""
+    """Names of the scenes that ship or stand in the working directory, drawn ones left out."""
     return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})
+
+
+def _draw(name: str, recipe_folder: Path | None, number: int) -> tuple[Scene, Path]:
+    """The scene that a function draws, its number in its title, and the folder of its files."""
+    label = f"scene: {name!r}"
+    try:
+        function = _function(name, recipe_folder or Path())
+        scene = function(Random(f"{function.__name__.removeprefix('drawn_')} {number}"))
+    except InputError as fault:
+        raise InputError(f"{label}, draw {number}: {fault}") from None
+    except (Exception, SystemExit) as fault:  # somebody else's function may raise anything
+        raise InputError(f"{label} cannot be drawn: {type(fault).__name__}: {fault}") from fault
+    if not isinstance(scene, Scene):
+        raise InputError(f"{label} must return a simgen.Scene, not {type(scene).__name__}")
+    folder = scene.folder or Path(inspect.getsourcefile(function) or "").parent
+    return scene.change(title=f"{scene.title} {number}", folder=folder), folder
+
+
+def _function(name: str, recipe_folder: Path) -> Callable[[Random], Scene]:
+    where, _, function = name.rpartition(":")
+    if not where:
+        return registered(GROUP, ())[name].load()
+    if not where.endswith(".py"):
+        return getattr(importlib.import_module(where), function)
+    path = (recipe_folder / where).resolve()
+    if not path.is_file():
+        raise InputError(f"there is no file {path}")
+    return runpy.run_path(str(path))[function]
+
+
+def _checked_number(number: int | None, source: str) -> int:
+    if number is None:
+        raise InputError(
+            f"scene_number: {source} is drawn by number; say which one, such as scene_number = 0 in a recipe "
+            "or --scene 0"
+        )
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < SEED_LIMIT:
+        raise InputError(f"scene_number: expected a whole number from 0 to 2^63 - 1, got {number!r}")
+    return number

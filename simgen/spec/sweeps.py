@@ -131,6 +131,7 @@ def load_sweep(
     *,
     seeds: int | None = None,
     scenes: int | None = None,
+    trust_python: bool = False,
 ) -> Sweep:
     """A recipe whose fields may have several values, by path or shipped name and `overrides` as for one.
 
@@ -139,7 +140,7 @@ def load_sweep(
     `InputError` for a recipe that is missing or wrong, for a field without values, with the same value twice,
     or swept twice, and for more than `MOST_DATASETS`.
     """
-    written, source, recipe_folder = _read(name_or_path, overrides)
+    written, source, recipe_folder = _read(name_or_path, overrides, trust_python)
     for option, field, count in (("scenes", "scene_number", scenes), ("seeds", "seed", seeds)):
         if count is not None:
             first = written.get(field, 0)
@@ -161,13 +162,15 @@ def load_sweep(
     return sweep
 
 
-def _read(name_or_path: str, overrides: Sequence[str]) -> tuple[dict[str, Any], str, Path]:
+def _read(
+    name_or_path: str, overrides: Sequence[str], trust_python: bool
+) -> tuple[dict[str, Any], str, Path]:
     file = recipe_file(name_or_path)
     if (file is None or file == Path(name_or_path)) and is_scene(name_or_path):
         values: dict[str, Any] = {"scene": name_or_path}
         override(values, overrides)
         return values, f"a recipe of the scene {name_or_path}", Path()
-    return read_recipe(name_or_path, overrides)
+    return read_recipe(name_or_path, overrides, trust_python=trust_python)
 
 
 def _put(values: dict[str, Any], field: str, value: Any) -> None:

@@ -14,7 +14,7 @@ from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.assets.asset_files import Assets
 from simgen.renderer import backend
 from simgen.renderer.emission import object_lux
-from simgen.renderer.mitsuba_colours import light_spectrum
+from simgen.renderer.mitsuba_surfaces import light_spectrum
 from simgen.spec.scene import Scene
 from simgen.spectral.spectra import FROM_XYZ, illuminant, integral, observer
 

@@ -16,7 +16,7 @@ from pcii.base.errors import InputError
 from simgen.assets import asset_files as assets
 from simgen.assets import asset_worker
 from simgen.assets.asset_files import read_assets, read_environment
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 
 LIMIT_S = 2.0
 

@@ -16,7 +16,7 @@ from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
 from simgen.assets.obj_files import read_obj
 from simgen.assets.ply_files import read_ply
 from simgen.assets.triangles import Triangles
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 
 # A roof: a square and a triangle that share two corners.
 POINTS = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]], np.float32)

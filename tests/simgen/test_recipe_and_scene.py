@@ -8,7 +8,8 @@ from pydantic import BaseModel
 from pcii.base.errors import InputError
 from simgen.base.strict_models import validate
 from simgen.spec.recipe import Analysis, Recipe, load_recipe
-from simgen.spec.scene import Scene, load_scene
+from simgen.spec.scene import Scene
+from simgen.spec.scene_lookup import load_scene
 
 LIGHT = {"type": "uniform", "luminance_cd_m2": 1.0}
 

@@ -20,7 +20,8 @@ from simgen.spec.camera_grid import Grid
 from simgen.spec.lights import Light
 from simgen.spec.materials import Finish, Spectrum, is_clear
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import Scene, is_scene_distribution, load_scene
+from simgen.spec.scene import Scene
+from simgen.spec.scene_lookup import load_scene
 from simgen.spec.shapes import Shape
 from simgen.spec.textures import Texture
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
@@ -36,25 +37,19 @@ BEYOND_THE_FILM = {
     "chess": {"board", "rug", "curtain"},
     "cornell_box": {"floor", "ceiling", "left-wall", "right-wall"},
     "desk": {"desk", "wall"},
-    "drawn_solids": {"desk", "wall"},
     "outdoors": {"ground"},
     "room": {"table", "wall"},
     "set_table": {"table", "wall"},
     "shelf": {"board", "wall"},
 }
-HIDDEN = {"chess": {"lamp"}, "drawn_foliage": {"leaf-11"}, "set_table": {"lamp"}}
-"""In a heap that is drawn one may lie behind another; a lamp may hang out of view."""
+HIDDEN = {"chess": {"lamp"}, "set_table": {"lamp"}}
+"""A lamp may hang out of view."""
 MOST_PICTURE_BYTES, MOST_ASSET_BYTES = 60_000, 130_000
-
-
-def shown_draw(name: str) -> int | None:
-    """The draw of a distribution of scenes that is looked at here, which is that of the gallery."""
-    return 0 if is_scene_distribution(str(ROOT / "scenes" / name)) else None
 
 
 @cache
 def scene_of(name: str) -> Scene:
-    return load_scene(str(ROOT / "scenes" / name), number=shown_draw(name))[0]
+    return load_scene(str(ROOT / "scenes" / name))[0]
 
 
 @cache
@@ -186,7 +181,7 @@ def test_recipes_of_every_kind_ship() -> None:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_light_passes_glass_where_there_is_some(name: str) -> None:
-    target = load_target(str(ROOT / "scenes" / name), scene_number=shown_draw(name))
+    target = load_target(str(ROOT / "scenes" / name))
     clear = any(is_clear(thing.material.finish) for thing in target.scene.objects)
     assert clear == (name in ("glass", "finishes"))
     assert target.recipe.render.max_depth == (8 if clear else 3)

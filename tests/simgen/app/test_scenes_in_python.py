@@ -76,13 +76,10 @@ def test_a_scene_of_values_is_that_of_the_file(tmp_path: Path) -> None:
     scene = simgen.load_scene(values, folder=tmp_path)
     assert scene == simgen.load_scene(scene.save(tmp_path))
     assert simgen.load_scene("two_objects").folder == simgen.load_scene("two_objects").change().folder
-    many = values | {"objects": [values["objects"][0] | {"count": 3, "material": {"reflectance": [1, 1, 1]}}]}
-    assert len(simgen.load_scene(many, 5).objects) == 3
     wrong: Any
     for wrong, said in (
         ((values,), r"^scene: object 'card', material.texture: 'a.png' is looked for in .*; give folder=$"),
-        ((values, 3), r"^scene_number: scene is one scene"),
-        ((many,), r"^scene_number: scene is a distribution"),
+        ((values, 3), r"^number: these are values of one scene"),
         ((values | {"titel": "x"},), r"^scene: unknown key 'titel'; did you mean 'title'\?$"),
         ((3,), r"^scene: expected a name, a path or a dict, got int$"),
     ):

@@ -12,7 +12,7 @@ from simgen.app import commands as simgen_cli
 from simgen.app.starting_points import write_new_recipe, write_new_scene
 from simgen.check.linter import lint
 from simgen.spec.recipe import load_recipe
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 
 
 @pytest.fixture(autouse=True)
@@ -96,7 +96,7 @@ def test_nothing_is_written_over_and_nothing_that_ships_is_hidden() -> None:
 def test_scenes_that_cannot_be_copied_are_refused_with_the_way_on() -> None:
     with pytest.raises(InputError, match="did you mean 'desk'"):
         write_new_scene("mine", "dezk")
-    with pytest.raises(InputError, match="simgen draw drawn_room --scene 0 -o scenes/mine"):
+    with pytest.raises(InputError, match=r"load_scene\('drawn_room', 0\)"):
         write_new_scene("mine", "drawn_room")
     with pytest.raises(InputError, match="--from: there is no scene"):
         write_new_scene("mine", "..")

@@ -73,8 +73,10 @@ SCENE = {
     "level": {"illuminance_lux": 500.0, "z_mm": 540.0},
     "backdrop": {"z_mm": 2000.0},
     "planes_mm": [540.0, 620.0],
+    "mitsuba": {"file": "a.xml", "unit_mm": 2.0, "camera": "front", "fit_mm": 9.0},
 }
 PLAIN = {"title": "even light", "lights": [{"type": "uniform", "luminance_cd_m2": 100.0}]}
+PLACED = PLAIN | {"mitsuba": {"file": "a.xml", "place_at_mm": [0.0, 0.0, 500.0]}}
 RECIPE = {
     "scene": "here",
     "grid": {"rows": 2, "cols": 3, "errors": {}},
@@ -91,7 +93,7 @@ EXPOSED = {
     "photons": {"scope": "exposure"},
     "exposure": {"f_number": 8.0, "time_s": 0.01},
 }
-BASES = [(RECIPE, SCENE), (EXPOSED, PLAIN), ({"scene": "drawn_room", "scene_number": 17}, PLAIN)]
+BASES = [(RECIPE, SCENE), (EXPOSED, PLACED), ({"scene": "drawn_room", "scene_number": 17}, PLAIN)]
 OTHER = {
     "here": "there",
     "drawn_room": "drawn_plain",
@@ -111,6 +113,8 @@ def near(tmp_path: Path) -> Path:
         (tmp_path / folder).mkdir()
         for name in ("a.png", "b.png", "a.ply", "b.ply", "a.exr", "b.exr"):
             (tmp_path / folder / name).write_bytes(b"nobody decodes this, and every byte counts")
+        for name in ("a.xml", "b.xml"):
+            (tmp_path / folder / name).write_text('<scene version="3.0.0"/>')
     for name in ("a.csv", "b.csv"):
         (tmp_path / name).write_text("wavelength_nm,R,G,B\n400,0,0,1\n550,0,1,0\n700,1,0,0\n")
     return tmp_path

@@ -3,19 +3,17 @@
 import hashlib
 import json
 import random
-import tomllib
 from pathlib import Path
 
 import pytest
 
+import simgen
 from pcii.base.errors import InputError
 from simgen.dataset.prepared import prepare
-from simgen.drawn import GENERATORS
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import is_scene_distribution, load_scene
-from simgen.spec.scene_generators import GROUP, generators
+from simgen.spec.scene_lookup import GROUP, drawn_scenes, is_drawn, load_scene
+from simgen.spec.sweeps import load_sweep
 
-ROOT = Path(__file__).resolve().parents[3]
 NUMBERS = (0, 1, 7, 17, 99, 100, 101, 102, 103, 250)
 # SHA-256 of the scenes of these numbers. A change of one makes figures that were reported of other scenes.
 HASHES = {
@@ -29,21 +27,24 @@ HASHES = {
     "shiny": "b1122c93065538cf10d4331faa16acb367f2a5dcbca230a5a4332f2b8d44eb8b",
 }
 CODE = """
-def good(number):
-    light = {"type": "uniform", "luminance_cd_m2": 1.0 + number}
-    card = {"type": "card", "width_mm": 9.0, "height_mm": 9.0}
-    material = {"texture": "label.png"}
-    thing = {"name": "thing", "position_mm": [0.0, 0.0, 500.0], "shape": card, "material": material}
-    return {"title": "Strange", "lights": [light], "objects": [thing]}
+import simgen
 
-def failing(number):
+def good(random):
+    light = simgen.UniformLight(luminance_cd_m2=1.0 + random.randrange(100))
+    card = simgen.Card(width_mm=9.0, height_mm=9.0)
+    thing = simgen.SceneObject(
+        name="thing", position_mm=(0, 0, 500), shape=card, material=simgen.Material(texture="label.png")
+    )
+    return simgen.Scene(title="Strange", lights=(light,), objects=(thing,))
+
+def failing(random):
     return good(1 // 0)
 
-def text(number):
+def text(random):
     return "a scene"
 
-def wrong(number):
-    return {"title": "Strange", "lights": []}
+def wrong(random):
+    return simgen.Scene(title="Strange", lights=())
 """
 
 
@@ -65,19 +66,30 @@ def test_a_number_gives_the_same_scene_for_all_time(kind: str) -> None:
     assert hashlib.sha256("".join(hashes).encode()).hexdigest() == HASHES[kind]
 
 
-@pytest.mark.parametrize("name", GENERATORS)
-def test_a_generator_gives_plain_values_whatever_was_drawn_before(name: str) -> None:
-    values = GENERATORS[name](3)
-    assert json.loads(json.dumps(values)) == values  # as TOML holds them: no tuples
+@pytest.mark.parametrize("name", ["drawn_solids", "drawn_foliage", "drawn_leaves"])
+def test_a_scene_is_the_same_whatever_was_drawn_before(name: str) -> None:
+    scene, _ = load_scene(name, number=3)
     random.seed(1)
     random.random()
-    assert GENERATORS[name](3) == values
-    assert is_scene_distribution(name)
+    assert load_scene(name, number=3)[0] == scene
+    assert load_scene(name, number=4)[0] != scene
+    assert is_drawn(name)
 
 
-def test_the_package_offers_the_generators_that_it_finds_by_itself() -> None:
-    offered = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"][GROUP]
-    assert offered == {name: f"{own.__module__}:{own.__name__}" for name, own in GENERATORS.items()}
+def test_solids_on_the_desk_stand_and_do_not_touch() -> None:
+    for number in range(20):
+        scene, _ = load_scene("drawn_solids", number=number)
+        standing = [thing for thing in scene.objects if thing.name not in ("desk", "wall")]
+        assert {"ball", "tin", "block-1"} <= {thing.name for thing in standing}
+        for thing in standing:
+            match thing.shape:
+                case simgen.Sphere(radius_mm=radius):
+                    height = 2 * radius
+                case simgen.Cylinder(length_mm=height) | simgen.Box(height_mm=height):
+                    pass
+                case _:
+                    pytest.fail(f"{thing.name} is a {thing.shape.type}")
+            assert thing.position_mm[1] + height / 2 == pytest.approx(65, abs=0.2)
 
 
 def install(folder: Path, monkeypatch: pytest.MonkeyPatch, points: dict[str, str]) -> None:
@@ -93,27 +105,28 @@ def install(folder: Path, monkeypatch: pytest.MonkeyPatch, points: dict[str, str
 
 
 def test_scenes_of_another_package_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    own = {"drawn_room": "simgen.drawn.clutter:drawn_room"}  # what the project itself registers
     points = {name: f"strange_scenes:{name}" for name in ("good", "failing", "text", "wrong")}
-    install(tmp_path, monkeypatch, points | {"missing": "strange_scenes:nothing"} | own)
-    assert generators()["good"] == "Made by the package strange."
+    install(tmp_path, monkeypatch, points | {"missing": "strange_scenes:nothing"})
+    assert drawn_scenes()["good"] == "the package strange"
     scene, folder = load_scene("good", number=4)
-    assert scene.lights[0].luminance_cd_m2 == 5  # type: ignore[union-attr]
+    drawn = random.Random("good 4").randrange(100)
+    assert scene.lights[0].luminance_cd_m2 == 1 + drawn  # type: ignore[union-attr]
+    assert scene.title == "Strange 4"
     assert folder == tmp_path  # where the files are that the scene names
-    with pytest.raises(InputError, match=r"^scene: 'failing' of the package strange .*ZeroDivisionError"):
+    with pytest.raises(InputError, match=r"^scene: 'failing' cannot be drawn: ZeroDivisionError"):
         load_scene("failing", number=4)
-    with pytest.raises(InputError, match=r"^scene: 'text' of the package strange must return .* not str$"):
+    with pytest.raises(InputError, match=r"^scene: 'text' must return a simgen.Scene, not str$"):
         load_scene("text", number=4)
-    with pytest.raises(InputError, match=r"^scene: 'missing' of the package strange .*AttributeError"):
+    with pytest.raises(InputError, match=r"^scene: 'missing' cannot be drawn: AttributeError"):
         load_scene("missing", number=4)
-    with pytest.raises(InputError, match=r"^wrong, draw 4: 'lights'"):
+    with pytest.raises(InputError, match=r"^scene: 'wrong', draw 4: .*'lights'"):
         load_scene("wrong", number=4)
 
 
 @pytest.mark.parametrize(
     ("points", "complaint"),
     [
-        ({"drawn_room": "strange_scenes:good"}, "takes the name of the built-in 'drawn_room'"),
+        ({"drawn_room": "strange_scenes:good"}, "are both named 'drawn_room'"),
         ({"a/b": "strange_scenes:good"}, "use letters"),
     ],
 )
@@ -122,15 +135,30 @@ def test_names_that_cannot_be_used_are_refused(
 ) -> None:
     install(tmp_path, monkeypatch, points)
     with pytest.raises(InputError, match=complaint):
-        generators()
+        drawn_scenes()
 
 
 def test_a_number_is_asked_for_and_refused_where_there_is_nothing_to_draw() -> None:
     for name in ("drawn_room", "drawn_solids"):
-        with pytest.raises(InputError, match=r"^scene_number: .* say which draw, such as scene_number = 0"):
+        with pytest.raises(InputError, match=r"^scene_number: .* say which one, such as scene_number = 0"):
             load_scene(name)
         for number in (-1, 1 << 63, True):
             with pytest.raises(InputError, match="from 0 to"):
                 load_scene(name, number=number)
     with pytest.raises(InputError, match=r"^scene_number: .*desk.* leave it out$"):
         load_scene("desk", number=0)
+
+
+def test_python_named_in_a_recipe_file_runs_only_if_its_author_is_trusted(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(CODE)
+    (tmp_path / "label.png").write_bytes(b"not looked at")
+    recipe = tmp_path / "recipe.toml"
+    for named in ('"mine.py:good"', '["desk", "mine.py:good"]'):
+        recipe.write_text(f"scene = {named}\nscene_number = 2\n")
+        with pytest.raises(InputError, match="--trust-python"):
+            load_sweep(str(recipe))
+    recipe.write_text('scene = "mine.py:good"\nscene_number = 2\n')
+    trusted = load_sweep(str(recipe), trust_python=True)
+    assert prepare(trusted.recipe(0), trusted.recipe_folder).scene.title == "Strange 2"
+    # What the person types is trusted, as any command is.
+    assert load_scene(f"{tmp_path / 'mine.py'}:good", number=2)[0].title == "Strange 2"

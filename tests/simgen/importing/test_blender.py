@@ -10,7 +10,7 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.importing.scene_import import import_scene
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 from simgen.truth.first_hits import first_hits_at_centre
 
 BY_BLENDER = Path(__file__).parent / "by_blender"

@@ -21,7 +21,8 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.mitsuba_shapes import pose_of
 from simgen.renderer.radiance import render_view
-from simgen.spec.scene import Scene, load_scene
+from simgen.spec.scene import Scene
+from simgen.spec.scene_lookup import load_scene
 from simgen.truth.first_hits import first_hits_at_centre
 
 RNG = np.random.default_rng(5)

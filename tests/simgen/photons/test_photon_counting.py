@@ -28,7 +28,8 @@ from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.detector import nested_subset
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import Scene, load_scene
+from simgen.spec.scene import Scene
+from simgen.spec.scene_lookup import load_scene
 
 PLAN = Plan(thins=True, samples=1, photons_per_view=0.0, noise=0.0, normaliser_error=0.0)
 BUDGETS = (120, 40, 8)

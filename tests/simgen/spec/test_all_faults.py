@@ -9,7 +9,7 @@ from pcii.base.errors import InputError
 from simgen.app import commands as simgen_cli
 from simgen.base.strict_models import MOST_FAULTS, validate
 from simgen.spec.recipe import Recipe
-from simgen.spec.scene import load_scene
+from simgen.spec.scene_lookup import load_scene
 
 SCENE = """
 titel = "Faults"

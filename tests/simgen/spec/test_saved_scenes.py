@@ -15,7 +15,6 @@ from pcii.base.errors import InputError
 from simgen import Material, Scene, SceneObject, Sphere, load_scene
 from simgen.base.strict_models import LARGEST_TOML_BYTES
 from simgen.base.toml_layout import toml_text
-from simgen.spec.scene import is_scene_distribution
 from simgen.spec.scene_lookup import scene_names
 
 TEXT = """# by hand
@@ -53,7 +52,7 @@ def same(loaded: Scene, scene: Scene) -> bool:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_a_scene_that_ships_is_the_same_once_saved_and_loaded(name: str, tmp_path: Path) -> None:
-    scene = load_scene(name, 3 if is_scene_distribution(name) else None)
+    scene = load_scene(name)
     file = scene.save(tmp_path / "new" / name)
     loaded = load_scene(file)
     assert same(loaded, scene)
