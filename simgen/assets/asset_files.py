@@ -1,53 +1,39 @@
-"""Files that a scene brings along, as plain arrays: decoded in a process of their own that may die."""
+"""Files that a scene brings along, as plain arrays that are checked once, before the renderer sees them."""
 
-import json
-import os
-import subprocess
-import sys
-import threading
-from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
-from typing import IO, Any
 
 import numpy as np
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from simgen.assets.asset_worker import SECONDS
+from pcii.pictures.picture_files import decode, kind_of, picture_of
+from simgen.assets.mesh_files import read_mesh
 from simgen.assets.triangles import Triangles
-from simgen.base.asset_names import AssetName, EnvironmentName, ImageName, MeshName, asset, named_files
-from simgen.base.strict_models import shorten
+from simgen.base.asset_names import EnvironmentName, ImageName, MeshName, asset, named_files
 
 LARGEST_TOTAL_BYTES = 1 << 30
-_KINDS: dict[type[AssetName], str] = {ImageName: "image", EnvironmentName: "environment", MeshName: "mesh"}
-# The parent's own search path, so that the same code runs; isolated, so that none of the working
-# directory's does.
-_START = (
-    "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-    "from simgen.assets.asset_worker import main; main()"
-)
+MOST_TEXTURE_PIXELS = 1 << 26
 
 
 @dataclass(frozen=True)
 class Assets:
     """The files of one scene, by the names that the scene gives them."""
 
-    _images: Mapping[str, np.ndarray] = field(default_factory=dict)
-    _environments: Mapping[str, np.ndarray] = field(default_factory=dict)
-    _meshes: Mapping[str, Triangles] = field(default_factory=dict)
+    images: dict[str, np.ndarray] = field(default_factory=dict)
+    environments: dict[str, np.ndarray] = field(default_factory=dict)
+    meshes: dict[str, Triangles] = field(default_factory=dict)
 
     def image(self, name: str) -> np.ndarray:
         """A texture as linear RGB, (H, W, 3) float32 from 0 to 1."""
-        pixels = self._images[name]
+        pixels = self.images[name]
         largest = np.iinfo(pixels.dtype).max
         return srgb_to_linear(np.arange(largest + 1) / largest).astype(np.float32)[pixels]
 
     def stored(self, name: str) -> np.ndarray:
         """What an image holds, without the sRGB curve: (H, W, 3) float32 from 0 to 1."""
-        pixels = self._images[name]
+        pixels = self.images[name]
         return pixels / np.float32(np.iinfo(pixels.dtype).max)
 
     def numbers(self, name: str, where: str) -> np.ndarray:
@@ -64,113 +50,75 @@ class Assets:
 
     def environment(self, name: str) -> np.ndarray:
         """Light from all around as linear RGB, (H, W, 3) float32, finite and not negative."""
-        return self._environments[name]
+        return self.environments[name]
 
     def mesh(self, name: str) -> Triangles:
         """A mesh in the file's own unit."""
-        return self._meshes[name]
+        return self.meshes[name]
 
 
 def read_assets(scene: BaseModel, folder: Path) -> Assets:
-    """Decode every file that a scene names. Raises `InputError` for the first that cannot be used.
+    """Decode every file that a scene names. Raises `InputError` for the first that cannot be used."""
+    found = Assets()
+    total = 0
+    wanted = {(type(name), str(name)): asset(folder, name, where) for where, name in named_files(scene)}
+    for (kind, name), path in wanted.items():
+        if kind is MeshName:
+            mesh = found.meshes[name] = read_mesh(path)
+            total += mesh.positions.nbytes + mesh.faces.nbytes
+        elif kind is ImageName:
+            total += found.images.setdefault(name, read_texture(path)).nbytes
+        elif kind is EnvironmentName:
+            total += found.environments.setdefault(name, read_environment(path)).nbytes
+        if total > LARGEST_TOTAL_BYTES:
+            raise InputError(
+                f"{path}: with this file the scene's files take more than {LARGEST_TOTAL_BYTES} bytes"
+            )
+    return found
 
-    The files are strangers': a process with limits of memory and time reads them, once each, and is
-    not even started for a scene without files.
+
+def read_texture(path: Path, *, alpha: bool = False) -> np.ndarray:
+    """A PNG, JPEG or TIFF file as sRGB (H, W, 3), uint8 or uint16, upright as its EXIF entry says.
+
+    `InputError` for a file that is no single RGB, grey or palette picture, or is not opaque; with `alpha`
+    that is a fourth channel if the file has it.
     """
-    found: dict[str, dict[str, Any]] = {kind: {} for kind in _KINDS.values()}
-    wanted = {
-        (_KINDS[type(name)], str(name)): asset(folder, name, w)
-        for w, name in named_files(scene)
-        if type(name) in _KINDS
-    }
-    if wanted:
-        total = 0
-        with _Worker() as worker:
-            for (kind, name), path in wanted.items():
-                arrays = worker.read(kind, path)
-                total += sum(array.nbytes for array in arrays.values())
-                if total > LARGEST_TOTAL_BYTES:
-                    raise InputError(
-                        f"{path}: with this file the scene's files take more than {LARGEST_TOTAL_BYTES} bytes"
-                    )
-                found[kind][name] = Triangles(**arrays) if kind == "mesh" else arrays["pixels"]
-    return Assets(found["image"], found["environment"], found["mesh"])
+    picture = picture_of(path, ("PNG", "JPEG", "TIFF"), MOST_TEXTURE_PIXELS)
+    if picture.pages != 1:
+        raise InputError(f"{path}: holds {picture.pages} pictures; give a file with one")
+    if picture.dtype.kind == "f":
+        raise InputError(f"{path}: a picture of {picture.dtype}; save it as RGB or grey with 8 or 16 bits")
+    (pixels,) = decode(picture, turn=True, alpha=alpha)
+    if picture.dtype == np.bool_ or picture.bits is not None:
+        pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
+    if picture.shape[2] == 1:
+        pixels = np.concatenate([np.repeat(pixels[..., :1], 3, axis=2), pixels[..., 1:]], axis=2)
+    return pixels
 
 
 def read_environment(path: Path) -> np.ndarray:
-    """An OpenEXR picture as linear RGB, (H, W, 3) float32, finite and not negative, or `InputError`."""
-    with _Worker() as worker:
-        return worker.read("environment", path)["pixels"]
+    """An OpenEXR file with the channels R, G and B as linear radiance (H, W, 3) float32, row 0 uppermost.
 
-
-def read_pictures(paths: Iterable[Path]) -> Iterator[np.ndarray]:
-    """Pictures as sRGB (H, W, 3), or with alpha (H, W, 4), uint8 or uint16; `InputError` as of textures."""
-    with _Worker() as worker:
-        for path in paths:
-            yield worker.read("picture with alpha", path)["pixels"]
-
-
-def read_meshes(paths: Iterable[Path]) -> Iterator[Triangles]:
-    """PLY and OBJ meshes in the files' own units, each as it is asked for; `InputError` for a bad one."""
-    with _Worker() as worker:
-        for path in paths:
-            yield Triangles(**worker.read("mesh", path))
-
-
-class _Worker:
-    """The process that decodes, and the clock that ends it."""
-
-    def __enter__(self) -> "_Worker":
-        command = [sys.executable, "-I", "-c", _START, json.dumps([*filter(None, sys.path)])]
-        pipe, nowhere = subprocess.PIPE, subprocess.DEVNULL
-        # One thread: each would reserve memory of the worker's allowance.
-        alone = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-        self._process = subprocess.Popen(
-            command, stdin=pipe, stdout=pipe, stderr=nowhere, env=os.environ | alone
+    `InputError` for another kind of file, one that is too large, and for values that are negative or not
+    finite.
+    """
+    if kind_of(path) != "EXR":
+        raise InputError(f"{path}: not an OpenEXR picture; convert it to OpenEXR (.exr)")
+    picture = picture_of(path, ("EXR",))
+    height, width, channels = picture.shape
+    if channels != 3:
+        raise InputError(f"{path}: this file has the channel Y; R, G and B are needed")
+    if width != 2 * height:
+        raise InputError(
+            f"{path}: this file is {height} x {width} pixels; what shines from all around is twice as wide "
+            "as high"
         )
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.communicate()
-
-    def read(self, kind: str, path: Path) -> dict[str, np.ndarray]:
-        """The arrays of one file; `InputError` if it is refused, or ends or outlasts the process."""
-        late = threading.Event()
-
-        def end() -> None:
-            late.set()
-            self._process.kill()
-
-        clock = threading.Timer(SECONDS, end)
-        clock.start()
-        try:
-            refused, arrays = self._ask(kind, path)
-        except (OSError, EOFError, ValueError):  # the answer breaks off
-            why = (
-                f"takes longer than {SECONDS} s to read"
-                if late.is_set()
-                else "ends the process that reads it"
-            )
-            raise InputError(f"{path}: this file {why}; save it anew, smaller or simpler") from None
-        finally:
-            clock.cancel()
-        if refused is not None:
-            raise InputError(f"{path}: {shorten(refused)}")
-        return arrays
-
-    def _ask(self, kind: str, path: Path) -> tuple[str | None, dict[str, np.ndarray]]:
-        questions, answers = _open(self._process.stdin), _open(self._process.stdout)
-        questions.write(json.dumps({"kind": kind, "path": str(path)}).encode() + b"\n")
-        questions.flush()
-        head = json.loads(answers.readline(1 << 16))
-        if "refused" in head:
-            return str(head["refused"]), {}
-        # Nothing but read(): of a true file NumPy asks the position, which a pipe has not.
-        pipe: Any = SimpleNamespace(read=answers.read)
-        return None, {name: np.lib.format.read_array(pipe, allow_pickle=False) for name in head["arrays"]}
-
-
-def _open(stream: IO[bytes] | None) -> IO[bytes]:
-    assert stream is not None
-    return stream
+    (radiance,) = decode(picture)
+    sound = np.isfinite(radiance) & (radiance >= 0)
+    if not sound.all():
+        i, j, c = np.argwhere(~sound)[0]
+        raise InputError(
+            f"{path}: has the value {radiance[i, j, c]:g} at row {i}, column {j}; "
+            "radiance is finite and not negative"
+        )
+    return radiance

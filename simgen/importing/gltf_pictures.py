@@ -1,4 +1,4 @@
-"""Pictures that a glTF file names or holds, decoded in a process that may die."""
+"""Pictures that a glTF file names or holds."""
 
 import tempfile
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_pictures
+from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_texture
 from simgen.importing.gltf_file import GltfFile
 
 
@@ -20,10 +20,10 @@ def pictures_of(gltf: GltfFile) -> dict[int, np.ndarray]:
     wanted = sorted({texture.source for texture in gltf.document.textures if texture.source is not None})
     found: dict[int, np.ndarray] = {}
     with _on_disk(gltf, wanted) as paths:
-        pictures, total = read_pictures(paths.values()), 0
+        total = 0
         for number, path in paths.items():
             try:
-                found[number] = next(pictures)
+                found[number] = read_texture(path, alpha=True)
             except InputError as fault:
                 sentence = str(fault).removeprefix(f"{path}: ")
                 raise gltf.fault(f"images[{number}]: {sentence}") from None
@@ -35,7 +35,7 @@ def pictures_of(gltf: GltfFile) -> dict[int, np.ndarray]:
 
 @contextmanager
 def _on_disk(gltf: GltfFile, numbers: list[int]) -> Iterator[dict[int, Path]]:
-    """Images as files, which another process can open."""
+    """Images as files."""
     images = gltf.document.images
     with tempfile.TemporaryDirectory() as folder:
         paths: dict[int, Path] = {}

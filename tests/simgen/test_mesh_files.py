@@ -13,8 +13,7 @@ from png_files import png16
 from property_settings import mostly_slow
 
 from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
-from simgen.assets.obj_files import read_obj
-from simgen.assets.ply_files import read_ply
+from simgen.assets.mesh_files import ply_bytes, read_mesh
 from simgen.assets.triangles import Triangles
 from simgen.spec.scene_lookup import load_scene
 
@@ -59,20 +58,27 @@ def obj_of(*, from_the_end: bool = False) -> bytes:
     return "\r\n".join(lines).encode()
 
 
+def read(folder: Path, name: str, content: bytes) -> Triangles:
+    (folder / name).write_bytes(content)
+    return read_mesh(folder / name)
+
+
 @pytest.mark.parametrize(
-    "mesh",
+    ("name", "content"),
     [
-        read_ply(ply_of("ascii", ("s", "t"))),
-        read_ply(ply_of("ascii", ("u", "v"), double=True)),
-        read_ply(ply_of("binary_little_endian", ("s", "t"), "int")),
-        read_ply(ply_of("binary_little_endian", ("texture_u", "texture_v"))),
-        read_ply(ply_of("binary_big_endian", ("u", "v"))),
-        read_ply(ply_of("binary_big_endian", ("s", "t"), "int", double=True)),
-        read_obj(obj_of()),
-        read_obj(obj_of(from_the_end=True)),
+        ("a.ply", ply_of("ascii", ("s", "t"))),
+        ("a.ply", ply_of("ascii", ("u", "v"), double=True)),
+        ("a.ply", ply_of("binary_little_endian", ("s", "t"), "int")),
+        ("a.ply", ply_of("binary_little_endian", ("texture_u", "texture_v"))),
+        ("a.ply", ply_of("binary_big_endian", ("u", "v"))),
+        ("a.ply", ply_of("binary_big_endian", ("s", "t"), "int", double=True)),
+        ("a.ply", ply_bytes(Triangles(POINTS, np.array(FACES, np.int32), NORMALS, TEXCOORDS))),
+        ("a.obj", obj_of()),
+        ("a.obj", obj_of(from_the_end=True)),
     ],
 )
-def test_every_form_gives_the_same_triangles(mesh: Triangles) -> None:
+def test_every_form_gives_the_same_triangles(name: str, content: bytes, tmp_path: Path) -> None:
+    mesh = read(tmp_path, name, content)
     np.testing.assert_array_equal(mesh.positions, POINTS)
     np.testing.assert_array_equal(mesh.faces, FACES)
     assert mesh.normals is not None
@@ -80,17 +86,18 @@ def test_every_form_gives_the_same_triangles(mesh: Triangles) -> None:
     np.testing.assert_array_equal(mesh.texcoords, TEXCOORDS)
 
 
-def test_a_corner_of_an_obj_is_split_where_its_texture_is() -> None:
+def test_a_corner_of_an_obj_is_split_where_its_texture_is(tmp_path: Path) -> None:
     lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "f 1/1 2/2 3/3", "f 1/3 2/2 3/3"]
-    mesh = read_obj("\n".join(lines).encode())
+    mesh = read(tmp_path, "a.obj", "\n".join(lines).encode())
     assert len(mesh.positions) == 4
     assert mesh.texcoords is not None
     np.testing.assert_array_equal(mesh.positions[mesh.faces[0]], mesh.positions[mesh.faces[1]])
     np.testing.assert_array_equal(mesh.texcoords[mesh.faces[:, 0]], [[0, 0], [0, 1]])
 
 
-def test_vertices_without_faces_do_not_count() -> None:
-    mesh = read_ply(ply("0 0 0\n1 0 0\nnan nan nan\n0 1 0\n", "3 0 1 3\n", vertex_count=4))
+def test_vertices_without_faces_do_not_count(tmp_path: Path) -> None:
+    content = ply("0 0 0\n1 0 0\nnan nan nan\n0 1 0\n", "3 0 1 3\n", vertex_count=4)
+    mesh = read(tmp_path, "a.ply", content)
     np.testing.assert_array_equal(mesh.positions, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     np.testing.assert_array_equal(mesh.faces, [[0, 1, 2]])
     assert mesh.normals is None
