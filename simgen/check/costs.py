@@ -22,7 +22,7 @@ def hopeless(needs: Needs) -> list[Finding]:
     """What cannot even be looked at, since memory cannot hold it whatever the scene; empty if it can be."""
     room = available_bytes()
     lacking = shortage(needs, None, room)
-    return [] if lacking is None else [Finding("bad", "memory", lacking.sentence(room))]
+    return [] if lacking is None else [Finding("bad", "memory", lacking)]
 
 
 def cost_findings(facts: Facts) -> list[Finding]:
@@ -40,7 +40,7 @@ def cost_findings(facts: Facts) -> list[Finding]:
     text = f"some {in_bytes(peak)} of memory at the peak"
     lacking = shortage(needs, plan, room)
     if lacking is not None:
-        found.append(Finding("bad", "memory", lacking.sentence(room)))
+        found.append(Finding("bad", "memory", lacking))
     elif peak > MOST_MEMORY * room:
         text = f"{text}, and this machine has {in_bytes(room)} available"
         found.append(Finding("warn", "memory", text, "make fewer photons or smaller views"))

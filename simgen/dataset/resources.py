@@ -1,21 +1,20 @@
 """What a recipe takes of the machine, estimated before any work: memory of each step, bytes of each product.
 
-`simgen check` reports it and `simgen generate` refuses what does not fit, both by this one estimate. Bytes
-per item were measured, as the growth of the process with the number of items.
+`simgen check` reports it and `simgen generate` refuses what does not fit. Bytes per item were measured, as
+the growth of the process with the number of items.
 """
 
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.photons.pilot import MOST_RAYS
@@ -26,23 +25,20 @@ BASE_BYTES = 4e8
 """What the renderer and its libraries take, whatever the needs."""
 PIXEL_BYTES = 165.0
 """Of a pixel while the first hits of its view are found; rendering takes less."""
-PLANE_BYTES = 2.0
-"""Of a pixel of the centre for each plane at which it is in focus or not."""
 VIEW_BYTES = 400.0
 """Of a camera: where it stands, and what is added up for its view."""
+PLANE_BYTES = 2.0
+"""Of a pixel of the centre for each plane at which it is in focus or not."""
 PHOTON_BYTES = 200.0
-"""Of a photon, or a pixel that counts without any, while the counts are made: 135 where the sensor has no
-faults, up to 260 where counters stop and budgets are nested."""
-SUM_BYTES = 8.0
-"""Of a pixel of any view while photons that are too many to be kept are counted."""
+"""Of a photon, or a pixel that counts without any, while the counts are made."""
 ORIGIN_BYTES = 30.0
 """Of each of several counts of one pixel while their origins are written."""
+SUM_BYTES = 8.0
+"""Of a pixel of any view while photons that are too many to be kept are counted."""
 TILE_BYTES = 110.0
 """Of a tile of the majorant."""
-EVENT_BYTES, FRAME_BYTES = 16, 2
-"""Of a pixel that caught photons, on disk before compression: four indices and a count; and of its frame."""
-TRUTH_BYTES = 6
-"""Depth (float32) and object (int16) of a pixel."""
+EVENT_BYTES, FRAME_BYTES, TRUTH_BYTES = 16, 2, 6
+"""On disk before compression: of a pixel that caught photons, of its frame, of its depth and object."""
 EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
@@ -59,57 +55,50 @@ class Needs:
     planes: int
 
 
-@dataclass(frozen=True)
-class Step:
-    """A step of the work: its memory in bytes, the field that this follows, and what of it would fit."""
-
-    bytes: float
-    field: str
-    value: str
-    right: str
-
-    def sentence(self, room: float) -> str:
-        """That it does not fit, and what would."""
-        return (
-            f"{self.field}: {self.value} takes some {in_bytes(self.bytes)} of memory, and this machine has "
-            f"{in_bytes(room)} available; {self.right} would fit"
-        )
-
-
-def steps(needs: Needs, plan: Plan | None, room: float) -> Iterator[Step]:
-    """Each step's need of memory; `room` is what is available. Without `plan` those that need none."""
+def bytes_of_steps(needs: Needs, plan: Plan | None) -> dict[str, float]:
+    """Memory that each step of the work takes, by the fields that it grows with; without `plan` those that
+    need none."""
     grid, sensor, products = needs.grid, needs.sensor, needs.products
     pixels, views = float(grid.height * grid.width), float(grid.rows * grid.cols)
-    yield _linear(PIXEL_BYTES * pixels, room, *_longer("height", grid.height, "width", grid.width))
-    yield _linear(VIEW_BYTES * views, room, *_longer("rows", grid.rows, "cols", grid.cols))
-    if products.truth and needs.planes:
-        needed = PLANE_BYTES * pixels * needs.planes
-        yield _linear(needed, room, "analysis.z_mm", needs.planes, " planes")
+    steps = {
+        "grid.height, grid.width": PIXEL_BYTES * pixels,
+        "grid.rows, grid.cols": VIEW_BYTES * views,
+        "analysis.z_mm": PLANE_BYTES * pixels * needs.planes * products.truth,
+    }
     if products.counts:
         counted = PHOTON_BYTES * pixels * views
-        yield _linear(counted * sensor.dark_counts, room, "sensor.dark_counts", sensor.dark_counts)
-        hot = counted * sensor.hot_pixel_share
-        yield _linear(hot, room, "sensor.hot_pixel_share", sensor.hot_pixel_share)
-        if plan is None or plan.thins:
-            many = hot * sensor.hot_pixel_counts
-            if sensor.bits is None and not products.frames:
-                many *= ORIGIN_BYTES / PHOTON_BYTES
-            yield _linear(many, room, "sensor.hot_pixel_counts", sensor.hot_pixel_counts)
+        steps["sensor.dark_counts"] = counted * sensor.dark_counts
+        keeps_each = sensor.bits is not None or products.frames
+        each = sensor.hot_pixel_counts * (1 if keeps_each else ORIGIN_BYTES / PHOTON_BYTES)
+        hot = sensor.hot_pixel_share * (max(1, each) if plan is None or plan.thins else 1)
+        steps["sensor.hot_pixel_share, sensor.hot_pixel_counts"] = counted * hot
     if plan is not None:
-        yield _of_photons(needs, plan, room)
+        photons, all_pixels = plan.photons_per_view * views, pixels * views
+        keeps_all = plan.thins and plan.keeps_origins
+        sums = SUM_BYTES * all_pixels if plan.thins and not keeps_all else 0.0
+        field = "exposure" if needs.photons.scope == "exposure" else "photons.budget"
+        steps[field] = PHOTON_BYTES * (photons if keeps_all else min(photons, all_pixels)) + sums
         if plan.thins:
-            yield _of_tiles(grid, plan, room)
+            z_mm = np.array(plan.depths_mm or (math.inf,))
+            tiles = tile_count(grid.camera_grid(), z_mm)
+            steps["grid.pixel_mm, grid.focal_mm, grid.pitch_mm, grid.shear_px"] = TILE_BYTES * tiles
+    return steps
 
 
 def peak_bytes(needs: Needs, plan: Plan | None) -> float:
     """Memory at the peak: of the libraries and of the largest step."""
-    return BASE_BYTES + max(step.bytes for step in steps(needs, plan, math.inf))
+    return BASE_BYTES + max(bytes_of_steps(needs, plan).values())
 
 
-def shortage(needs: Needs, plan: Plan | None, room: float) -> Step | None:
-    """The step that is largest beyond the room, None if all fit."""
-    most = max(steps(needs, plan, room), key=lambda step: step.bytes)
-    return most if most.bytes > room else None
+def shortage(needs: Needs, plan: Plan | None, room: float) -> str | None:
+    """A sentence on the largest step, if memory of `room` bytes cannot hold it; None if it can."""
+    field, most = max(bytes_of_steps(needs, plan).items(), key=lambda step: step[1])
+    if most <= room:
+        return None
+    return (
+        f"{field}: takes some {in_bytes(most)} of memory, and this machine has {in_bytes(room)} available; "
+        f"with {room / most:.2g} of that it would fit"
+    )
 
 
 def fits(needs: Needs) -> Callable[[Plan], bool]:
@@ -119,11 +108,10 @@ def fits(needs: Needs) -> Callable[[Plan], bool]:
 
 
 def check_resources(needs: Needs, plan: Plan | None, out: Path) -> None:
-    """Raise `InputError` if memory cannot hold a step, or the disk of `out` the full-light images."""
-    room = available_bytes()
-    lacking = shortage(needs, plan, room)
+    """Raise `InputError` if memory cannot hold a step, or the disk of `out` the rendered views."""
+    lacking = shortage(needs, plan, available_bytes())
     if lacking is not None:
-        raise InputError(lacking.sentence(room))
+        raise InputError(lacking)
     needed, free = least_rendered_bytes(needs, plan), _free_bytes(out)
     if needed > free:
         what = "products.radiance" if needs.products.radiance != "none" else "photons, drawn from such"
@@ -143,7 +131,7 @@ def product_bytes(needs: Needs, plan: Plan | None) -> dict[str, float]:
         each = FRAME_BYTES * photons if products.frames and needs.sensor.frames > 1 else 0.0
         sizes["counts"] = EVENT_BYTES * min(photons, float(pixels * views)) + each
     if products.radiance != "none":
-        sizes["radiance"] = _rendered_bytes(needs, None)
+        sizes["radiance"] = least_rendered_bytes(needs, None) / EXR_SHARE
     truth = pixels * products.truth + pixels * views * bool(products.view_truth)
     if truth:
         sizes["truth"] = float(TRUTH_BYTES * truth)
@@ -152,15 +140,10 @@ def product_bytes(needs: Needs, plan: Plan | None) -> dict[str, float]:
 
 def least_rendered_bytes(needs: Needs, plan: Plan | None) -> float:
     """What the files of rendered views take at least: of products, or for dense counts to be drawn from."""
-    return EXR_SHARE * _rendered_bytes(needs, plan)
-
-
-def _rendered_bytes(needs: Needs, plan: Plan | None) -> float:
-    dense = plan is not None and not plan.thins
-    if needs.products.radiance == "none" and not dense:
+    if needs.products.radiance == "none" and (plan is None or plan.thins):
         return 0.0
     pixels = float(needs.grid.height * needs.grid.width * needs.grid.rows * needs.grid.cols)
-    return 4.0 * pixels * (3 if needs.products.radiance == "rgb" else 1)
+    return EXR_SHARE * 4.0 * pixels * (3 if needs.products.radiance == "rgb" else 1)
 
 
 def available_bytes() -> float:
@@ -168,13 +151,10 @@ def available_bytes() -> float:
     room = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     try:
         lines = Path("/proc/meminfo").read_text().splitlines()
-        room = min(
-            room, next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
-        )
-        group = Path("/sys/fs/cgroup")
-        room = min(
-            room, float((group / "memory.max").read_text()) - float((group / "memory.current").read_text())
-        )
+        free = next(float(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
+        room, group = min(room, free), Path("/sys/fs/cgroup")
+        limit, used = (float((group / f"memory.{name}").read_text()) for name in ("max", "current"))
+        room = min(room, limit - used)
     except (OSError, StopIteration, ValueError):  # not known here, or no limit
         pass
     return room
@@ -187,7 +167,7 @@ def in_bytes(size: float) -> str:
 
 
 def rounded(value: float, digits: int) -> str:
-    """A number with so many digits and no needless zeros."""
+    """A number with this many digits and no needless zeros."""
     places = digits - 1 - math.floor(math.log10(value)) if 0 < value < math.inf else 0
     return f"{round(value, places):.{max(places, 0)}f}".removesuffix(".0")
 
@@ -206,91 +186,6 @@ def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
         moved = disparity_px * (grid.pitch_mm[axis] / longer) - grid.shear_px[axis]
         count *= math.ceil((size + float(np.abs(moved).max()) * (number - 1)) / tile_px)
     return count
-
-
-def _of_photons(needs: Needs, plan: Plan, room: float) -> Step:
-    grid = needs.grid
-    photons = plan.photons_per_view * grid.rows * grid.cols
-    pixels = float(grid.height * grid.width * grid.rows * grid.cols)
-    keeps_all = plan.thins and plan.keeps_origins
-    rows = photons if keeps_all else min(photons, pixels)
-    sums = SUM_BYTES * pixels if plan.thins and not keeps_all else 0.0
-    absolute = needs.exposure if needs.photons.scope == "exposure" else None
-    field, value = ("photons.budget", needs.photons.budget)
-    if absolute is not None:
-        field, value = "exposure.time_s", absolute.time_s
-    fits = value * (room / (PHOTON_BYTES * photons)) / ROUNDING if photons > 0 else value
-    return Step(PHOTON_BYTES * rows + sums, field, f"{value:g}", f"at most {two_digits(fits)}")
-
-
-def _of_tiles(grid: Grid, plan: Plan, room: float) -> Step:
-    """The need of the majorant, which grows with disparities and with the number of cameras.
-
-    It names the field that is farthest from the paper's camera grid.
-    """
-    cameras, usual, z_mm = grid.camera_grid(), Grid(), np.array(plan.depths_mm or (math.inf,))
-    pitch, shear = max(grid.pitch_mm), max(grid.shear_px, key=abs)
-    # Of each field: how many times it is what it usually is, its value, and the grid with that share of it.
-    ways: dict[str, tuple[float, float, Callable[[float], CameraGrid]]] = {
-        "grid.pixel_mm": (
-            usual.pixel_mm / grid.pixel_mm,
-            grid.pixel_mm,
-            lambda share: replace(cameras, pixel_mm=grid.pixel_mm / share),
-        ),
-        "grid.focal_mm": (
-            grid.focal_mm / usual.focal_mm,
-            grid.focal_mm,
-            lambda share: replace(cameras, focal_mm=grid.focal_mm * share),
-        ),
-        "grid.pitch_mm": (
-            pitch / max(usual.pitch_mm),
-            pitch,
-            lambda share: replace(cameras, pitch_mm=_scaled(grid.pitch_mm, pitch, share)),
-        ),
-        "grid.shear_px": (
-            abs(shear) / max(grid.height, grid.width),
-            shear,
-            lambda share: replace(cameras, shear_px=_scaled(grid.shear_px, shear, share)),
-        ),
-        "grid.rows": (
-            grid.rows / usual.rows,
-            grid.rows,
-            lambda share: replace(cameras, rows=math.ceil(grid.rows * share)),
-        ),
-        "grid.cols": (
-            grid.cols / usual.cols,
-            grid.cols,
-            lambda share: replace(cameras, cols=math.ceil(grid.cols * share)),
-        ),
-    }
-    field, (_, value, changed) = max(ways.items(), key=lambda way: way[1][0])
-    low, high = -300.0, 0.0  # powers of ten of the share that fits
-    for _ in range(60):
-        middle = (low + high) / 2
-        fits = TILE_BYTES * tile_count(changed(10**middle), z_mm) <= room
-        low, high = (middle, high) if fits else (low, middle)
-    right = f"at least {two_digits(value / 10**low * ROUNDING)}" if field == "grid.pixel_mm" else ""
-    right = right or f"at most {two_digits(value * 10**low / ROUNDING)}"
-    if not math.isinf(z_mm.min()):
-        right += f", with what is seen at {z_mm.min():.0f} mm,"
-    return Step(TILE_BYTES * tile_count(cameras, z_mm), field, f"{value:g}", right)
-
-
-def _scaled(pair: tuple[float, float], which: float, share: float) -> tuple[float, float]:
-    """The pair with `which` of it made smaller."""
-    first, second = (value * share if value == which else value for value in pair)
-    return first, second
-
-
-def _longer(one: str, size: int, other: str, other_size: int) -> tuple[str, int]:
-    return (f"grid.{one}", size) if size >= other_size else (f"grid.{other}", other_size)
-
-
-def _linear(needed: float, room: float, field: str, value: float, unit: str = "") -> Step:
-    """A step whose need grows in proportion to the value of a field."""
-    fits = value * (room / needed) / ROUNDING if needed > 0 else math.inf
-    right = str(math.floor(fits)) if isinstance(value, int) and math.isfinite(fits) else two_digits(fits)
-    return Step(needed, field, f"{value:g}{unit}", f"at most {right}{unit}")
 
 
 def _free_bytes(out: Path) -> float:
