@@ -122,12 +122,12 @@ def picture_of(path: Path, kinds: Sequence[str], most_pixels: int = MOST_PIXELS)
     return picture
 
 
-def decode(picture: Picture, *, turn: bool = False, alpha: bool = False) -> Iterator[np.ndarray]:
+def decode(picture: Picture, *, turn: bool | None = False, alpha: bool = False) -> Iterator[np.ndarray]:
     """Pixels (H, W, C) of each page of a picture, as they are in the file, without alpha.
 
     Raises `InputError`, naming the file, if they cannot be decoded, are not as the header says, are not
-    opaque, or have to be turned and may not be: with `turn` they are returned upright, and with `alpha` with
-    that as a further channel if the file has it.
+    opaque, or have to be turned and may not be: with `turn` they are returned upright, with `turn` None as
+    they are stored, and with `alpha` with that as a further channel if the file has it.
     """
     path = picture.path
     height, width, channels = picture.shape
@@ -150,6 +150,8 @@ def decode(picture: Picture, *, turn: bool = False, alpha: bool = False) -> Iter
             raise InputError(
                 f"{path}: has an alpha channel that is not opaque everywhere; save it without transparency"
             )
+        if turn is None:
+            orientation = UPRIGHT
         if orientation != UPRIGHT and not turn:
             raise InputError(
                 f"{path}: says that it has to be turned (EXIF orientation {orientation}); save it upright"

@@ -77,8 +77,10 @@ def read_assets(scene: BaseModel, folder: Path) -> Assets:
     return found
 
 
-def read_texture(path: Path, *, alpha: bool = False) -> np.ndarray:
+def read_texture(path: Path, *, alpha: bool = False, as_stored: bool = False) -> np.ndarray:
     """A PNG, JPEG or TIFF file as sRGB (H, W, 3), uint8 or uint16, upright as its EXIF entry says.
+
+    With `as_stored` that entry is ignored, as glTF allows and Blender does.
 
     `InputError` for a file that is no single RGB, grey or palette picture, or is not opaque; with `alpha`
     that is a fourth channel if the file has it.
@@ -88,7 +90,7 @@ def read_texture(path: Path, *, alpha: bool = False) -> np.ndarray:
         raise InputError(f"{path}: holds {picture.pages} pictures; give a file with one")
     if picture.dtype.kind == "f":
         raise InputError(f"{path}: a picture of {picture.dtype}; save it as RGB or grey with 8 or 16 bits")
-    (pixels,) = decode(picture, turn=True, alpha=alpha)
+    (pixels,) = decode(picture, turn=None if as_stored else True, alpha=alpha)
     if picture.dtype == np.bool_ or picture.bits is not None:
         pixels = np.round(pixels * (65535 / picture.most)).astype(np.uint16)
     if picture.shape[2] == 1:

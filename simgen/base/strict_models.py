@@ -144,10 +144,15 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not valid TOML: {shorten(str(fault))}") from None
 
 
-def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
-    """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy."""
+def validate(
+    model: type[Model], values: Mapping[str, Any], source: str, context: dict[str, Any] | None = None
+) -> Model:
+    """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy.
+
+    `context` is what its validators are given.
+    """
     with _as_input_errors(model, source):
-        return model.model_validate(values)
+        return model.model_validate(values, context=context)
 
 
 @contextmanager

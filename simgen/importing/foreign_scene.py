@@ -114,7 +114,8 @@ def placement_of(
     options that exclude each other.
     """
     if not scene.parts:
-        raise InputError("there is no surface in it")
+        reasons = "".join(f"; not represented: {what}" for what in scene.left_out)
+        raise InputError(f"there is no surface in it{reasons}")
     box = bounds(scene.parts, scene.upright)
     longest = float(np.ptp(box, axis=0).max())
     scale = scene.mm if fit_mm is None else fit_mm / longest

@@ -75,12 +75,18 @@ def _replaced(gltf: GltfFile, values: np.ndarray, accessor: Accessor, name: str)
 
 
 def triangles_of(
-    gltf: GltfFile, primitive: Primitive, texcoord: int | None, uv_matrix: np.ndarray, where: str
+    gltf: GltfFile,
+    primitive: Primitive,
+    texcoord: int | None,
+    uv_matrix: np.ndarray,
+    where: str,
+    moved: np.ndarray | None = None,
 ) -> Triangles | None:
     """A primitive as triangles in its own axes and unit; None for points and lines, which have no surface.
 
-    `texcoord` numbers the set of texture coordinates, which `uv_matrix` (3, 3) moves. The file's run down
-    from the picture's upper left, ours up from its lower left.
+    `moved` (N, 4, 4) are matrices that place each vertex of a skinned mesh. `texcoord` numbers the set of
+    texture coordinates, which `uv_matrix` (3, 3) moves. The file's run down from the picture's upper left,
+    ours up from its lower left.
     """
     if primitive.mode < TRIANGLES:
         return None
@@ -93,6 +99,12 @@ def triangles_of(
     for values, name in ((normals, "NORMAL"), (uv, f"TEXCOORD_{texcoord}")):
         if values is not None and len(values) != len(positions):
             raise gltf.fault(f"{where}: {len(values)} elements of {name}, and {len(positions)} of POSITION")
+    if moved is not None:
+        if len(moved) != len(positions):
+            raise gltf.fault(f"{where}: {len(moved)} elements of WEIGHTS_0, and {len(positions)} of POSITION")
+        positions = np.einsum("nab,nb->na", moved[:, :3, :3], positions) + moved[:, :3, 3]
+        if normals is not None:
+            normals = np.einsum("nab,nb->na", moved[:, :3, :3], normals)
     if primitive.indices is None:
         corners = np.arange(len(positions))
     else:

@@ -28,13 +28,10 @@ READ_EXTENSIONS = {
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_mesh_quantization",
+    "EXT_mesh_gpu_instancing",
 }
-HINTS = {
-    "KHR_draco_mesh_compression": "export it without compression",
-    "EXT_meshopt_compression": "export it without compression",
-    "KHR_texture_basisu": "export its textures as PNG or JPEG",
-    "EXT_texture_webp": "export its textures as PNG or JPEG",
-}
+COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
+"""Without these there are no meshes; what any other extension adds can be left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +42,9 @@ class GltfFile:
     document: Document
     binary: bytes | None
     """The buffer behind the JSON of a binary file."""
+    clamped: tuple[str, ...] = ()
+    """Values that were out of range, and what they are taken for."""
+    unread_extensions: tuple[str, ...] = ()
     _buffers: dict[int, np.ndarray] = field(default_factory=dict)
 
     def view(self, index: int, where: str) -> tuple[np.ndarray, int | None]:
@@ -118,15 +118,14 @@ def read_gltf(path: Path) -> GltfFile:
     text, binary = _parts(path, content) if content.startswith(MAGIC) else (content, None)
     values = _json(path, text)
     _check_version(path, values)
-    document = validate(Document, values, str(path))
-    unread = [name for name in document.extensions_required if name not in READ_EXTENSIONS]
-    if unread:
-        hints = sorted({HINTS[name] for name in unread if name in HINTS})
-        shown = ", ".join(shorten(name, LONGEST_PART) for name in sorted(set(unread))[:10])
-        raise InputError(
-            f"{path}: needs {shown}, which cannot be read{''.join(f'; {hint}' for hint in hints)}"
-        )
-    return GltfFile(path, document, binary)
+    clamped: list[str] = []
+    document = validate(Document, values, str(path), {"clamped": clamped})
+    compressed = sorted(COMPRESSED & {*document.extensions_required})
+    if compressed:
+        raise InputError(f"{path}: needs {', '.join(compressed)}; export it without compression")
+    used = dict.fromkeys((*document.extensions_used, *document.extensions_required))
+    unread = (shorten(name, LONGEST_PART) for name in used if name not in READ_EXTENSIONS)
+    return GltfFile(path, document, binary, tuple(dict.fromkeys(clamped)), tuple(unread))
 
 
 def _parts(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
@@ -162,7 +161,7 @@ def _json(path: Path, text: bytes) -> Any:
         raise ValueError(f"{constant} is no number of JSON")
 
     try:
-        return json.loads(text.decode(), parse_constant=refuse)
+        return json.loads(text.decode("utf-8-sig"), parse_constant=refuse)
     except RecursionError:
         raise InputError(f"{path}: its JSON is nested too deeply") from None
     except ValueError as fault:

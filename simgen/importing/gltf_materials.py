@@ -27,6 +27,9 @@ BORDER = 1e-4
 REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
 """How pictures go on beyond their borders, as OpenGL numbers it."""
 OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
+NEAREST = 9728
+DEFAULT = Material()
+BACKS = "backs of surfaces that are not there from behind (doubleSided false): they look like the fronts"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +50,24 @@ class GltfMaterials:
     def __init__(self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float) -> None:
         self.gltf, self.scene = gltf, scene
         self.cd_m2_per_emission = cd_m2_per_emission
-        self._made: dict[int | None, SurfaceOfPrimitive | None] = {}
+        self._made: dict[tuple[int | None, bool], SurfaceOfPrimitive | None] = {}
 
-    def surface(self, index: int | None, where: str) -> SurfaceOfPrimitive | None:
-        """That of a material, or of the default one; None for one that is all clear."""
+    def surface(
+        self, index: int | None, where: str, *, with_pictures: bool = True
+    ) -> SurfaceOfPrimitive | None:
+        """That of a material, or of the default one; None for one that is all clear.
+
+        Without pictures it is for a mesh that does not say where they lie.
+        """
         materials = self.gltf.document.materials
         if index is not None and index >= len(materials):
             raise self.gltf.fault(f"{where}: there is no materials[{index}]")
-        if index not in self._made:
-            material = Material() if index is None else materials[index]
+        key = index, with_pictures
+        if key not in self._made:
+            material = DEFAULT if index is None else materials[index]
             name = material.name or ("default" if index is None else f"material-{index}")
-            self._made[index] = _Making(self, material, name).surface()
-        return self._made[index]
+            self._made[key] = _Making(self, material, name, with_pictures).surface()
+        return self._made[key]
 
     @cached_property
     def pictures(self) -> dict[int, np.ndarray]:
@@ -69,8 +78,8 @@ class GltfMaterials:
 class _Making:
     """One material as it is made."""
 
-    def __init__(self, materials: GltfMaterials, material: Material, name: str) -> None:
-        self.all, self.material, self.name = materials, material, name
+    def __init__(self, materials: GltfMaterials, material: Material, name: str, with_pictures: bool) -> None:
+        self.all, self.material, self.name, self.with_pictures = materials, material, name, with_pictures
         self.scene = materials.scene
         self.layout: tuple[int, tuple[float, ...], tuple[int, int]] | None = None
 
@@ -113,6 +122,9 @@ class _Making:
         if info is None:
             return None
         gltf, name = self.all.gltf, f"material '{self.name}'"
+        if not self.with_pictures:
+            self.scene.lose(f"pictures of {name} on meshes that have no texture coordinates for them")
+            return None
         textures, samplers = gltf.document.textures, gltf.document.samplers
         if info.index >= len(textures):
             raise gltf.fault(f"{name}: there is no textures[{info.index}]")
@@ -129,7 +141,12 @@ class _Making:
         if texture.sampler is not None:
             if texture.sampler >= len(samplers):
                 raise gltf.fault(f"textures[{info.index}]: there is no samplers[{texture.sampler}]")
-            wrap = samplers[texture.sampler].wrap_s, samplers[texture.sampler].wrap_t
+            sampler = samplers[texture.sampler]
+            wrap = sampler.wrap_s, sampler.wrap_t
+            if sampler.mag_filter == NEAREST:
+                self.scene.lose(f"sharp pixels of pictures of {name} (magFilter NEAREST): they are smoothed")
+            if CLAMP in wrap and wrap[0] != wrap[1]:
+                self.scene.lose(f"pictures of {name} that are repeated along one side: they are along both")
         if MIRROR in wrap:
             self.scene.lose("every other repetition of a picture mirrored: pictures are repeated as they are")
         layout = (texcoord, transform, wrap)
@@ -148,7 +165,8 @@ class _Making:
         has_alpha = base is not None and base.shape[2] == 4
         if mode == BLEND and (has_alpha or factor < 1):
             self.scene.lose(
-                f"surfaces of '{self.name}' that are partly clear: they are there from an alpha of a half"
+                f"surfaces of '{self.name}' that are partly clear: they are there from an alpha of a half; "
+                "export them with transmission"
             )
         if base is None or not has_alpha:
             return factor >= cutoff
@@ -232,6 +250,8 @@ class _Making:
                 self.scene.lose(f"roughness and normal pictures of the clearcoat of material '{self.name}'")
         if "KHR_materials_unlit" in (more.model_extra or {}):
             self.scene.lose("materials that are shown without light (KHR_materials_unlit): they are lit")
+        if not material.double_sided and material is not DEFAULT:
+            self.scene.lose(BACKS)
         others = sorted(set(more.model_extra or {}) - {"KHR_materials_unlit"})
         for other in others:
             self.scene.lose(f"{other[:60]} of materials")

@@ -6,16 +6,36 @@ KHR_texture_transform and KHR_materials_*. What is not listed is not read.
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.alias_generators import to_camel
 
-from simgen.base.strict_models import NonNegative, Positive, Real, Share
+from simgen.base.strict_models import Positive, Real
 
 MOST_ITEMS = 100_000
 """Of one kind, such as nodes or accessors."""
 
 Index = Annotated[int, Field(strict=True, ge=0)]
 Name = Annotated[str, Field(max_length=1000)]
+
+
+def _within(low: float, high: float) -> BeforeValidator:
+    """A number beyond these bounds is taken as the bound, and named in the context's list `clamped`."""
+
+    def clamp(value: Any, info: ValidationInfo) -> Any:
+        if isinstance(value, bool) or not isinstance(value, int | float) or low <= value <= high:
+            return value
+        bound = low if value < low else high
+        if info.context is not None:
+            info.context["clamped"].append(
+                f"{to_camel(info.field_name or '')} of {value:.9g}, taken as {bound:g}"
+            )
+        return bound
+
+    return BeforeValidator(clamp)
+
+
+Share = Annotated[Real, _within(0.0, 1.0)]
+NonNegative = Annotated[Real, _within(0.0, float("inf"))]
 Rgb = tuple[NonNegative, NonNegative, NonNegative]
 
 
@@ -46,6 +66,7 @@ class Sampler(Read):
 
     wrap_s: int = 10497
     wrap_t: int = 10497
+    mag_filter: int = 9729
 
 
 class TextureTransform(Read):
@@ -142,7 +163,7 @@ class Material(Read):
     normal_texture: TextureInfo | None = None
     occlusion_texture: TextureInfo | None = None
     emissive_texture: TextureInfo | None = None
-    emissive_factor: tuple[Share, Share, Share] = (0.0, 0.0, 0.0)
+    emissive_factor: Rgb = (0.0, 0.0, 0.0)
     alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alpha_cutoff: NonNegative = 0.5
     double_sided: bool = False
@@ -226,11 +247,17 @@ class LightOfNode(Read):
     light: Index
 
 
+class Instancing(Read):
+    """Where copies of a node's mesh stand: accessors of TRANSLATION, ROTATION and SCALE."""
+
+    attributes: dict[str, Index] = {}
+
+
 class NodeExtensions(Read):
     """Extensions of nodes."""
 
     lights_punctual: LightOfNode | None = Field(default=None, validation_alias="KHR_lights_punctual")
-    mesh_gpu_instancing: Any = Field(default=None, validation_alias="EXT_mesh_gpu_instancing")
+    mesh_gpu_instancing: Instancing | None = Field(default=None, validation_alias="EXT_mesh_gpu_instancing")
 
 
 class Node(Read):
@@ -246,6 +273,13 @@ class Node(Read):
     rotation: tuple[Real, Real, Real, Real] = (0.0, 0.0, 0.0, 1.0)
     scale: tuple[Real, Real, Real] = (1.0, 1.0, 1.0)
     extensions: NodeExtensions = NodeExtensions()
+
+
+class Skin(Read):
+    """Joints, which are nodes, and by which each places the vertices that follow it."""
+
+    joints: tuple[Index, ...]
+    inverse_bind_matrices: Index | None = None
 
 
 class SceneNodes(Read):
@@ -323,5 +357,6 @@ class Document(Read):
     images: Annotated[tuple[Image, ...], Field(max_length=MOST_ITEMS)] = ()
     samplers: Annotated[tuple[Sampler, ...], Field(max_length=MOST_ITEMS)] = ()
     cameras: Annotated[tuple[Camera, ...], Field(max_length=MOST_ITEMS)] = ()
+    skins: Annotated[tuple[Skin, ...], Field(max_length=MOST_ITEMS)] = ()
     animations: tuple[Any, ...] = ()
     extensions: DocumentExtensions = DocumentExtensions()

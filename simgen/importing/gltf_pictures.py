@@ -23,7 +23,7 @@ def pictures_of(gltf: GltfFile) -> dict[int, np.ndarray]:
         total = 0
         for number, path in paths.items():
             try:
-                found[number] = read_texture(path, alpha=True)
+                found[number] = read_texture(path, alpha=True, as_stored=True)
             except InputError as fault:
                 sentence = str(fault).removeprefix(f"{path}: ")
                 raise gltf.fault(f"images[{number}]: {sentence}") from None

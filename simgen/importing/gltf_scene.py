@@ -9,12 +9,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from simgen.assets.triangles import MOST_FACES, Triangles
+from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
 from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
-from simgen.importing.gltf_arrays import triangles_of
+from simgen.importing.gltf_arrays import numbers, triangles_of
 from simgen.importing.gltf_file import GltfFile, read_gltf
 from simgen.importing.gltf_materials import GltfMaterials, fitted, light_values
-from simgen.importing.gltf_models import Node, PunctualLight
+from simgen.importing.gltf_models import Instancing, Node, Primitive, PunctualLight
+from simgen.spec.scene import MOST_OBJECTS
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
@@ -40,9 +41,15 @@ def foreign_gltf(path: Path, metres_per_unit: float, emission_unit: EmissionUnit
     """Read a .gltf or .glb file. Raises `InputError` for one that is wrong, or that cannot be read."""
     gltf = read_gltf(path)
     scene = ForeignScene(title=path.stem, mm=1000 * metres_per_unit, upright=FLIP[:3, :3])
-    reader = _Reader(gltf, scene, CD_M2_PER_EMISSION[emission_unit])
-    for index, matrix in _placed_nodes(gltf):
+    for what in gltf.clamped:
+        scene.lose(what)
+    places = dict(_placed_nodes(gltf))
+    reader = _Reader(gltf, scene, CD_M2_PER_EMISSION[emission_unit], places)
+    for index, matrix in places.items():
         reader.add(gltf.document.nodes[index], index, matrix)
+    for name in gltf.unread_extensions:
+        if not any(name in what for what in scene.left_out):
+            scene.lose(name)
     if gltf.document.animations:
         scene.left_out.append("animations: everything stands as the file begins")
     if emission_unit == "nit" and scene.lamps and any("emission" in part.material for part in scene.parts):
@@ -101,17 +108,25 @@ def _matrix(node: Node) -> np.ndarray:
 class _Reader:
     """What the nodes hold, put into the scene."""
 
-    def __init__(self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float) -> None:
-        self.gltf, self.scene = gltf, scene
+    def __init__(
+        self,
+        gltf: GltfFile,
+        scene: ForeignScene,
+        cd_m2_per_emission: float,
+        places: dict[int, np.ndarray],
+    ) -> None:
+        self.gltf, self.scene, self.places = gltf, scene, places
         self.materials = GltfMaterials(gltf, scene, cd_m2_per_emission)
-        self._primitives: dict[tuple[int, int], tuple[Triangles, dict[str, Any]] | None] = {}
+        self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
         self._faces = 0
 
     def add(self, node: Node, index: int, matrix: np.ndarray) -> None:
         """The mesh, camera and light of a node."""
         where = f"nodes[{index}]"
         if node.mesh is not None:
-            self._add_mesh(node, index, matrix)
+            copies = node.extensions.mesh_gpu_instancing
+            for number, copy in enumerate([np.eye(4)] if copies is None else self._copies(copies, where)):
+                self._add_mesh(node, index, matrix @ copy, f"-{number + 1}" if copies is not None else "")
         if node.camera is not None:
             self._add_camera(node, where, matrix)
         if node.extensions.lights_punctual is not None:
@@ -121,24 +136,61 @@ class _Reader:
                 raise self.gltf.fault(f"{where}: there is no lights[{number}] of KHR_lights_punctual")
             if lights[number].intensity > 0 and any(lights[number].color):
                 self.scene.lamps.append(Lamp(matrix @ FLIP, _lamp(lights[number])))
-        if node.extensions.mesh_gpu_instancing is not None:
-            self.scene.lose("copies of meshes by EXT_mesh_gpu_instancing, but for the first")
 
-    def _add_mesh(self, node: Node, index: int, matrix: np.ndarray) -> None:
+    def _copies(self, copies: Instancing, where: str) -> list[np.ndarray]:
+        """Matrices (4, 4) of the copies of a mesh, in the node's axes (EXT_mesh_gpu_instancing)."""
+        kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+        columns = {
+            name.lower(): numbers(self.gltf, copies.attributes[name], where, kind, MOST_OBJECTS)
+            for name, kind in kinds.items()
+            if name in copies.attributes
+        }
+        count = min((len(column) for column in columns.values()), default=1)
+        rows = [{name: column[row] for name, column in columns.items()} for row in range(count)]
+        return [
+            _matrix(Node.model_validate({name: part.tolist() for name, part in row.items()})) for row in rows
+        ]
+
+    def _skinned(self, skin: int, primitive: Primitive, where: str) -> np.ndarray:
+        """Matrices (N, 4, 4) that bring each vertex of a skinned mesh to where its joints stand.
+
+        Section 3.7.3.3: the place of the node itself is of no account.
+        """
+        skins = self.gltf.document.skins
+        if skin >= len(skins):
+            raise self.gltf.fault(f"{where}: there is no skins[{skin}]")
+        if not {"JOINTS_0", "WEIGHTS_0"} <= primitive.attributes.keys():
+            raise self.gltf.fault(f"{where}: a mesh with a skin needs JOINTS_0 and WEIGHTS_0")
+        joints = np.array([self.places.get(joint, np.eye(4)) for joint in skins[skin].joints])
+        if skins[skin].inverse_bind_matrices is not None:
+            number = skins[skin].inverse_bind_matrices
+            inverse = numbers(self.gltf, number, where, "MAT4", len(joints)).reshape(-1, 4, 4)
+            joints = joints[: len(inverse)] @ inverse.transpose(0, 2, 1)
+        which, weight = (
+            numbers(self.gltf, primitive.attributes[name], where, "VEC4", MOST_VERTICES)
+            for name in ("JOINTS_0", "WEIGHTS_0")
+        )
+        if which.max() >= len(joints):
+            raise self.gltf.fault(f"{where}: JOINTS_0: there is no joint {which.max()} in skins[{skin}]")
+        share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
+        return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
+
+    def _add_mesh(self, node: Node, index: int, matrix: np.ndarray, copy: str) -> None:
         meshes, number = self.gltf.document.meshes, node.mesh
         assert number is not None
         if number >= len(meshes):
             raise self.gltf.fault(f"nodes[{index}]: there is no meshes[{number}]")
         if node.skin is not None:
-            self.scene.lose("skeletons: meshes stand as they were modelled")
+            matrix = np.eye(4)
+            self.scene.lose("skeletons: meshes stand as the file begins")
         mesh = meshes[number]
-        name = node.name or mesh.name or f"node-{index}"
-        stem = mesh.name or name
+        name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
+        stem = mesh.name or node.name or name
         if not np.linalg.det(matrix[:3, :3]):
             self.scene.lose(f"'{name}', which is scaled to nothing")
             return
         for part, primitive in enumerate(mesh.primitives):
-            made = self._primitive(number, part)
+            made = self._primitive(number, part, node.skin)
             if made is None:
                 continue
             triangles, material = made
@@ -148,24 +200,26 @@ class _Reader:
             ending = f"-{of or part + 1}" if several else ""
             self.scene.parts.append(Part(f"{name}{ending}", matrix, triangles, f"{stem}{ending}", material))
 
-    def _primitive(self, mesh: int, part: int) -> tuple[Triangles, dict[str, Any]] | None:
+    def _primitive(self, mesh: int, part: int, skin: int | None) -> tuple[Triangles, dict[str, Any]] | None:
         """Triangles and material of a primitive, None if there are none; those of one primitive are one."""
-        key = mesh, part
+        key = mesh, part, skin
         if key not in self._primitives:
-            self._primitives[key] = self._read_primitive(mesh, part)
+            self._primitives[key] = self._read_primitive(mesh, part, skin)
         return self._primitives[key]
 
-    def _read_primitive(self, mesh: int, part: int) -> tuple[Triangles, dict[str, Any]] | None:
+    def _read_primitive(
+        self, mesh: int, part: int, skin: int | None
+    ) -> tuple[Triangles, dict[str, Any]] | None:
         where = f"meshes[{mesh}].primitives[{part}]"
         primitive = self.gltf.document.meshes[mesh].primitives[part]
         surface = self.materials.surface(primitive.material, where)
+        if surface is not None and f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:
+            surface = self.materials.surface(primitive.material, where, with_pictures=False)
         if surface is None:
             self.scene.lose("surfaces that are all clear")
             return None
-        texcoord = surface.texcoord
-        if texcoord is not None and f"TEXCOORD_{texcoord}" not in primitive.attributes:
-            raise self.gltf.fault(f"{where}: its pictures need TEXCOORD_{texcoord}, which it has not")
-        triangles = triangles_of(self.gltf, primitive, texcoord, surface.uv_matrix, where)
+        moved = None if skin is None else self._skinned(skin, primitive, where)
+        triangles = triangles_of(self.gltf, primitive, surface.texcoord, surface.uv_matrix, where, moved)
         if triangles is None:
             self.scene.lose("points and lines, which have no surface")
             return None

@@ -33,6 +33,8 @@ TETRAHEDRON_FACES = np.array([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], "<u1")
 def imported(draft: GltfDraft, folder: Path, **options: Any) -> tuple[Scene, tuple[str, ...]]:
     """The scene of a draft, and what could not be represented."""
     folder.mkdir(exist_ok=True)
+    for material in draft.json.get("materials", []):
+        material.setdefault("doubleSided", True)
     (folder / "file.glb").write_bytes(draft.glb())
     said = import_scene(folder / "file.glb", folder / "scene", **options)
     return load_scene(str(folder / "scene"))[0], said.left_out
@@ -409,3 +411,102 @@ def test_text_and_binary_files_are_one(tmp_path: Path) -> None:
         for number in range(3)
     ]
     assert written[0] == written[1] == written[2]
+
+
+SAMPLED = {"magFilter": 9728, "wrapS": 33071, "wrapT": 10497}
+
+
+@pytest.mark.parametrize(
+    ("material", "said"),
+    [
+        (
+            {"pbrMetallicRoughness": {"roughnessFactor": 1.0000001}},
+            "roughnessFactor of 1.0000001, taken as 1",
+        ),
+        ({"pbrMetallicRoughness": {"metallicFactor": -1e-9}}, "metallicFactor of -1e-09, taken as 0"),
+        ({"doubleSided": False}, "doubleSided false"),
+        ({"extensions": {"KHR_materials_unlit": {}}}, "KHR_materials_unlit"),
+    ],
+)
+def test_a_value_that_cannot_be_represented_is_named(
+    tmp_path: Path, material: dict[str, Any], said: str
+) -> None:
+    _, left_out = material_of(material, tmp_path)
+    assert said in "".join(left_out)
+
+
+def test_what_a_sampler_says_and_a_mesh_lacks_is_named(tmp_path: Path) -> None:
+    draft = GltfDraft()
+    texture = draft.texture(png(QUARTERS))
+    draft.json["textures"][texture]["sampler"] = draft.put("samplers", SAMPLED)
+    material = {"name": "m", "pbrMetallicRoughness": {"baseColorTexture": {"index": texture}}}
+    draft.node(mesh=draft.mesh(uv=QUAD_UV, material=material), name="with")
+    draft.node(mesh=draft.mesh(material=material), name="without")
+    scene, left_out = imported(draft, tmp_path, place_at_mm=(0.0, 0.0, 600.0))
+    assert [thing.material.texture is not None for thing in scene.objects] == [True, False]
+    for said in ("magFilter NEAREST", "repeated along one side", "have no texture coordinates"):
+        assert any(said in what for what in left_out)
+
+
+def test_what_is_required_and_can_be_left_out_is_named(tmp_path: Path) -> None:
+    draft = GltfDraft()
+    glow = {"emissiveFactor": [2.0, 0.0, 0.0]}  # as written before KHR_materials_emissive_strength
+    draft.node(mesh=draft.mesh(material=glow), name="plate")
+    document = draft.document()
+    document["extensionsRequired"] = ["KHR_xmp_json_ld", "KHR_materials_variants"]
+    document["buffers"][0]["uri"] = "a.bin"
+    (tmp_path / "a.bin").write_bytes(draft.bytes)
+    (tmp_path / "a.gltf").write_bytes(
+        b"\xef\xbb\xbf" + json.dumps(document).encode()
+    )  # with a byte order mark
+    said = import_scene(tmp_path / "a.gltf", tmp_path / "scene", place_at_mm=(0.0, 0.0, 600.0))
+    assert {"KHR_xmp_json_ld", "KHR_materials_variants"} <= {*said.left_out}
+    emission = load_scene(str(tmp_path / "scene"))[0].objects[0].material.emission
+    assert emission is not None
+    assert emission.luminance_cd_m2 == pytest.approx(2 * 0.2126)
+
+
+def test_a_file_without_a_surface_says_why(tmp_path: Path) -> None:
+    draft = GltfDraft()
+    clear = {
+        "name": "glass",
+        "alphaMode": "BLEND",
+        "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.1]},
+    }
+    draft.node(mesh=draft.mesh(material=clear))
+    with pytest.raises(InputError, match=r"no surface in it; not represented: .*'glass'.* transmission"):
+        imported(draft, tmp_path, place_at_mm=(0.0, 0.0, 600.0))
+
+
+@pytest.mark.renders
+def test_copies_and_skins_stand_where_the_file_says(tmp_path: Path) -> None:
+    draft = GltfDraft()
+    mesh = draft.mesh(TETRAHEDRON, TETRAHEDRON_FACES)
+    moves = np.array([(1, 0, 0), (2, 0, 0)], "<f4")
+    sizes = np.array([(2, 2, 2), (3, 3, 3)], "<f4")
+    attributes = {"TRANSLATION": draft.numbers(moves), "SCALE": draft.numbers(sizes)}
+    copies = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    draft.node(mesh=mesh, name="post", translation=[0, 1, 0], extensions=copies)
+    body = draft.mesh(TETRAHEDRON, TETRAHEDRON_FACES)
+    count = len(TETRAHEDRON)
+    draft.json["meshes"][body]["primitives"][0]["attributes"] |= {
+        "JOINTS_0": draft.numbers(np.zeros((count, 4), "<u1")),
+        "WEIGHTS_0": draft.numbers(np.tile(np.array([1, 0, 0, 0], "<f4"), (count, 1))),
+    }
+    bone = draft.node(name="bone", translation=[0, 0, 3])
+    draft.put("skins", {"joints": [bone]})
+    draft.node(mesh=body, name="body", translation=[100, 0, 0], scale=[50, 50, 50], skin=0)
+    draft.camera()
+    scene, left_out = imported(draft, tmp_path)
+    to_ours = np.array([1000, -1000, -1000])
+    for number in range(2):
+        expected = (TETRAHEDRON * sizes[number] + moves[number] + [0, 1, 0]) * to_ours
+        np.testing.assert_allclose(
+            corners_mm(scene, tmp_path / "scene", f"post-{number + 1}"), expected, atol=1e-3
+        )
+    np.testing.assert_allclose(
+        corners_mm(scene, tmp_path / "scene", "body"),
+        (TETRAHEDRON + np.array([0, 0, 3])) * to_ours,
+        atol=1e-3,
+    )
+    assert "skeletons: meshes stand as the file begins" in left_out
