@@ -12,9 +12,7 @@ scene_facts       What a coarse look at a scene shows, and what follows from it:
                   check`.
 scene_probe       The coarse probe of `simgen check`: what few, large pixels of the centre and of the
                   corner cameras see.
-sight             Findings on what the cameras see: objects hidden, cut or never seen, cameras inside
+sight             Findings on what the cameras see: objects cut or never seen, cameras inside
                   things, lamps.
 targets           What `check` and `preview` look at: a scene or a recipe, by name or path.
-unseen            Why an object of a scene is not seen: what stands before it, how large it is on the
-                  film, and where.
 """

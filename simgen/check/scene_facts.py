@@ -10,7 +10,6 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.disparities import apart_px
-from simgen.check.unseen import OnFilm
 from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Plan
 from simgen.spec.lights import Level
@@ -39,6 +38,16 @@ class Finding:
         )
 
 
+@dataclass(frozen=True)
+class OnFilm:
+    """Where an object's bounding box falls."""
+
+    size_px: tuple[float, float]
+    """Columns and rows that it covers of the virtual centre's film, however far that reaches."""
+    in_view: bool
+    """Whether part of it falls on the film of the virtual centre or of a corner camera."""
+
+
 @dataclass(frozen=True, eq=False)
 class ObjectFacts:
     """What is known of one object. Shares are of the film, of the object, or of the photons of a view."""
@@ -50,8 +59,6 @@ class ObjectFacts:
     """Share of the virtual centre's pixels that see it."""
     light_share: np.ndarray
     """Share (C,) of the light in each colour of the virtual centre's image that comes from it."""
-    hidden_share: float = 0.0
-    """Share of what the virtual centre would see of it alone that other objects hide."""
     corners_seen: int = 4
     """Corner cameras that see any of it."""
     corners_cut: int = 0
@@ -62,8 +69,6 @@ class ObjectFacts:
     """Nearest and farthest depth of its bounding box, of what is hidden too."""
     stands_at_mm: float = math.inf
     """The scene's depth of its origin."""
-    hidden_by: tuple[str, ...] = ()
-    """What hides it from the virtual centre, if that sees nothing of it."""
     on_film: OnFilm | None = None
     """Where its bounding box falls."""
     encloses_camera: bool = False

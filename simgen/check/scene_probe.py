@@ -14,9 +14,8 @@ from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import as_rig, corners, with_larger_pixels
-from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts
-from simgen.check.unseen import hidden_by, on_backdrop, on_film, pixels_without_occluders
+from simgen.cameras.rig import Camera, as_rig, centre_camera, corners, with_larger_pixels
+from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts, OnFilm
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes, fits
 from simgen.photons.candidates import Setup
@@ -31,8 +30,8 @@ from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
-ALONE_PX, SCALAR_ALONE_PX = 256, 128
-"""The same where objects are looked at alone, which takes a pass for each."""
+SAME_DEPTH = 1e-3
+"""This near to the backdrop's depth, as a share of it, a hit is taken to be on it."""
 SAMPLES = 4
 
 
@@ -40,8 +39,7 @@ SAMPLES = 4
 class _Look:
     """A scene on a coarse film: its picture in the sensor's colours, and what is hit first.
 
-    `boxes` are the objects' bounding boxes by number; `alone` is a still coarser film, on which objects can
-    be looked at one by one, and `together` what all of them show there.
+    `boxes` are the objects' bounding boxes by number.
     """
 
     target: Prepared
@@ -51,8 +49,6 @@ class _Look:
     centre: FirstHits
     corners: dict[tuple[int, int], FirstHits]
     boxes: dict[int, np.ndarray]
-    alone: CameraGrid
-    together: FirstHits
 
 
 def probe_scene(target: Prepared) -> Facts:
@@ -61,14 +57,13 @@ def probe_scene(target: Prepared) -> Facts:
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
     made = _plan_of(target, render_scene) if recipe.products.counts else None
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
-    alone = coarser(grid, ALONE_PX if compiled else SCALAR_ALONE_PX)
     image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, small)
     begun = time.perf_counter()
     ends = {(k, l): first_hits_of_view(render_scene, small, k, l) for k, l in corners(grid)}
     hit_s = (time.perf_counter() - begun) / (len(ends) * centre.z_mm.size)
-    boxes, together = _boxes(render_scene), first_hits_at_centre(render_scene, alone)
-    look = _Look(target, render_scene, small, image, centre, ends, boxes, alone, together)
+    boxes = _boxes(render_scene)
+    look = _Look(target, render_scene, small, image, centre, ends, boxes)
     light = image.sum(axis=(0, 1))
     return Facts(
         grid=grid,
@@ -131,9 +126,6 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
     target, box, here = look.target, look.boxes.get(number), look.centre.object_id == number
     masks = {camera: hits.object_id == number for camera, hits in look.corners.items()}
     full = [camera for camera, mask in masks.items() if mask.all()]
-    unseen_behind = (
-        () if here.any() else hidden_by(look.render_scene, target.scene, number, look.alone, look.together)
-    )
     own = target.scene.objects
     stands_at_mm = own[number - 1].position_mm[2] if number <= len(own) else np.inf
     return ObjectFacts(
@@ -141,13 +133,11 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
         z_mm=look.centre.z_mm[here].astype(np.float64),
         film_share=float(here.mean()),
         light_share=_share(look.image[here].sum(axis=0), look.image.sum(axis=(0, 1))),
-        hidden_share=_hidden_share(look, number),
         corners_seen=sum(bool(mask.any()) for mask in masks.values()),
         corners_cut=sum(_at_border(mask) for mask in masks.values()),
         centre_cut=_at_border(here),
         body_z_mm=(0.0, 0.0) if box is None else (float(box[0, 2]), float(box[1, 2])),
         stands_at_mm=stands_at_mm,
-        hidden_by=unseen_behind,
         on_film=None if box is None else on_film(box, target.recipe.grid.camera_grid()),
         shines=any(number == one.number for one in look.render_scene.shining),
         encloses_camera=box is not None and any(_holds(box, look.grid, *camera) for camera in full),
@@ -197,35 +187,6 @@ def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
     return bool(np.all((box[0] <= place) & (place <= box[1])))
 
 
-def _hidden_share(look: _Look, number: int) -> float:
-    """Share of an object, seen alone from the virtual centre, that other objects stand before.
-
-    Only objects whose boxes appear to overlap another's are looked at alone.
-    """
-    boxes = look.boxes
-    others = [box for other, box in boxes.items() if other != number]
-    if number not in boxes or not any(_overlap(boxes[number], box) for box in others):
-        return 0.0
-    alone = pixels_without_occluders(look.render_scene, number, look.alone)
-    owner = look.together.object_id
-    before = alone & (owner > 0) & (owner != number)
-    return float(before.sum() / alone.sum()) if alone.any() else 0.0
-
-
-def _overlap(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two boxes may stand one before the other, seen from X = Y = 0."""
-    a, b = _outline(one), _outline(other)
-    return bool(np.all(a[0] <= b[1]) and np.all(b[0] <= a[1]))
-
-
-def _outline(box: np.ndarray) -> np.ndarray:
-    """Smallest and largest X / Z and Y / Z (2, 2) of a box; everything if it reaches the cameras."""
-    if box[0, 2] <= 0:
-        return np.array([[-np.inf, -np.inf], [np.inf, np.inf]])
-    slopes = box[:, None, :2] / box[None, :, 2:]
-    return np.array([slopes.min(axis=(0, 1)), slopes.max(axis=(0, 1))])
-
-
 def _lamps_away(scene: Scene, boxes: Iterable[np.ndarray]) -> tuple[int, ...]:
     """Lamps, from 1, behind whose face all objects stand."""
     choices = itertools.product((0, 1), repeat=3)
@@ -238,3 +199,28 @@ def _lamps_away(scene: Scene, boxes: Iterable[np.ndarray]) -> tuple[int, ...]:
             if np.all((points - lamp.position_mm) @ facing <= 0):
                 away.append(number)
     return tuple(away)
+
+
+def on_backdrop(scene: Scene, z_mm: np.ndarray) -> np.ndarray:
+    """Which first hits at these depths, +inf for none, are so near the backdrop that they are on it; bool."""
+    if scene.backdrop is None:
+        return np.zeros(z_mm.shape, dtype=bool)
+    wall_mm = scene.backdrop.z_mm
+    return np.abs(z_mm - wall_mm) <= SAME_DEPTH * wall_mm
+
+
+def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
+    """Where a bounding box (2, 3), smallest and largest X, Y, Z in mm, falls on the films."""
+    if box[0, 2] <= 0:
+        return OnFilm((np.inf, np.inf), in_view=True)
+    rig, centre = as_rig(grid), centre_camera(grid)
+    ends = [rig.camera(k, l) for k, l in corners(grid)]
+    points = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+    across, down = np.ptp(centre.film_px(points), axis=0).tolist()
+    return OnFilm((across, down), any(_meets(points, one) for one in (centre, *ends)))
+
+
+def _meets(points: np.ndarray, camera: Camera) -> bool:
+    """Whether the outline of points reaches onto the film."""
+    px, half = camera.film_px(points), np.array([camera.grid.width, camera.grid.height]) / 2
+    return bool(np.all(px.min(axis=0) < half) and np.all(px.max(axis=0) > -half))

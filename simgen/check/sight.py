@@ -1,9 +1,8 @@
-"""Findings on what the cameras see: objects hidden, cut or never seen, cameras inside things, lamps."""
+"""Findings on what the cameras see: objects cut or never seen, cameras inside things, lamps."""
 
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts, listed
 from simgen.renderer.mitsuba_camera import NEAR_CLIP_MM
 
-MOST_HIDDEN = 0.5
 MOST_MAGNIFIED = 10.0
 """What stands nearer than the focal length divided by this is so many times as large on the film."""
 LEAST_GLASS_DEPTH = 6
@@ -38,8 +37,7 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
         text = (
             f"{thing.corners_seen} of {facts.corners} corner cameras see {name}, the virtual centre does not"
         )
-        before = f", where it is hidden behind {listed(list(thing.hidden_by))}" if thing.hidden_by else ""
-        remedy = f"truth and scores are the centre's{before}: move it into view"
+        remedy = "truth and scores are the centre's: move it into view"
         found.append(Finding("warn", "objects", text, remedy))
     elif thing.corners_seen < facts.corners:
         text = f"{facts.corners - thing.corners_seen} of {facts.corners} corner cameras do not see {name}"
@@ -47,15 +45,7 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
     if thing.body_z_mm[0] <= 0:
         text = f"{name} reaches to z = {thing.body_z_mm[0]:.0f} mm, behind the cameras"
         found.append(Finding("warn", "objects", text, "what lies there is not seen; move it away"))
-    return found + _hidden(thing) + _cut(facts, thing)
-
-
-def _hidden(thing: ObjectFacts) -> list[Finding]:
-    if thing.hidden_share == 0 or not thing.z_mm.size:
-        return []
-    text = f"others hide {thing.hidden_share:.0%} of {thing.name} from the virtual centre"
-    much = thing.hidden_share > MOST_HIDDEN
-    return [Finding("warn" if much else "ok", "objects", text, "move one of them aside" if much else "")]
+    return found + _cut(facts, thing)
 
 
 def _cut(facts: Facts, thing: ObjectFacts) -> list[Finding]:
@@ -79,8 +69,6 @@ def _why_unseen(facts: Facts, thing: ObjectFacts) -> str:
         return f"it reaches behind the cameras, to z = {near:g} mm: move it away"
     if facts.backdrop_mm is not None and near >= facts.backdrop_mm:
         return f"it is behind the backdrop at {facts.backdrop_mm:g} mm"
-    if thing.hidden_by:
-        return f"it is hidden behind {listed(list(thing.hidden_by))}: move one of them aside"
     if thing.on_film is None or not thing.on_film.in_view:
         across, down = (
             side * facts.grid.pixel_mm / facts.grid.focal_mm * near / 2
@@ -99,7 +87,7 @@ def _too_small(facts: Facts, size_px: float) -> str:
     coarse_px = max(facts.grid.height, facts.grid.width) / max(facts.probe_px)
     if size_px < 2 * coarse_px:
         return f"it is {size_px:.1f} px large, and this coarse look has pixels of {coarse_px:.1f} px"
-    return "it is thinner than a pixel: turn it towards the cameras, or make it thicker"
+    return "something hides it, or it is thinner than a pixel: move what stands before it, or turn it"
 
 
 def _surely_metres(facts: Facts, thing: ObjectFacts) -> bool:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -179,18 +179,6 @@ def not_finite(render_scene: RenderScene, number: int) -> str:
         f"{what}: its radiance is not a finite number in the renderer's single precision; make lamps that "
         "are tiny or almost touch it larger, or move them away"
     )
-
-
-def alone(render_scene: RenderScene, number: int, *, with_lamps: bool) -> RenderScene:
-    """The same without backdrop and objects but for `number` (from 1), with or without area lights."""
-    numbers = render_scene.object_of_shape[shape_numbers(render_scene.scene)]
-    shapes = {
-        f"{OBJECT}{place}": shape
-        for place, (shape, own) in enumerate(zip(render_scene.scene.shapes(), numbers, strict=True))
-        if own == number or (with_lamps and own == 0 and shape.is_emitter())
-    }
-    scene = render_scene.mi.load_dict({"type": "scene"} | shapes, optimize=False)
-    return replace(render_scene, scene=scene)
 
 
 def shape_number(render_scene: RenderScene, hit: Any) -> Any:
