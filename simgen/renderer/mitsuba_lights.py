@@ -118,10 +118,10 @@ def _environment(
 
 
 def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
-    """The mean spectrum (N,) of all that shines, each at luminance 1."""
+    """The mean spectrum (N,) of all that shines, each at luminance 1; daylight if only Mitsuba files do."""
     emissions = [thing.material.emission for thing in scene.objects if thing.material.emission is not None]
     colours = [getattr(lamp, "illuminant", DAYLIGHT) for lamp in (*scene.lights, *emissions)]
-    return np.mean([light_spectrum(mi, colour) for colour in colours], axis=0)
+    return np.mean([light_spectrum(mi, colour) for colour in colours or [DAYLIGHT]], axis=0)
 
 
 def gain_for(

@@ -18,21 +18,20 @@ from simgen.base.strict_models import shorten, suggestion
 from simgen.renderer.backend import is_scalar, load_drjit
 from simgen.renderer.device_arrays import floats
 from simgen.renderer.emission import ShiningSurface
+from simgen.renderer.mitsuba_surfaces import is_spectral
 from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
 from simgen.spec.scene import NAME
 from simgen.spectral.filters import Filters
 from simgen.spectral.spectra import WAVELENGTH_NM, integral
 
-BRIGHTNESS = re.compile(
-    r"(?:(?:radiance|irradiance|intensity)\.(?:value|values|data|scale)|(?:sun_|sky_)?scale)"
-)
-"""Parameters that say how bright a light is; of each of them Mitsuba's lights have one."""
+BRIGHTNESS = re.compile(r"(?:radiance|irradiance|intensity)\.value|(?:sun_|sky_)?scale")
+"""Parameters that say how bright a light is; pictures that shine, and lights by temperature, have none."""
 AXES_OF_CAMERA = np.diag([-1.0, -1.0, 1.0])
 """Mitsuba's sensors have X to the left and Y up; the world X to the right and Y down."""
 UPRIGHT = np.diag([1.0, -1.0, -1.0])
 """Y up and Z towards the viewer, as models stand, to Y down and Z away from the cameras."""
-SAMPLES_OF_LIGHT = 1 << 12
+SAMPLES_OF_LIGHT = 1 << 14
 """Directions in which each light is looked for, when it is measured what it gives a plane."""
 FLAT = 1e-4
 """Shading normals that differ less from a face's own are taken to be its own."""
@@ -52,8 +51,13 @@ class Reference:
     def illuminance_lux(self, z_mm: float) -> float:
         """Illuminance, in the unit of the file's lights, of a surface at (0, 0, z) that faces the cameras.
 
-        Nothing stands in the way, as of the lights of a scene.toml.
+        Nothing stands in the way, as of the lights of a scene.toml. Raises `InputError` in spectral variants.
         """
+        if is_spectral(self.mi):
+            raise InputError(
+                "level: lights of a Mitsuba file have a level only where light is linear sRGB; leave it out, "
+                "or give a recipe without sensor.camera"
+            )
         mi, scene = self.mi, self.build({}, {"type": "path"}, 1.0)
         points, total = np.random.default_rng(0).random((SAMPLES_OF_LIGHT, 2)), 0.0
         point = self.frame.points(np.array([0.0, 0.0, z_mm]))
@@ -71,9 +75,8 @@ class Reference:
                     seen_from, mi.Point2f(*(floats(mi, column) for column in points.T))
                 )
                 towards, radiance = np.array(sample.d).T, np.array(weight).T[:, :3]
-            luminance = radiance @ LUMINANCE if radiance.shape[1] == 3 else radiance.mean(axis=1)
             cosine = np.maximum(-self.frame.world_directions(towards)[:, 2], 0)
-            total += float((luminance * cosine).mean())
+            total += float((radiance @ LUMINANCE * cosine).mean())
         return total
 
     def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> Any:
@@ -97,9 +100,17 @@ class Reference:
         scene = _instantiate(mi, config, state, self.path)
         for light in self._lights(scene, own) if gain != 1 else ():
             values = mi.traverse(light)
-            for name in filter(BRIGHTNESS.fullmatch, values.keys()):
+            by_name = [name for name in values.keys() if BRIGHTNESS.fullmatch(name)]  # noqa: SIM118 (no dict)
+            if not by_name:
+                raise InputError(
+                    f"level: {self.path} has lights that cannot be made brighter, such as pictures that "
+                    "shine; leave the level out"
+                )
+            # A light with a scale has a radiance beside it, and each of them alone makes it brighter.
+            for name in ["scale"] if "scale" in by_name else by_name:
                 values[name] = values[name] * gain
             values.update()
+        _try_to_render(mi, scene, self.path)
         return scene
 
     def _lights(self, scene: Any, own: Mapping[str, Any]) -> Iterator[Any]:
@@ -138,8 +149,7 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     camera that is not there.
     """
     path = folder / file.file
-    for _ in files_named_by(folder, file.file):
-        pass
+    list(files_named_by(folder, file.file))  # refuses what leads outside, before Mitsuba sees the file
     _, state = _parsed(mi, path)
     names: list[str] = []
     for number in _children(mi, state.root).values():
@@ -177,6 +187,17 @@ def _instantiate(mi: Any, config: Any, state: Any, path: Path) -> Any:
         return mi.parser.instantiate(config, state)
     except RuntimeError as fault:
         raise InputError(f"{path}: Mitsuba cannot build it: {_sentence(fault)}") from None
+
+
+def _try_to_render(mi: Any, scene: Any, path: Path) -> None:
+    """`InputError` for plugins that can be built and not rendered, such as a temperature without spectra."""
+    film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
+    sensor = mi.load_dict({"type": "perspective", "film": film, "sampler": {"type": "independent"}})
+    try:
+        np.array(mi.render(scene, sensor=sensor, spp=1, seed=0))
+    except RuntimeError as fault:
+        reason = fault.__cause__ or fault.__context__ or fault
+        raise InputError(f"{path}: Mitsuba cannot render it: {_sentence(reason)}") from None
 
 
 def _sentence(fault: BaseException) -> str:
