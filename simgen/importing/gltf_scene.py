@@ -162,8 +162,8 @@ class _Reader:
         if not {"JOINTS_0", "WEIGHTS_0"} <= primitive.attributes.keys():
             raise self.gltf.fault(f"{where}: a mesh with a skin needs JOINTS_0 and WEIGHTS_0")
         joints = np.array([self.places.get(joint, np.eye(4)) for joint in skins[skin].joints])
-        if skins[skin].inverse_bind_matrices is not None:
-            number = skins[skin].inverse_bind_matrices
+        number = skins[skin].inverse_bind_matrices
+        if number is not None:
             inverse = numbers(self.gltf, number, where, "MAT4", len(joints)).reshape(-1, 4, 4)
             joints = joints[: len(inverse)] @ inverse.transpose(0, 2, 1)
         which, weight = (
