@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from simgen.dataset.software import versions as dataset_versions
+from simgen.dataset.dataset_folder import versions as dataset_versions
 from simgen.renderer import backend
 
 PEERS = ("scipy", "numba", "colour-science", "colour-demosaicing")

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from simgen.app.preview_picture import draw_preview
 from simgen.check.targets import load_target
-from simgen.figures.preview_picture import draw_preview
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene_lookup import load_scene
 

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
         preview,
     )
     from simgen.app.without_files import draw_photons, render
-    from simgen.importing.scene_folder import ImportedScene
-    from simgen.importing.scene_import import import_scene
+    from simgen.importing.scene_import import ImportedScene, import_scene
     from simgen.spec.camera_grid import CalibrationErrors, Lens
     from simgen.spec.lights import (
         AreaLight,

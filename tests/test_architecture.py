@@ -50,10 +50,7 @@ ROOMS = {
         "truth",
         "photons",
         "dataset",
-        "collection",
-        "benchmark",
         "check",
-        "figures",
         "app",
     ],
 }
@@ -76,8 +73,8 @@ LONGER = {
 }
 # Where a whole recipe is known, beside the commands: everything else takes parts of it.
 KNOW_RECIPE = {
-    "simgen.benchmark.benchmark_datasets",
-    "simgen.collection.series",
+    "simgen.dataset.benchmark_datasets",
+    "simgen.dataset.dataset_collection",
     "simgen.check.targets",
     "simgen.dataset.generation",
     "simgen.dataset.prepared",

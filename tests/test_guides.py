@@ -20,8 +20,7 @@ from pcii.exporting.card_files import write_card
 from pcii.exporting.publication_terms import Terms
 from pcii.figures.pictures import write_png
 from pcii.io.sample_dataset import copy_sample
-from simgen.base.overrides import override
-from simgen.spec.recipe import Recipe
+from simgen.spec.recipe import Recipe, override
 
 DOCS = ROOT / "docs"
 SLOW = {"first_hour.md", "your_own_images.md"}

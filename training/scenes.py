@@ -5,8 +5,7 @@ from random import Random
 from typing import Any
 
 import simgen
-from simgen.drawn.composition import box_of, card, cylinder_of, placed, sphere
-from simgen.drawn.surfaces import colour
+from simgen.drawn.composition import box_of, card, colour, cylinder_of, placed, sphere
 
 Table = dict[str, Any]
 

@@ -15,7 +15,7 @@ from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.timing import median_of
 from pcii.base.executor import ALONE, Executor
 from pcii.io.collection import open_collection
-from simgen.collection.whole_collection import generate_collection
+from simgen.dataset.dataset_collection import generate_collection
 from simgen.spec.sweeps import load_sweep
 
 if TYPE_CHECKING:

@@ -53,8 +53,8 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from simgen.benchmark.definition import load_definition
-    from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark
+    from simgen.dataset.definition import load_definition
+    from simgen.dataset.making import CERTIFICATE, certify, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)

@@ -108,7 +108,7 @@ def generate(
         Run the Python function that a recipe file names as its scene: only if you trust its author.
     """
     from pcii.exporting.card_files import write_card
-    from simgen.collection.whole_collection import generate_collection
+    from simgen.dataset.dataset_collection import generate_collection
     from simgen.dataset.generation import generate as make
     from simgen.renderer import backend
     from simgen.spec.sweeps import load_sweep
@@ -161,7 +161,7 @@ def sheet(dataset: Path, *, out: Out) -> None:
     out
         The picture to write, .png or .jpg, in a folder that exists.
     """
-    from simgen.figures.contact_sheet import write_sheet
+    from simgen.app.contact_sheet import write_sheet
 
     write_sheet(dataset, out)
     say(f"{out}")

@@ -10,11 +10,11 @@ from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.exporting.card_files import write_card
 from pcii.io.collection import Collection, open_collection
+from simgen.app.picture_parts import check_picture_path
+from simgen.app.preview_picture import Preview, draw_preview
 from simgen.check.targets import load_target, target_of_scene
-from simgen.collection import whole_collection as collections
+from simgen.dataset import dataset_collection as collections
 from simgen.dataset import generation
-from simgen.figures.picture_parts import check_picture_path
-from simgen.figures.preview_picture import Preview, draw_preview
 from simgen.spec import recipe as recipes
 from simgen.spec import scene_lookup
 from simgen.spec.recipe import Recipe

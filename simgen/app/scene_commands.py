@@ -116,7 +116,7 @@ def check(
     json
         Print the findings as JSON.
     """
-    from simgen.check.linter import lint
+    from simgen.check.targets import lint
 
     line, findings = lint(target, set, scene, trust_python=trust_python)
     bad = sum(finding.verdict == "bad" for finding in findings)
@@ -167,9 +167,9 @@ def preview(
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
+    from simgen.app.picture_parts import check_picture_path
+    from simgen.app.preview_picture import draw_preview
     from simgen.check.targets import load_target
-    from simgen.figures.picture_parts import check_picture_path
-    from simgen.figures.preview_picture import draw_preview
     from simgen.spec.recipe import recipe_file
     from simgen.spec.scene_lookup import is_scene
 

@@ -6,8 +6,6 @@ depths            Findings on depth: disparities, how far objects stand apart in
                   colours that alias.
 expected_photons  Findings on photons: who sends them, how many an object and a voxel get, and how many
                   come by mistake.
-linter            `simgen check`: what a scene or recipe will give, found without rendering it, but for
-                  one coarse probe.
 scene_facts       What a coarse look at a scene shows, and what follows from it: the types of `simgen
                   check`.
 scene_probe       The coarse probe of `simgen check`: what few, large pixels of the centre and of the

@@ -10,8 +10,28 @@ from typing import Any
 from pcii.base.errors import BusyError, InputError
 from pcii.io.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
 from pcii.io.dataset_writer import check_held
+from pcii.store import software
 from pcii.store.safe_files import locked
-from simgen.dataset.software import DECISIVE, other_versions, versions
+from pcii.store.software import PACKAGE
+
+DECISIVE = (PACKAGE, "mitsuba")
+"""Packages whose versions are part of what identifies a dataset."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that make datasets."""
+    return software.versions(*DECISIVE, "drjit", "numpy", "zarr")
+
+
+def decisive_versions() -> dict[str, str]:
+    """Versions that identify a dataset, with its recipe and scene."""
+    return software.versions(*DECISIVE)
+
+
+def other_versions(recorded: Mapping[str, str]) -> str:
+    """How the decisive versions recorded differ from those here, in words; empty if they are the same."""
+    known = {name: number for name, number in recorded.items() if name in DECISIVE}
+    return software.differences(known, decisive_versions())
 
 
 def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:

@@ -7,5 +7,4 @@ clutter      Kinds of drawn scenes that are full: heaps of cards, rooms, leaves.
 composition  What drawn scenes are composed of: depths, objects that stand there, lamps.
 desks        Kinds of drawn scenes that are arranged: solids that stand on a desk, something behind leaves.
 few_solids   Kinds of drawn scenes with two or three solids before a dark backdrop.
-surfaces     Materials of drawn scenes: plain, patterned, glossy.
 """

@@ -6,13 +6,16 @@ from simgen.drawn.composition import (
     REFERENCE_MM,
     box_of,
     card,
+    colour,
     drawn_scene,
+    noise,
+    pattern,
     placed,
+    plain,
     planes_apart,
     solid,
     two_planes,
 )
-from simgen.drawn.surfaces import colour, noise, pattern, plain
 from simgen.spec.scene import Scene
 
 

@@ -3,8 +3,17 @@
 import math
 from random import Random
 
-from simgen.drawn.composition import Table, box_of, card, cylinder_of, placed, sphere
-from simgen.drawn.surfaces import chessboard, colour, noise
+from simgen.drawn.composition import (
+    Table,
+    box_of,
+    card,
+    chessboard,
+    colour,
+    cylinder_of,
+    noise,
+    placed,
+    sphere,
+)
 from simgen.spec.scene import Scene, scene_of
 
 DESK_TOP_MM = 65.0

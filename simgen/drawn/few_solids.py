@@ -8,15 +8,18 @@ from simgen.drawn.composition import (
     REFERENCE_MM,
     Table,
     box_of,
+    chessboard,
     cylinder_of,
     drawn_scene,
+    glossy,
+    pattern,
     placed,
+    plain,
     planes_apart,
     solid,
     sphere,
     two_planes,
 )
-from simgen.drawn.surfaces import chessboard, glossy, pattern, plain
 from simgen.spec.scene import Scene
 
 

@@ -8,8 +8,6 @@ gltf_file       A glTF file and the bytes that it names: JSON or its binary form
 gltf_materials  Materials of a glTF file as ours: what its metallic-roughness model says in numbers and
                 pictures.
 gltf_models     What of a glTF file's JSON is read, as models that check it.
-gltf_pictures   Pictures that a glTF file names or holds.
 gltf_scene      A glTF file as a foreign scene: its nodes, meshes, cameras and lights (sections 3.5 to 3.10).
-scene_folder    A foreign scene as a folder of its own: scene.toml, meshes as PLY, pictures as PNG.
 scene_import    From a scene file of another program to a scene's folder.
 """

@@ -3,23 +3,27 @@
 Sections 3.9 and 5.19 of the specification, and KHR_materials_*. Factors multiply pictures in linear light.
 """
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
+from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_texture
 from simgen.assets.cutouts import cut_out
 from simgen.assets.mesh_points import bears_pictures_once
 from simgen.assets.triangles import Triangles
-from simgen.base.srgb import srgb_of
 from simgen.importing.foreign_scene import ForeignScene
 from simgen.importing.gltf_file import GltfFile
 from simgen.importing.gltf_models import Material, MaterialExtensions, Texture, TextureInfo
-from simgen.importing.gltf_pictures import pictures_of
 from simgen.spec.materials import LEAST_INDEX, MOST_INDEX
+from simgen.spectral.spectra import srgb_of
 
 HALF = 0.5
 BORDER = 1e-4
@@ -30,6 +34,49 @@ OPAQUE, MASK, BLEND = "OPAQUE", "MASK", "BLEND"
 NEAREST = 9728
 DEFAULT = Material()
 BACKS = "backs of surfaces that are not there from behind (doubleSided false): they look like the fronts"
+
+
+def pictures_of(gltf: GltfFile) -> dict[int, np.ndarray]:
+    """Pixels of the images that textures name, (H, W, 3) or with alpha (H, W, 4), uint8 or uint16, by number.
+
+    Raises `InputError`, naming the image, for one that is missing or cannot be decoded.
+    """
+    wanted = sorted({texture.source for texture in gltf.document.textures if texture.source is not None})
+    found: dict[int, np.ndarray] = {}
+    with _on_disk(gltf, wanted) as paths:
+        total = 0
+        for number, path in paths.items():
+            try:
+                found[number] = read_texture(path, alpha=True, as_stored=True)
+            except InputError as fault:
+                sentence = str(fault).removeprefix(f"{path}: ")
+                raise gltf.fault(f"images[{number}]: {sentence}") from None
+            total += found[number].nbytes
+            if total > LARGEST_TOTAL_BYTES:
+                raise gltf.fault(f"its images take more than {LARGEST_TOTAL_BYTES} bytes; make them smaller")
+    return found
+
+
+@contextmanager
+def _on_disk(gltf: GltfFile, numbers: list[int]) -> Iterator[dict[int, Path]]:
+    """Images as files."""
+    images = gltf.document.images
+    with tempfile.TemporaryDirectory() as folder:
+        paths: dict[int, Path] = {}
+        for number in numbers:
+            where = f"images[{number}]"
+            if number >= len(images):
+                raise gltf.fault(f"textures: there is no {where}")
+            image = images[number]
+            if image.uri is not None:
+                content = gltf.named_bytes(image.uri, f"{where}.uri")
+            elif image.buffer_view is not None:
+                content, _ = gltf.view(image.buffer_view, f"{where}.bufferView")
+            else:
+                raise gltf.fault(f"{where}: it has neither a uri nor a bufferView")
+            paths[number] = Path(folder) / f"{number}"
+            paths[number].write_bytes(content.tobytes())
+        yield paths
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,13 +6,14 @@ from dataclasses import dataclass, field, replace
 from pcii.base.errors import InputError
 from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
-from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.cameras.rig import Rig
 from simgen.photons.candidates import Setup
 from simgen.photons.exploration import Exploration, explore
 from simgen.photons.rendering_noise import Probe, first_hit_depths_mm, probe
 from simgen.spec.recipe import MOST_PATHS, Photons
 
+ROUNDING = 1.05
+"""Two digits are off by up to 5 %: what is said to fit, divided by this before it is rounded, does so."""
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 """Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
 `make bench` on two cores; only their ratios matter."""
@@ -27,6 +28,15 @@ MOST_SINGLE_PHOTONS = 1 << 25
 only counted."""
 MOST_THINNED_PHOTONS = 1e10
 """So many are drawn at most, which takes two cores four hours, as a hundred views of `MOST_PATHS` do."""
+
+
+def two_digits(value: float) -> str:
+    """A number with two digits.
+
+    >>> two_digits(1234.0), two_digits(0.0456)
+    ('1200', '0.046')
+    """
+    return f"{float(f'{value:.2g}'):g}"
 
 
 @dataclass(frozen=True, eq=False)

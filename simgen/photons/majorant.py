@@ -20,8 +20,8 @@ from copy import copy
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.base.neighbourhoods import over_squares
 from simgen.photons.disparity_layers import DisparityLayers, Samples
+from simgen.truth.pixel_coverage import over_squares
 
 COARSE_TILES = 8
 """Coarse tiles are 8 x 8 tiles."""

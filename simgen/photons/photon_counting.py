@@ -14,9 +14,8 @@ from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.dataset_writer import write_counts as save_counts
 from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
-from simgen.base.round_numbers import ROUNDING, two_digits
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan
+from simgen.photons.counting_plan import ROUNDING, Capture, Plan, two_digits
 from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import places, thin_photons
 from simgen.sensor.detector import detect, nested_subset

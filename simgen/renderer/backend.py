@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.base.errors import InputError
-from simgen.base.machine_cache import kept
+from simgen.base.locations import kept
 
 NEEDED = ("mitsuba", "drjit")
 Kind = Literal["cuda", "llvm", "scalar"]

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
-from simgen.cameras.rig import Camera, Rig
+from simgen.cameras.rig import Camera, Rig, film_slopes, slopes_behind_lens
 from simgen.renderer.backend import load_drjit
 from simgen.renderer.device_arrays import floats
 from simgen.renderer.mitsuba_scene import RenderScene

@@ -1,7 +1,6 @@
 """What a sensor makes of light: mosaic, faults, exposure.
 
 detector       What a real sensor makes of the photons that arrive: losses, false counts. All off by default.
-exposure       Absolute exposure: how many photons a pixel catches of a scene's light.
 frame_readout  Frames of an exposure: in which of them a photon is counted, and where the pixel's counter
                stops.
 mosaic         Colours that a sensor's pixels take, and photon counts drawn from expected ones.

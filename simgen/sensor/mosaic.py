@@ -3,14 +3,25 @@
 Expected photons are those of `pcii.core.photon_limit`: the budget shared out over the recipe's `scope`.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.bayer import colour_index
-from simgen.spec.recipe import Photons, Sensor
+from simgen.spec.recipe import Exposure, Photons, Sensor
 from simgen.spectral.camera_curves import sensitivity
+
+PHOTONS_PER_LUMEN_SECOND = 555e-9 / (683 * 6.62607015e-34 * 299792458)
+"""Photons of 555 nm; CODATA values of h and c, SI value of the luminous efficacy."""
+
+
+def photons_per_radiance(exposure: Exposure, pixel_mm: float) -> float:
+    """Photons that arrive at a pixel during the exposure for each cd/m^2 that it looks at."""
+    illuminance_per_luminance = math.pi / (4 * exposure.f_number**2)
+    pixel_m2 = (pixel_mm * 1e-3) ** 2
+    return PHOTONS_PER_LUMEN_SECOND * illuminance_per_luminance * pixel_m2 * exposure.time_s
 
 
 def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:

@@ -1,5 +1,6 @@
 """Recipes: one TOML file a dataset, resolved and validated before anything is rendered."""
 
+import tomllib
 from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -12,7 +13,6 @@ from pcii.core.bayer import PATTERNS
 from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from pcii.exporting.publication_terms import Terms
 from simgen.base.locations import find, recipe_roots
-from simgen.base.overrides import override
 from simgen.base.strict_models import (
     Count,
     NonNegative,
@@ -53,6 +53,35 @@ SEED_LIMIT = 1 << 63
 """Seeds are less."""
 APERTURE_TOLERANCE = 0.01
 """F-numbers are rounded by about so much."""
+
+
+def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
+    """Put values given as `key=value` into what a recipe says; raises `InputError` for any other text."""
+    for text in overrides:
+        _override(values, text)
+
+
+def _override(values: dict[str, Any], text: str) -> None:
+    key, equals, value = text.partition("=")
+    if not equals or not all(key.split(".")):
+        raise InputError(f"--set: expected key=value such as photons.budget=300, got {text!r}")
+    *tables, last = key.split(".")
+    target = values
+    for table in tables:
+        target = target.setdefault(table, {})
+        if not isinstance(target, dict):
+            raise InputError(f"--set: {table!r} in {key!r} is a value, not a table")
+    try:
+        target[last] = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        if value.startswith(("[", "{")):
+            raise InputError(
+                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, "
+                'as in \'scene=["two_objects", "overlap"]\''
+            ) from None
+        target[last] = value
+
+
 assert set(Cfa.__args__) == {*PATTERNS, "none"}
 
 

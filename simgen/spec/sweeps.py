@@ -18,9 +18,8 @@ from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.store.hashes import hash_json
-from simgen.base.overrides import override
 from simgen.base.strict_models import validate
-from simgen.spec.recipe import Recipe, read_recipe, recipe_file
+from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
 from simgen.spec.scene_lookup import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000

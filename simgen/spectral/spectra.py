@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.srgb import LUMINANCE
-from simgen.base.machine_cache import kept
-from simgen.base.srgb import FROM_XYZ
+from pcii.base.srgb import LUMINANCE, linear_to_srgb
+from simgen.base.locations import kept
 from simgen.base.strict_models import suggestion
 
+FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
+"""From CIE XYZ to linear sRGB."""
 WAVELENGTH_NM = np.arange(380.0, 781.0)
 PEAK_NM = 555.0
 """Where a lumen is 1/683 W."""
@@ -27,6 +28,11 @@ DAYLIGHT = "D65"
 CHART = "ColorChecker N Ohta"
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
 KINDS = OBSERVERS, ILLUMINANTS, PATCHES = "observers", "illuminants", "patches"
+
+
+def srgb_of(linear: np.ndarray) -> list[float]:
+    """Linear values (3,), cut to 0 to 1, as sRGB of six digits."""
+    return [round(float(part), 6) for part in linear_to_srgb(linear)]
 
 
 def integral(values: np.ndarray) -> Any:

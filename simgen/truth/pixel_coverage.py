@@ -1,8 +1,9 @@
 """Where between pixels objects end: the share of each pixel that its centre's object covers."""
 
+from functools import reduce
+
 import numpy as np
 
-from simgen.base.neighbourhoods import over_squares
 from simgen.cameras.rig import Camera
 from simgen.renderer.intersection import first_objects
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -13,6 +14,20 @@ SAMPLES = 233
 _GENERATOR = 144
 PART = 1 << 13
 """Pixels that are sampled at once."""
+
+
+def over_squares(pick: np.ufunc, values: np.ndarray, side: int) -> np.ndarray:
+    """`pick`, as `numpy.maximum`, over every square of `side` x `side` places that lies in a map (H, W).
+
+    (H - `side` + 1, W - `side` + 1): pad the map first for values up to its border.
+
+    >>> over_squares(np.maximum, np.array([[1, 0, 0, 2], [0, 3, 0, 0]]), 2).tolist()
+    [[3, 3, 2]]
+    """
+    for _ in range(2):  # along rows, then along columns
+        count = len(values) - side + 1
+        values = reduce(pick, (values[first : first + count] for first in range(side))).T
+    return values
 
 
 def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -> np.ndarray:

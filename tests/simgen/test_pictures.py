@@ -21,10 +21,9 @@ from pcii.figures.pictures import to_srgb8
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_writer import save_dataset
 from simgen.app import commands as cli
+from simgen.app.contact_sheet import photon_block_px, photon_tiles, radiance_tiles, write_sheet
+from simgen.app.picture_parts import part_of_interest
 from simgen.dataset.generation import generate
-from simgen.figures.contact_sheet import write_sheet
-from simgen.figures.picture_parts import part_of_interest
-from simgen.figures.thumbnails import photon_block_px, photon_tiles, radiance_tiles
 from simgen.spec.recipe import Recipe
 
 
@@ -77,7 +76,7 @@ def test_a_sheets_panels_have_room_and_do_not_overlap(
     light = Views(np.random.default_rng(0).random((*shape, 3)).astype(np.float32), films)
     save_dataset(tmp_path / "d", (counts, light), truth, z_mm=[540], title="Of any shape")
     drawn: list[Any] = []
-    monkeypatch.setattr("simgen.figures.contact_sheet.save_figure", lambda figure, _: drawn.append(figure))
+    monkeypatch.setattr("simgen.app.contact_sheet.save_figure", lambda figure, _: drawn.append(figure))
     write_sheet(tmp_path / "d", tmp_path / "sheet.png")
     (figure,) = drawn
     figure.canvas.draw()
@@ -128,7 +127,7 @@ def test_a_folder_that_may_not_be_written_is_told(tmp_path: Path, monkeypatch: p
 
     simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
     assert_shows_something(tmp_path / "x.png")
-    monkeypatch.setattr("simgen.figures.picture_parts.write_bytes_safely", refuse)
+    monkeypatch.setattr("simgen.app.picture_parts.write_bytes_safely", refuse)
     with pytest.raises(InputError, match=r"x.png: cannot be written here \(Permission denied\)$"):
         simgen.preview("two_objects", tmp_path / "x.png", samples_per_pixel=1)
 
@@ -185,7 +184,7 @@ def test_full_light_is_shown_in_its_colours_whatever_the_part(cfa: str | None) -
 
 
 def test_a_sheet_names_its_cameras_and_photons(nested_dataset: Path) -> None:
-    from simgen.figures.contact_sheet import facts
+    from simgen.app.contact_sheet import facts
 
     dataset = open_dataset(nested_dataset)
     cameras, light = facts(dataset, dataset.counts)

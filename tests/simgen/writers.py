@@ -57,11 +57,10 @@ class Writer:
 def main(log: Path) -> None:
     from pcii.base import command_line
     from simgen.app import commands
-    from simgen.collection import whole_collection
-    from simgen.dataset import generation, prepared
+    from simgen.dataset import dataset_collection, generation, prepared
     from simgen.renderer import backend
 
-    assert whole_collection
+    assert dataset_collection
     backend.load()
     work, load = generation._work, prepared.Prepared.render_scene
 

@@ -17,14 +17,12 @@ from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities
 from simgen.cameras.calibration import turn
-from simgen.cameras.chief_rays import film_slopes, slopes_behind_lens
-from simgen.cameras.rig import as_rig, with_larger_pixels
+from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.thinning import WAVEFRONT, candidates_needed, places
 from simgen.sensor.detector import detect, full_light_image, nested_subset
-from simgen.sensor.exposure import photons_per_radiance
 from simgen.sensor.frame_readout import read_out
-from simgen.sensor.mosaic import draw_counts, fixed_totals
+from simgen.sensor.mosaic import draw_counts, fixed_totals, photons_per_radiance
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import Grid, Lens
 from simgen.spec.recipe import Exposure, FullLight, Photons, Recipe, Sensor

@@ -10,7 +10,7 @@ from pcii.base.errors import InputError
 from pcii.io.verification import verify
 from simgen.app import commands as simgen_cli
 from simgen.app.starting_points import write_new_recipe, write_new_scene
-from simgen.check.linter import lint
+from simgen.check.targets import lint
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene_lookup import load_scene
 

@@ -6,8 +6,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.cameras.film_windows import covered_px, object_windows
 from simgen.cameras.rig import Camera
+from simgen.renderer.radiance import covered_px, object_windows
 from simgen.spec.camera_grid import Lens
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.2, height=150, width=200)

@@ -37,10 +37,10 @@ from simgen.check.depths import (
     separation_findings,
 )
 from simgen.check.expected_photons import photon_findings, photons_per_view
-from simgen.check.linter import findings
 from simgen.check.scene_facts import Facts, Finding, ObjectFacts
 from simgen.check.scene_probe import coarser, probe_scene
 from simgen.check.sight import sight_findings
+from simgen.check.targets import findings
 from simgen.dataset.prepared import Prepared, needs_of
 from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes
 from simgen.photons.counting_plan import Plan

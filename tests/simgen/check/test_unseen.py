@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.check.linter import findings
 from simgen.check.scene_facts import Finding
 from simgen.check.scene_probe import on_film, probe_scene
+from simgen.check.targets import findings
 from simgen.dataset.prepared import Prepared
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene

@@ -17,7 +17,7 @@ from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.exposure import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
+from simgen.sensor.mosaic import PHOTONS_PER_LUMEN_SECOND, photons_per_radiance
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Exposure, Recipe
 from simgen.spec.scene import Scene

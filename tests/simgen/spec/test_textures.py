@@ -11,8 +11,7 @@ from property_settings import at_least
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from simgen.assets.pattern_areas import square_wave
-from simgen.assets.texture_pixels import paint
+from simgen.assets.texture_pixels import paint, square_wave
 from simgen.renderer.mitsuba_surfaces import aspect_of
 from simgen.spec.shapes import Card, Mesh, Sphere
 from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture

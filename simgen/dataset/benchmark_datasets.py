@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES
-from simgen.benchmark.definition import Definition, Scene
+from simgen.dataset.definition import Definition, Scene
 from simgen.spec.recipe import Recipe, load_recipe
 
 Light = Literal["photons", "frames", "full-light"]

@@ -1,6 +1,10 @@
 """Making a benchmark: all of its datasets as one collection, and the certificate of what they are."""
 
 import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -10,18 +14,55 @@ from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.io.collection import open_collection
 from pcii.io.collection_layout import Half
+from pcii.io.evaluation_layout import read_evaluation
 from pcii.store.hashes import hash_json
 from pcii.store.safe_files import write_json_safely
 from simgen.base.strict_models import suggestion
-from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
-from simgen.benchmark.certificate import Content, Verdict, compare, content_of
-from simgen.benchmark.definition import Definition
-from simgen.benchmark.reference_method import Scores, differing_scores, reference_scores
-from simgen.collection.whole_collection import generate_collection
-from simgen.dataset.software import versions
+from simgen.dataset.benchmark_datasets import BenchmarkDatasets
+from simgen.dataset.certificate import Content, Verdict, compare, content_of
+from simgen.dataset.dataset_collection import generate_collection
+from simgen.dataset.dataset_folder import versions
+from simgen.dataset.definition import Definition
 from simgen.renderer import backend
 
+METHOD = "brightness"
+"""In focus is what is bright: the simplest method of removal."""
+PHOTONS_PER_VIEW = 1000.0
+TOLERANCE = 0.02
+"""Means that are closer say nothing: the interval of three draws may be narrow by chance."""
+Scores = Mapping[str, Mapping[str, Any]]
+"""By scene: `mean` IoU over seeds and its 95 % `interval`."""
 CERTIFICATE = "certificate.json"
+
+
+def reference_scores(benchmark: Path, halves: Iterable[Half]) -> dict[str, Mapping[str, Any]]:
+    """IoU of `METHOD` on each scene of these halves; `InputError` if `pcii benchmark run` fails."""
+    found: dict[str, Mapping[str, Any]] = {}
+    for half in halves:
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "scores"
+            words = ["benchmark", "run", METHOD, "--budget", f"{PHOTONS_PER_VIEW:g}", "--half", half]
+            run = "import sys; from pcii.app.commands import main; sys.exit(main())"
+            command = [sys.executable, "-c", run, *words, "--data", str(benchmark), "-o", str(out)]
+            if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
+                raise InputError(f"certificate: `pcii {' '.join(words)}` failed, as said above")
+            for group in read_evaluation(out)["groups"]:
+                (result,) = group["results"]
+                if (iou := result["object"]["iou"]) is not None and iou["interval"] is not None:
+                    found[group["title"]] = {"mean": iou["mean"], "interval": iou["interval"]}
+    return found
+
+
+def differing_scores(own: Scores, published: Scores) -> list[str]:
+    """A sentence for each scene whose interval has nothing in common with the published one."""
+    problems = []
+    for scene in own.keys() & published.keys():
+        (low, high), (least, most) = (scores[scene]["interval"] for scores in (own, published))
+        apart = abs(own[scene]["mean"] - published[scene]["mean"])
+        if (high < least or most < low) and apart > TOLERANCE:
+            means = f"{own[scene]['mean']:.3f} instead of {published[scene]['mean']:.3f}"
+            problems.append(f"{scene}: the method {METHOD!r} has an IoU of {means} there")
+    return sorted(problems)
 
 
 def scenes_of(definition: Definition, half: Half | None, names: tuple[str, ...]) -> tuple[str, ...]:

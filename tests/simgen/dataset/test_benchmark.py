@@ -15,11 +15,17 @@ from pcii.base.executor import Executor
 from pcii.io.verification import verify
 from pcii.store.hashes import hash_json
 from simgen.app.commands import app
-from simgen.benchmark.benchmark_datasets import BenchmarkDatasets
-from simgen.benchmark.certificate import compare
-from simgen.benchmark.definition import Definition, benchmark_files, load_definition
-from simgen.benchmark.making import CERTIFICATE, certify, make_benchmark, published_certificate
-from simgen.benchmark.reference_method import differing_scores, reference_scores
+from simgen.dataset.benchmark_datasets import BenchmarkDatasets
+from simgen.dataset.certificate import compare
+from simgen.dataset.definition import Definition, benchmark_files, load_definition
+from simgen.dataset.making import (
+    CERTIFICATE,
+    certify,
+    differing_scores,
+    make_benchmark,
+    published_certificate,
+    reference_scores,
+)
 
 pytestmark = pytest.mark.renders
 

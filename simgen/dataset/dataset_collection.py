@@ -1,11 +1,14 @@
-"""The folder of a collection that is being made: whose it is, and the index of what is finished."""
+"""Many datasets as one collection: a series of recipes, each made as a job, one index for all of them."""
 
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
+from pcii.base.progress import Report, silent
 from pcii.io.collection_layout import (
     COLLECTION,
     COLLECTION_FOLDER,
@@ -19,11 +22,48 @@ from pcii.io.collection_layout import (
     write_index,
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
-from pcii.store.safe_files import locked, temporaries_of
-from simgen.collection.series import Series
-from simgen.dataset.software import decisive_versions, other_versions
+from pcii.store.safe_files import locked, named_in_errors, temporaries_of
+from simgen.dataset.dataset_folder import decisive_versions, finished, other_versions
+from simgen.dataset.generation import make
+from simgen.dataset.prepared import prepare
+from simgen.dataset.reuse import Reuse
+from simgen.renderer import backend
+from simgen.spec.recipe import Recipe
 
 Row = Mapping[str, Any]
+
+
+class Series(Protocol):
+    """Datasets of one collection, in order; a sweep over the fields of a recipe is one."""
+
+    @property
+    def fields(self) -> Sequence[str]:
+        """Names of what distinguishes the datasets."""
+        ...
+
+    @property
+    def base(self) -> Mapping[str, Any]:
+        """What all datasets have in common."""
+        ...
+
+    @property
+    def recipe_folder(self) -> Path:
+        """Where files are that recipes name."""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def values(self, number: int) -> Mapping[str, Any]:
+        """Value of each of the fields of a dataset."""
+        ...
+
+    def folder(self, number: int) -> str:
+        """Name of a dataset's folder, the same whatever other datasets there are."""
+        ...
+
+    def recipe(self, number: int) -> Recipe:
+        """The recipe of a dataset; raises `InputError` if its values make none."""
+        ...
 
 
 def begin(series: Series, out: Path) -> None:
@@ -121,3 +161,64 @@ def _known(out: Path) -> list[dict[str, Any]]:
             continue
         rows.append(row)
     return rows
+
+
+class DatasetJob:
+    """Makes datasets of `series` in the folder `out`; keeps what one has in common with the next."""
+
+    def __init__(self, series: Series, out: Path) -> None:
+        self.series, self.out, self.reuse = series, out, Reuse()
+        self.versions = decisive_versions()
+
+    def __call__(self, piece: int) -> Row:
+        """Make one dataset, unless it is finished; its row of the index.
+
+        Raises `BusyError` if another process is at it, `InputError` if it cannot be made, or if this process
+        has other versions of the software than the one that made the job.
+        """
+        differ = other_versions(self.versions)
+        if differ:
+            raise InputError(
+                f"{self.name(piece)}: the collection is made with other software ({differ}); install that"
+            )
+        prepared = prepare(self.series.recipe(piece), self.series.recipe_folder)
+        folder = self.out / self.series.folder(piece)
+        # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
+        manifest = finished(folder, prepared.identity, content=False)
+        return row_of(self.series, piece, self.out, manifest or make(prepared, folder, silent, self.reuse))
+
+    def name(self, piece: int) -> str:
+        """The dataset's folder."""
+        return str(self.out / self.series.folder(piece))
+
+    def use_threads(self, count: int) -> None:
+        """Let the renderer run on so many threads."""
+        backend.use_threads(count)
+
+
+def generate_collection(
+    series: Series, out: Path, executor: Executor = ALONE, report: Report = silent
+) -> list[str]:
+    """Make all datasets of a series in the folder `out`, or go on with them; faults of those that failed.
+
+    A dataset that cannot be made holds up no other. The index is written at the end, also of work that is
+    interrupted. Raises `InputError` for a folder that holds anything else, and what is no fault of a
+    single dataset, such as a full disk.
+    """
+    backend.choose()  # before work is distributed: a missing backend is reported once
+    out = out.resolve()
+    with named_in_errors(out):
+        begin(series, out)
+    rows, faults, pieces = dict[int, Row](), list[str](), range(len(series))
+    try:
+        with closing(executor.run(DatasetJob(series, out), pieces, report)) as work:
+            for done in work:
+                if done.result is None:
+                    faults.append(done.fault)
+                else:
+                    rows[done.piece] = done.result
+                report("datasets", len(rows) + len(faults), len(pieces))
+    finally:
+        with named_in_errors(out):
+            write_whole_index(series, out, rows)
+    return faults

@@ -20,8 +20,8 @@ from pcii.io.dataset_layout import CARD, CROISSANT, MARKER
 from pcii.io.verification import verify
 from pcii.store import software
 from simgen.app import commands as cli
-from simgen.collection import dataset_job
-from simgen.collection.whole_collection import generate_collection
+from simgen.dataset import dataset_collection
+from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import load_recipe
 from simgen.spec.sweeps import Sweep, load_sweep
@@ -79,8 +79,10 @@ def test_what_is_finished_is_left_alone_and_what_is_missing_is_made(
 ) -> None:
     out = tmp_path / "copy"
     shutil.copytree(collection, out)
-    made, original = [], dataset_job.make
-    monkeypatch.setattr(dataset_job, "make", lambda *given: made.append(given[1].name) or original(*given))
+    made, original = [], dataset_collection.make
+    monkeypatch.setattr(
+        dataset_collection, "make", lambda *given: made.append(given[1].name) or original(*given)
+    )
     assert generate_collection(sweep_of(recipe_file), out) == []
     assert made == []
     assert (out / INDEX).read_bytes() == (collection / INDEX).read_bytes()
@@ -158,7 +160,7 @@ def test_the_same_recipe_written_otherwise_is_the_same_collection(collection: Pa
 def test_other_software_neither_extends_a_collection_nor_works_on_it(
     recipe_file: Path, collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    job, original = dataset_job.DatasetJob(sweep_of(recipe_file), tmp_path), software.version
+    job, original = dataset_collection.DatasetJob(sweep_of(recipe_file), tmp_path), software.version
     monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)

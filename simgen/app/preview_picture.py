@@ -10,9 +10,7 @@ from pcii.base.errors import InputError
 from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import to_srgb8, white_level
-from simgen.check.scene_probe import coarser
-from simgen.dataset.prepared import Prepared
-from simgen.figures.picture_parts import (
+from simgen.app.picture_parts import (
     check_picture_path,
     draw_truth,
     encoded,
@@ -20,6 +18,8 @@ from simgen.figures.picture_parts import (
     part_of_interest,
     save_figure,
 )
+from simgen.check.scene_probe import coarser
+from simgen.dataset.prepared import Prepared
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
