@@ -21,14 +21,19 @@ SCENE = """title = "An evenly lit wall"
 lights = [{ type = "uniform", luminance_cd_m2 = 100.0 }]
 backdrop = { z_mm = %s, reflectance = [0.8, 0.8, 0.8] }
 """
+DRAWN = """import simgen
+def wall(random):
+    behind = simgen.Backdrop(z_mm=random.uniform(400, 600), reflectance=(0.8, 0.8, 0.8))
+    return simgen.Scene(title="A wall", lights=[simgen.UniformLight(luminance_cd_m2=100.0)], backdrop=behind)
+"""
 GRID = {"rows": 8, "cols": 8, "pitch_mm": [1e-3, 1e-3], "pixel_mm": 0.3, "height": SIDE, "width": SIDE}
 SENSOR = {"quantum_efficiency": [0.5, 0.5, 0.5], "dark_counts": 0.1}
 RECIPE: dict[str, Any] = {"seed": 11, "grid": GRID, "sensor": SENSOR, "products": {"truth": False}}
 OTHERS: list[dict[str, Any]] = [
     {"scene": "near"},
     {"scene": "far"},
-    {"scene": "drawn", "scene_number": 0},
-    {"scene": "drawn", "scene_number": 1},
+    {"scene": "drawn.py:wall", "scene_number": 0},
+    {"scene": "drawn.py:wall", "scene_number": 1},
     {"scene": "near", "photons": {"budget": 1.01}},
 ]
 """Two scenes and two draws of a third in one light, and one of them in a little more."""
@@ -36,9 +41,10 @@ OTHERS: list[dict[str, Any]] = [
 
 def counts(folder: Path, budget: float, method: str) -> np.ndarray:
     """Counts (dataset, view, pixel) of all recipes; their own budgets are shares of `budget`."""
-    for name, z_mm in {"near": "500", "far": "510", "drawn": "{ uniform = [400, 600] }"}.items():
+    for name, z_mm in {"near": "500", "far": "510"}.items():
         (folder / name).mkdir(parents=True)
         (folder / name / "scene.toml").write_text(SCENE % z_mm)
+    (folder / "drawn.py").write_text(DRAWN)
     found = []
     for number, values in enumerate(OTHERS):
         own = budget * values.get("photons", {"budget": 1.0})["budget"]
