@@ -8,10 +8,10 @@ trust).
 import re
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 from xml.parsers import expat
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
 from simgen.base.asset_names import AssetName, asset
@@ -48,16 +48,21 @@ class MitsubaFile(Strict):
     fit_mm: Length | None = None
     """Length of the longest side of that box, instead of `unit_mm`."""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _may_be_a_name(cls, values: Any) -> Any:
-        return {"file": values} if isinstance(values, str) else values
-
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:
         if self.camera is not None and self.place_at_mm is not None:
             raise ValueError("give camera or place_at_mm, not both: each says where the scene stands")
         return self
+
+
+MitsubaScene = Annotated[
+    MitsubaFile,
+    BeforeValidator(
+        lambda value: {"file": value} if isinstance(value, str) else value,
+        json_schema_input_type=str | MitsubaFile,
+    ),
+]
+"""The same by the name of its file alone."""
 
 
 def files_named_by(folder: Path, name: str) -> Iterator[str]:

@@ -35,7 +35,7 @@ from simgen.base.strict_models import (
 from simgen.base.toml_layout import toml_text
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
-from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
+from simgen.spec.mitsuba_file import MitsubaScene, files_named_by
 from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
@@ -142,7 +142,7 @@ class Scene(Strict):
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
     backdrop: Backdrop | None = None
     """A wall behind the objects, which is no object itself."""
-    mitsuba: MitsubaFile | None = None
+    mitsuba: MitsubaScene | None = None
     """A Mitsuba scene by the name of its XML file, or a table that says where it stands, too. All that it has
     is part of the scene, beside objects and lights of its own."""
     planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES), at_most(MOST_PLANES)] = ()
