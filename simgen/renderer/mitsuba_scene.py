@@ -30,8 +30,8 @@ from simgen.spec.scene import MOST_OBJECTS, Scene, SceneObject
 from simgen.spec.shapes import Mesh, Sphere
 from simgen.spectral.filters import Filters, filters_for
 
-BACKDROP, OBJECT, LIGHT = "backdrop", "object", "light"
-"""Ids of shapes; those of objects and lights end in their numbers."""
+BACKDROP, OBJECT, LIGHT = "simgen:backdrop", "simgen:object", "simgen:light"
+"""Ids of shapes, which none of a Mitsuba file has; those of objects and lights end in their numbers."""
 
 
 @dataclass(frozen=True)

@@ -170,6 +170,18 @@ def test_objects_lights_and_level_of_the_scene_stand_beside_the_file(folder: Pat
 
 
 @pytest.mark.renders
+def test_ids_of_the_file_and_objects_of_the_scene_do_not_mix(folder: Path) -> None:
+    ball = {"type": "sphere", "radius_mm": 300.0}
+    own = {"name": "ball", "position_mm": [0, 0, 3000], "shape": ball, "material": {"reflectance": [1, 1, 1]}}
+    scene = scene_of(folder, CAMERA + ROOM.replace('"back"', '"object1"'), objects=[own])
+    _, truth = simgen.draw_photons(scene, GRID, budget=100, cfa=None)
+    assert truth.names[int(truth.object_id[SIDE // 2, SIDE // 2])] == "ball"
+    assert truth.names[int(truth.object_id[0, 0])] == "object1"
+    with pytest.raises(InputError, match="both named 'back'"):
+        simgen.render(scene_of(folder, CAMERA + ROOM, objects=[own | {"name": "back"}]), GRID)
+
+
+@pytest.mark.renders
 def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
     content = '<shape type="cube" id="box"><transform name="to_world"><scale x="2"/></transform></shape>'
     place = {"file": "scene.xml", "place_at_mm": [0.0, 0.0, 600.0], "fit_mm": 100.0}
