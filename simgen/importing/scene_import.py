@@ -1,7 +1,5 @@
 """From a scene file of another program to a scene's folder."""
 
-import re
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +17,7 @@ from simgen.base.toml_layout import toml_text
 from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Placement, bounds, placement_of
 from simgen.importing.gltf_scene import CD_M2_PER_EMISSION, EmissionUnit, foreign_gltf
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
-from simgen.spec.scene import MOST_LIGHTS, MOST_OBJECTS, Scene
+from simgen.spec.scene import MOST_LIGHTS, MOST_OBJECTS, Scene, names_of_objects
 
 SQUARE = 1e-5
 """Axes of a matrix whose cosine is less than this are square to each other."""
@@ -27,7 +25,7 @@ FAR_MM = 100.0
 """How far before a spot its target is written."""
 EVEN_LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
 """For files without any light."""
-LONGEST_NAME, LONGEST_TITLE = 64, 200
+LONGEST_TITLE = 200
 MOST_TRIANGLES = 1 << 24
 """Of all objects; the renderer makes those of each instance anew, and needs 100 bytes for each."""
 Unit = Literal["mm", "cm", "m", "in", "ft"]
@@ -102,7 +100,7 @@ def write_scene_folder(scene: ForeignScene, placement: Placement, out: Path) -> 
             f"its objects have {triangles} triangles in all; at most {MOST_TRIANGLES} are rendered"
         )
     meshes = _Meshes()
-    names = _unique([part.name for part in scene.parts])
+    names = names_of_objects([part.name for part in scene.parts])
     objects = [_object(part, name, placement, meshes) for part, name in zip(scene.parts, names, strict=True)]
     lights = [_light(lamp, placement, scene.mm) for lamp in scene.lamps]
     left_out = list(scene.left_out)
@@ -171,7 +169,7 @@ class _Meshes:
         key = id(mesh), b"" if matrix is None else matrix.tobytes()
         if key not in self._names:
             taken = {name.removesuffix(".ply") for name in self.files}
-            self._names[key] = f"{_unique([stem], taken)[0]}.ply"
+            self._names[key] = f"{names_of_objects([stem], taken)[0]}.ply"
             self.files[self._names[key]] = mesh if matrix is None else _moved(mesh, matrix)
         return self._names[key]
 
@@ -252,23 +250,6 @@ def _rounded(position_mm: np.ndarray) -> list[float]:
 
 def _significant(value: float) -> float:
     return float(f"{value:.7g}")
-
-
-def _unique(names: Sequence[str], taken: set[str] | None = None) -> list[str]:
-    """Names as scenes have them, each different: a letter, then letters, digits, _ and -."""
-    found: list[str] = []
-    used = Counter[str]() if taken is None else Counter(taken)
-    for name in names:
-        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "object"
-        plain = plain if plain[0].isalpha() else f"object-{plain}"
-        short, number = plain[: LONGEST_NAME - 6], 1
-        wanted = short
-        while used[wanted]:
-            number += 1
-            wanted = f"{short}-{number}"
-        used[wanted] += 1
-        found.append(wanted)
-    return found
 
 
 def import_scene(

@@ -21,7 +21,7 @@ from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.mitsuba_surfaces import is_spectral
 from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
-from simgen.spec.scene import NAME
+from simgen.spec.scene import names_of_objects
 from simgen.spectral.filters import Filters
 from simgen.spectral.spectra import WAVELENGTH_NM, integral
 
@@ -151,13 +151,10 @@ def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     path = folder / file.file
     list(files_named_by(folder, file.file))  # refuses what leads outside, before Mitsuba sees the file
     _, state = _parsed(mi, path)
-    names: list[str] = []
-    for number in _children(mi, state.root).values():
-        node = state.nodes[number]
-        if _is_object(node):
-            names.append(
-                _object_name(node.props.id() or Path(_properties(node).get("filename", "")).stem, names)
-            )
+    shapes = filter(_is_object, (state.nodes[number] for number in _children(mi, state.root).values()))
+    names = names_of_objects(
+        [node.props.id() or Path(_properties(node).get("filename", "")).stem for node in shapes]
+    )
     kinds = {_kind(node) for node in state.nodes} | {node.props.plugin_name() for node in state.nodes}
     frame = _frame(mi, file, path, state)
     return Reference(mi, path, frame, tuple(names), "Medium" in kinds, "instance" in kinds)
@@ -261,17 +258,6 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
 
 def _is_object(node: Any) -> bool:
     return _kind(node) == "Shape" and node.props.plugin_name() != "shapegroup"
-
-
-def _object_name(shape_id: str, taken: list[str]) -> str:
-    """A name as truth and scores have it, like the id of a shape, and no other's."""
-    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", shape_id).strip("-")[:56]
-    stem = plain if re.fullmatch(NAME, plain) else f"shape-{plain}".rstrip("-")
-    name, number = stem, 1
-    while name in taken:
-        number += 1
-        name = f"{stem}-{number}"
-    return name
 
 
 def _flat_triangles(mesh: Any) -> np.ndarray | None:

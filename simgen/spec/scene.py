@@ -40,6 +40,7 @@ from simgen.spec.shapes import Shape
 
 MOST_OBJECTS = 1000
 NAME = "^[A-Za-z][A-Za-z0-9_-]*$"
+LONGEST_NAME = 64
 MOST_LIGHTS = 100
 MOST_PLANES = 1000
 
@@ -47,7 +48,7 @@ MOST_PLANES = 1000
 class SceneObject(Strict):
     """One named thing that truth and scores know."""
 
-    name: Annotated[str, Field(max_length=64, json_schema_extra={"pattern": NAME})]
+    name: Annotated[str, Field(max_length=LONGEST_NAME, json_schema_extra={"pattern": NAME})]
     """What truth, scores and pictures call it: a letter, then letters, digits, _ and -."""
     position_mm: Position
     """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
@@ -278,6 +279,23 @@ def checked_folder(scene: Scene, source: str = "scene") -> Path:
     if faults:
         raise faults_of(source, faults, len(faults))
     return scene.folder or Path()
+
+
+def names_of_objects(names: Sequence[str], taken: set[str] | None = None) -> list[str]:
+    """Names like these of a file, as objects have them, each different and none of those `taken`."""
+    unique: list[str] = []
+    used = Counter[str]() if taken is None else Counter(taken)
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "object"
+        plain = plain if plain[0].isalpha() else f"object-{plain}"
+        short, number = plain[: LONGEST_NAME - 6], 1
+        wanted = short
+        while used[wanted]:
+            number += 1
+            wanted = f"{short}-{number}"
+        used[wanted] += 1
+        unique.append(wanted)
+    return unique
 
 
 def scene_files(scene: Scene) -> Iterator[tuple[str, AssetName]]:
