@@ -59,22 +59,22 @@ class Assets:
 
 def read_assets(scene: BaseModel, folder: Path) -> Assets:
     """Decode every file that a scene names. Raises `InputError` for the first that cannot be used."""
-    found = Assets()
+    assets = Assets()
     total = 0
     wanted = {(type(name), str(name)): asset(folder, name, where) for where, name in named_files(scene)}
     for (kind, name), path in wanted.items():
         if kind is MeshName:
-            mesh = found.meshes[name] = read_mesh(path)
+            mesh = assets.meshes[name] = read_mesh(path)
             total += mesh.positions.nbytes + mesh.faces.nbytes
         elif kind is ImageName:
-            total += found.images.setdefault(name, read_texture(path)).nbytes
+            total += assets.images.setdefault(name, read_texture(path)).nbytes
         elif kind is EnvironmentName:
-            total += found.environments.setdefault(name, read_environment(path)).nbytes
+            total += assets.environments.setdefault(name, read_environment(path)).nbytes
         if total > LARGEST_TOTAL_BYTES:
             raise InputError(
                 f"{path}: with this file the scene's files take more than {LARGEST_TOTAL_BYTES} bytes"
             )
-    return found
+    return assets
 
 
 def read_texture(path: Path, *, alpha: bool = False, as_stored: bool = False) -> np.ndarray:

@@ -126,8 +126,8 @@ def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
     target, box, here = look.target, look.boxes.get(number), look.centre.object_id == number
     masks = {camera: hits.object_id == number for camera, hits in look.corners.items()}
     full = [camera for camera, mask in masks.items() if mask.all()]
-    own = target.scene.objects
-    stands_at_mm = own[number - 1].position_mm[2] if number <= len(own) else np.inf
+    own_objects = target.scene.objects
+    stands_at_mm = own_objects[number - 1].position_mm[2] if number <= len(own_objects) else np.inf
     return ObjectFacts(
         name=name,
         z_mm=look.centre.z_mm[here].astype(np.float64),

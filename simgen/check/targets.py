@@ -45,8 +45,8 @@ def lint(
     pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
     target = target_of(sweep, recipe_folder, scene_number)
     line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    found = hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
-    return f"{line}{_first_values(sweep)}", found
+    all_findings = hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
+    return f"{line}{_first_values(sweep)}", all_findings
 
 
 def _first_values(sweep: Sweep) -> str:
