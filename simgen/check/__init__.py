@@ -12,5 +12,5 @@ scene_probe       The coarse probe of `simgen check`: what few, large pixels of 
                   corner cameras see.
 sight             Findings on what the cameras see: objects cut or never seen, cameras inside
                   things, lamps.
-targets           What `check` and `preview` look at: a scene or a recipe, by name or path.
+targets           `simgen check`, and what it and `preview` look at: a scene or a recipe, by name or path.
 """

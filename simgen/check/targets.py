@@ -1,4 +1,4 @@
-"""What `check` and `preview` look at: a scene or a recipe, by name or path."""
+"""`simgen check`, and what it and `preview` look at: a scene or a recipe, by name or path."""
 
 import json
 from collections.abc import Sequence

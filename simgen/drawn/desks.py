@@ -10,11 +10,12 @@ from simgen.drawn.composition import (
     chessboard,
     colour,
     cylinder_of,
+    drawn_scene,
     noise,
     placed,
     sphere,
 )
-from simgen.spec.scene import Scene, scene_of
+from simgen.spec.scene import Scene
 
 DESK_TOP_MM = 65.0
 APART_MM = 2.0
@@ -61,7 +62,7 @@ def drawn_solids(random: Random) -> Scene:
     desk = placed("desk", (0.0, 185.0, 590.0), upright, box_of(640, 240, 320), noise(random, wood))
     paper = noise(random, colour(random, 0.5, 0.75))
     wall = placed("wall", (0.0, 0.0, 761.0), upright, card(700, 700), paper)
-    return _lit(random, "Solids on a desk", [desk, wall, *standing], [near, middle, far, 760], None)
+    return drawn_scene(random, "Solids on a desk", [desk, wall, *standing], [near, middle, far, 760], None)
 
 
 def drawn_foliage(random: Random) -> Scene:
@@ -91,7 +92,7 @@ def drawn_foliage(random: Random) -> Scene:
     place = random.uniform(-15, 15), random.uniform(-15, 15), far + 25.0
     objects.append(placed("hidden", place, turned, shape, _material(random, "hidden")))
     backdrop = {"z_mm": 2500.0, "reflectance": [0.03, 0.035, 0.04]}
-    return _lit(random, "Something behind leaves", objects, [near, far], backdrop)
+    return drawn_scene(random, "Something behind leaves", objects, [near, far], backdrop)
 
 
 def _material(random: Random, name: str) -> Table:
@@ -109,20 +110,3 @@ def _material(random: Random, name: str) -> Table:
     periods, angle = random.randint(6, 16), round(random.uniform(-90, 90), 1)
     colours = [colour(random, 0.1, 0.6), [0.9, 0.88, 0.8]]
     return {"texture": {"type": "stripes", "periods": periods, "angle_deg": angle, "colours": colours}}
-
-
-def _lit(
-    random: Random, title: str, objects: list[Table], planes: list[int], backdrop: Table | None
-) -> Scene:
-    """The scene under a lamp above and even light."""
-    lamp = {
-        "type": "area",
-        "position_mm": [round(random.uniform(-300, 300)), -425.0, round(random.uniform(200, 400))],
-        "target_mm": [0.0, 20.0, 580.0],
-        "width_mm": 400.0,
-        "height_mm": 280.0,
-        "luminance_cd_m2": 2000.0,
-    }
-    even = {"type": "uniform", "luminance_cd_m2": round(random.uniform(80, 160))}
-    values = {"title": title, "planes_mm": planes, "objects": objects, "lights": [lamp, even]}
-    return scene_of(values if backdrop is None else values | {"backdrop": backdrop}, None, title)

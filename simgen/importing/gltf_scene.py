@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
+from simgen.base.strict_models import validate
 from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
 from simgen.importing.gltf_arrays import numbers, triangles_of
 from simgen.importing.gltf_file import GltfFile, read_gltf
@@ -147,8 +148,10 @@ class _Reader:
         }
         count = min((len(column) for column in columns.values()), default=1)
         rows = [{name: column[row] for name, column in columns.items()} for row in range(count)]
+        source = f"{self.gltf.path}: {where}"
         return [
-            _matrix(Node.model_validate({name: part.tolist() for name, part in row.items()})) for row in rows
+            _matrix(validate(Node, {name: part.tolist() for name, part in row.items()}, source))
+            for row in rows
         ]
 
     def _skinned(self, skin: int, primitive: Primitive, where: str) -> np.ndarray:
@@ -170,8 +173,11 @@ class _Reader:
             numbers(self.gltf, primitive.attributes[name], where, "VEC4", MOST_VERTICES)
             for name in ("JOINTS_0", "WEIGHTS_0")
         )
-        if which.max() >= len(joints):
-            raise self.gltf.fault(f"{where}: JOINTS_0: there is no joint {which.max()} in skins[{skin}]")
+        if len(which) != len(weight) or which.dtype.kind != "u" or which.max() >= len(joints):
+            raise self.gltf.fault(
+                f"{where}: JOINTS_0: expected a whole number below {len(joints)}, the joints of skins[{skin}], "
+                "for each of WEIGHTS_0"
+            )
         share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
         return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
 

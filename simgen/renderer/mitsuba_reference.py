@@ -58,7 +58,7 @@ class Reference:
                 "level: lights of a Mitsuba file have a level only where light is linear sRGB; leave it out, "
                 "or give a recipe without sensor.camera"
             )
-        mi, scene = self.mi, self.build({}, {"type": "path"}, 1.0)
+        mi, scene = self.mi, _instantiate(self.mi, *_parsed(self.mi, self.path), self.path)
         points, total = np.random.default_rng(0).random((SAMPLES_OF_LIGHT, 2)), 0.0
         point = self.frame.points(np.array([0.0, 0.0, z_mm]))
         for light in scene.emitters():

@@ -510,3 +510,23 @@ def test_copies_and_skins_stand_where_the_file_says(tmp_path: Path) -> None:
         atol=1e-3,
     )
     assert "skeletons: meshes stand as the file begins" in left_out
+
+
+def test_joints_and_copies_that_are_no_numbers_are_refused(tmp_path: Path) -> None:
+    for name, sentence in (("joint", "a whole number below 1"), ("copy", "translation")):
+        draft = GltfDraft()
+        mesh = draft.mesh(TETRAHEDRON, TETRAHEDRON_FACES)
+        count = len(TETRAHEDRON)
+        if name == "joint":
+            draft.json["meshes"][mesh]["primitives"][0]["attributes"] |= {
+                "JOINTS_0": draft.numbers(np.full((count, 4), np.nan, "<f4")),
+                "WEIGHTS_0": draft.numbers(np.ones((count, 4), "<f4")),
+            }
+            draft.put("skins", {"joints": [draft.node(name="bone")]})
+            draft.node(mesh=mesh, skin=0)
+        else:
+            moves = draft.numbers(np.array([(np.nan, 0, 0)], "<f4"))
+            copies = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": moves}}}
+            draft.node(mesh=mesh, extensions=copies)
+        with pytest.raises(InputError, match=sentence):
+            imported(draft, tmp_path / name, place_at_mm=(0.0, 0.0, 600.0))
