@@ -175,8 +175,8 @@ class _Reader:
         )
         if len(which) != len(weight) or which.dtype.kind != "u" or which.max() >= len(joints):
             raise self.gltf.fault(
-                f"{where}: JOINTS_0: expected a whole number below {len(joints)}, the joints of skins[{skin}], "
-                "for each of WEIGHTS_0"
+                f"{where}: JOINTS_0: expected a whole number below {len(joints)}, the joints of "
+                f"skins[{skin}], for each of WEIGHTS_0"
             )
         share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
         return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
