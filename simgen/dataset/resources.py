@@ -16,8 +16,8 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.counting_plan import Plan
-from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
-from simgen.photons.pilot import MOST_RAYS
+from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MAX_LAYERS, tile_px_for
+from simgen.photons.exploration import MAX_RAYS
 from simgen.spec.camera_grid import Grid
 from simgen.spec.recipe import Exposure, Photons, Products, Sensor
 
@@ -174,13 +174,13 @@ def rounded(value: float, digits: int) -> str:
 
 def tile_count(grid: CameraGrid, z_mm: np.ndarray) -> float:
     """Tiles of the majorant for first hits at these depths, as of `disparity_layers.layers_for`; or inf."""
-    tile_px, longer = tile_px_for(grid, MOST_RAYS), max(grid.pitch_mm)
+    tile_px, longer = tile_px_for(grid, MAX_RAYS), max(grid.pitch_mm)
     with np.errstate(over="ignore", divide="ignore"):
         disparity_px = np.float64(grid.focal_mm) * longer / grid.pixel_mm / z_mm
     if not np.isfinite(disparity_px).all():
         return math.inf
     thin = 4 * LAYER_BLUR_TILES * tile_px / max(max(grid.rows, grid.cols) - 1, 1)
-    step_px = max(thin, float(disparity_px.max()) / MOST_LAYERS)
+    step_px = max(thin, float(disparity_px.max()) / MAX_LAYERS)
     count = float(np.unique(np.rint(disparity_px / step_px)).size)
     for axis, (size, number) in enumerate(((grid.width, grid.cols), (grid.height, grid.rows))):
         moved = disparity_px * (grid.pitch_mm[axis] / longer) - grid.shear_px[axis]

@@ -2,7 +2,7 @@
 
 candidates            Candidates of photons: rays drawn from a majorant, and followed if they may be
                       bright enough to be kept.
-counting_plan         How photon counts will be made: thinned one by one or drawn from rendered views, and
+counting_plan         How photon counts will be made: thinned one by one, or drawn from rendered views, and
                       what led to it.
 disparity_layers      Layers of disparity and their tiles: pieces of surface that all views share.
 emission_sampler      Candidates of photons that come straight from something that shines, drawn on its
@@ -12,14 +12,9 @@ exploration           What is found out about a scene's light before photons are
 majorant              How bright it can get where: the majorant from which photon candidates are drawn.
 photon_counting       The photon counts of a dataset: thinned or drawn from views, counted by the sensor,
                       written.
-pilot                 The pilot: a few paths that find where there is light, and from them the first
-                      majorant.
-rendering_noise       How many samples a dense rendering needs for its noise not to show in the photon
-                      counts.
-samplers              Which sampler of candidates: all at once where a compiled backend runs, else one by
-                      one.
 scalar_sampler        Candidates one after the other, for scalar mode: drawn in NumPy, traced by one call
                       of the renderer each.
+scopes                Scopes: what photons are counted over, which is an exposure of each view or a budget.
 shining_pieces        Pieces of all that shines and can be seen, each with a bound of how many photons its
                       points send to a film.
 thinning              Photons, not pixels: photon-limited images by thinning, in the time that their

@@ -49,14 +49,14 @@ class Setup:
 class Accepted:
     """The `photons` that candidates gave, a row for each that was kept, and its first hit.
 
-    `candidate` (rows,) is the number of each. `ratio` (F,) is radiance by limit of all paths that were
-    followed beyond their first hit, `over` those that exceeded it.
+    `candidate` (rows,) is the number of each. `ratio` (F,) is radiance over limit of all paths that were
+    followed beyond their first hit, `exceeding` are those above it.
     """
 
     photons: PhotonTable
     candidate: np.ndarray
     ratio: np.ndarray
-    over: Samples
+    exceeding: Samples
 
 
 class FilmPoints(NamedTuple):
@@ -65,6 +65,12 @@ class FilmPoints(NamedTuple):
     view: np.ndarray
     row: np.ndarray
     col: np.ndarray
+
+    def on_film(self, grid: CameraGrid) -> "FilmPoints":
+        """Those that lie on the film; NaN lies nowhere."""
+        rows, cols = self.row, self.col
+        which = (rows >= 0) & (rows < grid.height) & (cols >= 0) & (cols < grid.width)
+        return FilmPoints(self.view[which], rows[which], cols[which])
 
 
 class CandidateSampler(Protocol):
@@ -94,8 +100,8 @@ class CandidateSampler(Protocol):
         """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
 
         `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
-        A path that exceeds its bound is kept, and is among those that are `over`. Raises `InputError` for
-        radiance that is not finite.
+        A path that exceeds its bound is kept, and is among those that are `exceeding`. Raises `InputError`
+        for radiance that is not finite.
         """
         ...
 
@@ -122,14 +128,6 @@ def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) ->
     i = np.minimum((row + down) * (grid.height / rows), np.nextafter(grid.height, 0))
     j = np.minimum((col + right) * (grid.width / cols), np.nextafter(grid.width, 0))
     return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
-
-
-def cell_groups(scope: str, cfa: str | None) -> list[np.ndarray]:
-    """Groups of Bayer cells (2 a + b) that are counted apart: those of each colour for scope "channel"."""
-    if scope != "channel":
-        return [np.arange(4)]
-    cells = colour_cells(cfa).ravel()
-    return [np.flatnonzero(cells == colour) for colour in range(channel_count(cfa))]
 
 
 def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:

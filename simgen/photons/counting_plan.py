@@ -1,19 +1,38 @@
-"""How photon counts will be made: thinned one by one or drawn from rendered views, and what led to it."""
+"""How photon counts will be made: thinned one by one, or drawn from rendered views, and what led to it.
 
+Counts drawn from a rendered view have the view's noise besides their own: a rate that is off by a random
+amount of variance v makes counts whose variance is larger by v. That share of the Poisson variance is to
+stay below `MAX_NOISE_SHARE`, so dimmer light needs fewer samples. A budget is divided by a view's light,
+whose own standard error is to stay below `MAX_NORMALISER_ERROR`. Both are forecast here, by a probe of few
+paths and by what is known of all that shines in view; the paths of a view are spread more evenly than the
+probe's, and vary less. Each view is then rendered in two halves, whose difference tells the noise that there
+is (see `photon_counting.draw_from_views`).
+"""
+
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import channel_count
 from pcii.core.camera_grid import CameraGrid
-from simgen.cameras.rig import Rig
+from pcii.core.photon_limit import sense
+from simgen.base import random_streams as seeds
+from simgen.cameras.rig import Rig, corners, with_larger_pixels
 from simgen.photons.candidates import Setup
-from simgen.photons.exploration import Exploration, explore
-from simgen.photons.rendering_noise import Probe, first_hit_depths_mm, probe
+from simgen.photons.emission_sampler import EmissionSampler
+from simgen.photons.exploration import EXPLORATION_SEED, Exploration, explore
+from simgen.photons.scopes import Scopes
+from simgen.photons.thinning import MAX_SINGLE_PHOTONS
+from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import MOST_PATHS, Photons
+from simgen.truth.first_hits import first_hits_of_view
 
-ROUNDING = 1.05
-"""Two digits are off by up to 5 %: what is said to fit, divided by this before it is rounded, does so."""
+MAX_NOISE_SHARE = 0.01
+MAX_NORMALISER_ERROR = 0.003
 PHOTON_COST, SAMPLE_COST, PIXEL_COST = 1.5, 0.065, 0.015
 """Microseconds for a photon drawn by thinning, and for a sample and a pixel of a dense view, as measured by
 `make bench` on two cores; only their ratios matter."""
@@ -23,20 +42,16 @@ UNBOUNDED = "rare light paths, as by mirrors, are too bright for single photons"
 PROBE_SEED = 0
 """The probe measures the scene, and its paths enter no data. With one seed for all, recipes that differ in
 nothing else are made alike: all with the origins of photons or all without."""
-MOST_SINGLE_PHOTONS = 1 << 25
-"""So many photons are kept one by one at most; each takes some 200 bytes. More are drawn in the same way, but
-only counted."""
-MOST_THINNED_PHOTONS = 1e10
-"""So many are drawn at most, which takes two cores four hours, as a hundred views of `MOST_PATHS` do."""
-
-
-def two_digits(value: float) -> str:
-    """A number with two digits.
-
-    >>> two_digits(1234.0), two_digits(0.0456)
-    ('1200', '0.046')
-    """
-    return f"{float(f'{value:.2g}'):g}"
+PROBE_PX = 64
+"""Longer side of the film that the probe renders, twice."""
+PROBE_SAMPLES = 64
+AIMED_POINTS = 1 << 13
+"""Points of what shines in view, by which its light and its share of the film are known."""
+DEPTH_STEPS = 64
+"""Depths are rounded to equal steps of disparity, this many up to the nearest."""
+MAX_THINNED_PHOTONS = 1e10
+"""Largest number of photons that are thinned, which takes two cores four hours, as a hundred views of
+`MOST_PATHS` do."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +72,11 @@ class Capture:
     def grid(self) -> CameraGrid:
         """The cameras as they ought to be."""
         return self.rig.grid
+
+    @cached_property
+    def scopes(self) -> Scopes:
+        """What the photons are counted over."""
+        return Scopes(self.photons, self.grid, self.cfa, self.photons_per_radiance)
 
 
 @dataclass(frozen=True)
@@ -81,11 +101,38 @@ class Plan:
     """What is known of the light, if photons are thinned."""
 
 
+@dataclass(frozen=True)
+class Probe:
+    """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view."""
+
+    mean: float
+    variance: float
+
+    def photon_noise(self, photons_per_radiance: float, samples: int) -> float:
+        """Variance that rendering adds to counts, as a share of their Poisson variance."""
+        if self.mean <= 0:
+            return 0.0
+        return photons_per_radiance * self.variance / (samples * self.mean)
+
+    def light_error(self, paths: int) -> float:
+        """Standard error of the light that `paths` find, as a share of it."""
+        return math.sqrt(self.variance / paths) / self.mean if self.mean > 0 else 0.0
+
+    def samples_for(self, photons_per_radiance: float, pixels: int | None = None) -> int:
+        """Samples per pixel that keep the noise below `MAX_NOISE_SHARE`, however many these are.
+
+        With a budget that is counted over `pixels`, enough for `MAX_NORMALISER_ERROR` too.
+        """
+        noise = math.ceil(self.photon_noise(photons_per_radiance, 1) / MAX_NOISE_SHARE)
+        error = 0.0 if pixels is None else self.light_error(pixels) / MAX_NORMALISER_ERROR
+        return max(noise, math.ceil(error**2), 1)
+
+
 def plan(
     capture: Capture,
     setup: Setup,
     kind: str,
-    least_samples: int = 1,
+    min_samples: int = 1,
     *,
     may_explore: Callable[[Plan], bool] = lambda _: True,
 ) -> Plan:
@@ -96,62 +143,86 @@ def plan(
     is so small that one sample for each pixel takes longer than all its photons. What is to be thinned is
     explored first, if it `may_explore` (memory may not suffice), and rendered where the light has no bound.
     The seed has no part in it (see `PROBE_SEED`). `kind` is that of the backend; views that are rendered in
-    any case have `least_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and
+    any case have `min_samples` per pixel. Raises `InputError` for nested budgets of too many photons, and
     for more photons than can be made in either way.
     """
-    if setup.render_scene.why_rendered:
-        return _cheaper_way(capture, setup, kind, least_samples, why_rendered=setup.render_scene.why_rendered)
-    made = _cheaper_way(capture, setup, kind, least_samples)
-    if not made.thins or not may_explore(made):
-        return made
-    explored = explore(setup, capture.photons, capture.photons_per_radiance)
+    scopes, why_rendered = capture.scopes, setup.render_scene.why_rendered
+    cheaper = _choose_cheaper(scopes, setup, kind, min_samples, why_rendered)
+    if not cheaper.thins or not may_explore(cheaper):
+        return cheaper
+    explored = explore(setup, scopes.photons, scopes.photons_per_radiance)
     if not explored.is_bounded:
-        return _cheaper_way(capture, setup, kind, least_samples, why_rendered=UNBOUNDED)
-    return replace(made, explored=explored)
+        return _choose_cheaper(scopes, setup, kind, min_samples, UNBOUNDED)
+    return replace(cheaper, explored=explored)
 
 
-def _cheaper_way(
-    capture: Capture, setup: Setup, kind: str, least_samples: int, why_rendered: str = ""
-) -> Plan:
-    render_scene = setup.render_scene
-    grid = capture.grid
+def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
+    """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
+    small = replace(_coarse(grid), rows=1, cols=1)
+    first, second = (
+        sense(
+            render_view(
+                render_scene,
+                small,
+                0,
+                0,
+                samples_per_pixel=PROBE_SAMPLES,
+                seed=seeds.integer(seed, stage="plan probe", part=part),
+                independent=True,
+            ),
+            cfa,
+        ).astype(np.float64)
+        for part in range(2)
+    )
+    # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
+    variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
+    mean, extra_variance = _missed_light(render_scene, small, cfa, grid)
+    return Probe(float((first + second).mean() / 2) + mean, float(variance) + extra_variance)
+
+
+def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, why_rendered: str) -> Plan:
+    """The cheaper way, or with a reason `why_rendered` the dense one."""
+    render_scene, grid = setup.render_scene, scopes.grid
     pixels = grid.height * grid.width
     photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
-    def is_cheaper(photons_per_view: float, samples: int) -> bool:
-        return photon_cost * photons_per_view <= (sample_cost * samples + PIXEL_COST) * pixels
+    def is_cheaper(per_view: float, samples: int) -> bool:
+        return photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
 
-    def are_few(photons_per_view: float) -> bool:
-        return photons_per_view * grid.view_count <= MOST_SINGLE_PHOTONS
+    def are_few(per_view: float) -> bool:
+        return per_view * grid.view_count <= MAX_SINGLE_PHOTONS
 
-    per_view = _budget_per_view(capture)
-    if (
-        per_view is not None
-        and not why_rendered
-        and are_few(per_view)
-        and is_cheaper(per_view, least_samples)
-    ):
-        depths_mm = first_hit_depths_mm(render_scene, grid)
-        return Plan(True, least_samples, per_view, depths_mm=depths_mm)
-    probed = probe(render_scene, grid, capture.cfa, PROBE_SEED)
-    per_view, gain = _photons(capture, probed)
-    scope_pixels = _scope_pixels(capture)
-    samples = max(probed.samples_for(gain, scope_pixels), least_samples)
-    if capture.photons.nested and not are_few(per_view):
+    per_view, gain = scopes.photons_per_view, scopes.photons_per_radiance
+    if per_view is not None and not why_rendered and are_few(per_view) and is_cheaper(per_view, min_samples):
+        return Plan(True, min_samples, per_view, depths_mm=_first_hit_depths_mm(render_scene, grid))
+    probed = probe(render_scene, grid, scopes.cfa, PROBE_SEED)
+    # The virtual centre tells how many photons an exposure has, and what a unit of radiance has of a budget.
+    if per_view is None:
+        assert gain is not None
+        per_view = gain * probed.mean * pixels
+    else:
+        gain = per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
+    samples = max(probed.samples_for(gain, scopes.pixels), min_samples)
+    if scopes.photons.nested and not are_few(per_view):
         raise InputError(
             f"photons.nested: {per_view * grid.view_count:.3g} photons are too many to be told apart; "
-            f"at most {MOST_SINGLE_PHOTONS} can be"
+            f"at most {MAX_SINGLE_PHOTONS} can be"
         )
     # Where the virtual centre sees no light there may be none at all, which rendered views show at once.
     may_thin = not why_rendered and probed.mean > 0
-    most_thinned = MOST_THINNED_PHOTONS / grid.view_count if may_thin else 0.0
-    most_samples = (MOST_PATHS - 1) // pixels
-    is_better = is_cheaper(per_view, samples) or samples > most_samples
-    thins = may_thin and per_view <= most_thinned and is_better
-    if not thins and samples > most_samples:
-        raise _too_many_photons(capture, per_view, max(most_thinned, per_view * most_samples / samples))
+    max_thinned = MAX_THINNED_PHOTONS / grid.view_count if may_thin else 0.0
+    max_samples = (MOST_PATHS - 1) // pixels
+    is_better = is_cheaper(per_view, samples) or samples > max_samples
+    thins = may_thin and per_view <= max_thinned and is_better
+    if not thins and samples > max_samples:
+        most = 0.95 * max(max_thinned, per_view * max_samples / samples)  # two digits are off by up to 5 %
+        name = "photons.budget" if scopes.photons_per_view is not None else "exposure"
+        raise InputError(
+            f"{name}: {per_view:.3g} photons per view are more than can be made without rendering noise; "
+            f"at most {most:.2g} can be"
+        )
     return Plan(
         thins=thins,
         samples=samples,
@@ -159,47 +230,44 @@ def _cheaper_way(
         keeps_origins=are_few(per_view),
         why_rendered=why_rendered,
         noise=probed.photon_noise(gain, samples),
-        normaliser_error=0.0 if scope_pixels is None else probed.light_error(samples * scope_pixels),
-        depths_mm=first_hit_depths_mm(render_scene, grid) if thins else (),
+        normaliser_error=0.0 if scopes.pixels is None else probed.light_error(samples * scopes.pixels),
+        depths_mm=_first_hit_depths_mm(render_scene, grid) if thins else (),
     )
 
 
-def _too_many_photons(capture: Capture, per_view: float, most_per_view: float) -> InputError:
-    """That so many photons of a view cannot be made exactly, and how many of them can."""
-    what, number, most = "exposure: {:.3g} photons per view", per_view, most_per_view
-    if capture.photons.scope != "exposure":
-        what, number = "photons.budget: {:g} photons", capture.photons.budget
-        most *= number / per_view
-    return InputError(
-        f"{what.format(number)} are more than can be made without rendering noise; at most "
-        f"{two_digits(most / ROUNDING)} can be"
-    )
+def _missed_light(
+    render_scene: RenderScene, small: CameraGrid, cfa: str | None, grid: CameraGrid
+) -> tuple[float, float]:
+    """Mean radiance of a pixel, and variance of a path, that the probe's paths are likely not to have met.
 
-
-def _budget_per_view(capture: Capture) -> float | None:
-    """Photons of a view that a budget asks for; None for an exposure."""
-    scopes = {"view": 1.0, "channel": float(channel_count(capture.cfa)), "scene": 1 / capture.grid.view_count}
-    share = scopes.get(capture.photons.scope)
-    return None if share is None else capture.photons.budget * share
-
-
-def _photons(capture: Capture, probed: Probe) -> tuple[float, float]:
-    """Photons that a view is expected to have, and those of a pixel and a unit of radiance.
-
-    For a budget the second is estimated from what the virtual centre sees, for an exposure the first.
+    A surface of radiance L that fills the share a of a pixel, small beside 1, has the mean a L and the
+    variance a L^2. The probe misses it with the probability exp(-n) if n of its paths hit it on average.
     """
-    gain, per_view = capture.photons_per_radiance, _budget_per_view(capture)
-    pixels = capture.grid.height * capture.grid.width
-    if per_view is None:
-        assert gain is not None
-        return gain * probed.mean * pixels, gain
-    return per_view, per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
+    centre = replace(grid, rows=1, cols=1)
+    emission = EmissionSampler(Setup(render_scene, centre, cfa, 1))
+    if not emission.mass:
+        return 0.0, 0.0
+    rng = seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=2)
+    arriving = emission.arriving(np.zeros(AIMED_POINTS, dtype=np.int64), rng)
+    pixels, paths = grid.height * grid.width, 2 * PROBE_SAMPLES * small.height * small.width
+    light = emission.mass / AIMED_POINTS / pixels  # of each that arrives, per pixel
+    number = len(emission.surfaces)
+    film_share = np.bincount(arriving.surface, light / arriving.radiance, minlength=number)
+    unmet = np.exp(-paths * film_share)[arriving.surface]
+    return float(light * unmet.sum()), float(light * (unmet * arriving.radiance).sum())
 
 
-def _scope_pixels(capture: Capture) -> int | None:
-    """Pixels over which a budget is counted, of the rarest colour at worst; None without a budget."""
-    grid = capture.grid
-    pixels = grid.height * grid.width
-    by_colour = max(pixels // 4, 1) if capture.cfa is not None else pixels
-    scopes = {"view": pixels, "channel": by_colour, "scene": pixels * grid.view_count}
-    return scopes.get(capture.photons.scope)
+def _first_hit_depths_mm(render_scene: RenderScene, grid: CameraGrid) -> tuple[float, ...]:
+    """Up to `DEPTH_STEPS` depths in mm that the corner cameras see in a coarse look; inf for nothing."""
+    hits = [first_hits_of_view(render_scene, _coarse(grid), k, l) for k, l in corners(grid)]
+    z_mm = np.concatenate([of_view.z_mm.ravel() for of_view in hits])
+    nearest = float(z_mm.min())
+    if not nearest < math.inf:
+        return (math.inf,)
+    steps = np.unique(np.rint(DEPTH_STEPS * nearest / z_mm.astype(np.float64)))
+    return tuple((DEPTH_STEPS * nearest / steps[steps > 0]).tolist())
+
+
+def _coarse(grid: CameraGrid) -> CameraGrid:
+    """The same cameras with the same field of view on few pixels."""
+    return with_larger_pixels(grid, max(grid.height, grid.width) / PROBE_PX, least_px=2)

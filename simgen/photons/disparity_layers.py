@@ -5,6 +5,7 @@ disparity, on square tiles that move along with it: what is found in one view is
 tiles are even, so that a tile holds whole Bayer cells.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +13,12 @@ import numpy as np
 from pcii.core.camera_grid import CameraGrid
 
 TILES_ACROSS = 256
-"""The longer side of a film has at most about so many tiles, whatever its pixels."""
+"""Largest number of tiles along the longer side of a film, about, whatever its pixels."""
 RAYS_PER_TILE = 4
-"""Of a pilot: with one in each quarter of a tile hardly a piece of surface is missed."""
+"""Rays of a pilot: with one in each quarter of a tile hardly a piece of surface is missed."""
 LAYER_BLUR_TILES = 0.5
 """Layers are so thin that their tiles are off by no more than this share of a tile in any view."""
-MOST_LAYERS = 64
+MAX_LAYERS = 64
 
 
 @dataclass(frozen=True)
@@ -43,12 +44,13 @@ class Samples:
 
     def take(self, which: np.ndarray) -> "Samples":
         """Some of them, by mask or index."""
-        return Samples(*(getattr(self, name)[which] for name in self.__dataclass_fields__))
+        return Samples(*(column[which] for column in vars(self).values()))
 
-    def join(self, other: "Samples") -> "Samples":
-        """These and others."""
-        names = self.__dataclass_fields__
-        return Samples(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in names))
+    @staticmethod
+    def joined(parts: "Sequence[Samples]") -> "Samples":
+        """Those of all parts, one part after the other."""
+        columns = zip(*(vars(part).values() for part in parts), strict=True)
+        return Samples(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,7 @@ def layers_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> DisparityLay
     # A point that moves by more than a film from camera to camera, as in their own plane, is seen by one.
     disparity_px = disparity_mm / np.maximum(z_mm, disparity_mm / max(grid.height, grid.width))
     thin = 4 * LAYER_BLUR_TILES * tile_px / max(cameras - 1, 1)
-    step_px = max(thin, float(disparity_px.max()) / MOST_LAYERS)
+    step_px = max(thin, float(disparity_px.max()) / MAX_LAYERS)
     levels = np.unique(np.rint(disparity_px / step_px))
     steps = np.arange(int(levels[-1]) + 1)
     layer_at = np.abs(steps[:, None] - levels).argmin(axis=1)
@@ -145,7 +147,7 @@ def _from_zero(shifts_px: np.ndarray) -> np.ndarray:
 
 
 def tile_px_for(grid: CameraGrid, rays: int) -> int:
-    """Side of tiles that hold `RAYS_PER_TILE` of so many rays over the film; no finer than `TILES_ACROSS`."""
+    """Side of tiles that hold `RAYS_PER_TILE` of `rays` over the film; no finer than `TILES_ACROSS`."""
     finest = max(grid.height, grid.width) / TILES_ACROSS
     side = np.sqrt(RAYS_PER_TILE * grid.height * grid.width / rays)
     return 2 * max(1, round(max(finest, side) / 2))

@@ -19,7 +19,7 @@ from simgen.photons.shining_pieces import look_of, pieces_in_view, points_on_bal
 from simgen.renderer.intersection import standing_before
 from simgen.sensor.photon_table import PhotonTable
 
-SHY_OF_SURFACE = 1e-5
+SHADOW_EPSILON = 1e-5
 """Of the distance: what stands nearer than this before a shining point does not hide it. Single precision
 errs by a hundredth of it."""
 
@@ -87,38 +87,39 @@ class EmissionSampler:
 
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
-        kept = self.arriving(view, np.random.default_rng(seed))
-        is_wanted = np.zeros((len(cells), 4), dtype=bool)
+        light = self.arriving(view, np.random.default_rng(seed))
+        is_of_group = np.zeros((len(cells), 4), dtype=bool)
         for number, own in enumerate(cells):
-            is_wanted[number, own] = True
-        kept = kept.take(is_wanted[group[kept.candidate], kept.row % 2 * 2 + kept.col % 2])
+            is_of_group[number, own] = True
+        light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
         photons = PhotonTable(
-            k=view[kept.candidate] // self.setup.grid.cols,
-            l=view[kept.candidate] % self.setup.grid.cols,
-            i=kept.row,
-            j=kept.col,
-            n=np.ones(kept.row.size, dtype=np.int64),
-            object_id=self.numbers[kept.surface],
-            z_mm=kept.z_mm,
+            k=view[light.candidate] // self.setup.grid.cols,
+            l=view[light.candidate] % self.setup.grid.cols,
+            i=light.row,
+            j=light.col,
+            n=np.ones(light.row.size, dtype=np.int64),
+            object_id=self.numbers[light.surface],
+            z_mm=light.z_mm,
         )
-        return replace(nothing(self.setup.channels), photons=photons, candidate=kept.candidate)
+        return replace(nothing(self.setup.channels), photons=photons, candidate=light.candidate)
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
         """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
-        found, chance, grid = self.film_points(view, rng), rng.random(view.size), self.setup.grid
-        row, col = np.floor(found.row_px + 0.5), np.floor(found.col_px + 0.5)
-        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width) & (found.sent > 0)
+        points, chance, grid = self.film_points(view, rng), rng.random(view.size), self.setup.grid
+        row, col = np.floor(points.row_px + 0.5), np.floor(points.col_px + 0.5)
+        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width) & (points.sent > 0)
         which = np.flatnonzero(inside)
         row, col = row[which].astype(np.int64), col[which].astype(np.int64)
         colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
-        radiance = self._radiance(found.surface[which], found.texcoord[which])[np.arange(which.size), colour]
-        kept = chance[which] * found.bound[which] < found.sent[which] * radiance
-        which, row, col, radiance = which[kept], row[kept], col[kept], radiance[kept]
-        surface, point_mm = found.surface[which], found.point_mm[which]
-        before = standing_before(self.setup.render_scene, found.camera_mm[which], point_mm, SHY_OF_SURFACE)
+        radiance = self._radiance(points.surface[which], points.texcoord[which])
+        radiance = radiance[np.arange(which.size), colour]
+        is_kept = chance[which] * points.bound[which] < points.sent[which] * radiance
+        which, row, col, radiance = which[is_kept], row[is_kept], col[is_kept], radiance[is_kept]
+        surface, point_mm = points.surface[which], points.point_mm[which]
+        blocker = standing_before(self.setup.render_scene, points.camera_mm[which], point_mm, SHADOW_EPSILON)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
-        seen = (before < 0) | (self.is_ball[surface] & (before == self.numbers[surface]))
-        return Arriving(which, row, col, surface, radiance, point_mm[:, 2]).take(seen)
+        is_visible = (blocker < 0) | (self.is_ball[surface] & (blocker == self.numbers[surface]))
+        return Arriving(which, row, col, surface, radiance, point_mm[:, 2]).take(is_visible)
 
     def film_points(self, view: np.ndarray, rng: np.random.Generator) -> ShiningPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""

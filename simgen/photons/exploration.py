@@ -1,45 +1,82 @@
 """What is found out about a scene's light before photons are drawn: the majorant, and what it keeps.
 
-It depends on scene, cameras and photons wanted, not on the seed: datasets that differ in nothing else
-share it. A pilot suggests the majorant; then candidates are drawn for nothing but to lift it where it is
-exceeded, until a rehearsal, with as many candidates as the draw needs, rarely exceeds it. Where mirrors
+It depends on scene, cameras and photons wanted, not on the seed: datasets that differ in nothing else share
+it. A pilot of few paths suggests the majorant; then candidates are drawn for nothing but to lift it where it
+is exceeded, until a rehearsal, with as many candidates as the draw needs, rarely exceeds it. Where mirrors
 reflect light onto other surfaces no majorant may suffice. What is learned here costs no photon its
 independence.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pcii.core.bayer import colour_cells
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler, Setup, cell_groups, paths_of
+from simgen.photons.candidates import (
+    Accepted,
+    CandidateSampler,
+    FilmPoints,
+    Setup,
+    even_film_points,
+    paths_of,
+)
+from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
 from simgen.photons.emission_sampler import EmissionSampler
-from simgen.photons.majorant import Majorant
-from simgen.photons.pilot import AIMED_RAYS, EXPLORATION_SEED, send_pilot
-from simgen.photons.samplers import sampler_for
+from simgen.photons.majorant import DIM_SHARE, Majorant, fit
+from simgen.photons.scalar_sampler import ScalarSampler
+from simgen.photons.scopes import Scopes
+from simgen.photons.wavefront_sampler import WavefrontSampler
+from simgen.renderer.backend import is_scalar
+from simgen.renderer.path_tracing import bright_directions, surrounding_radiance
+from simgen.renderer.wavelengths import light_of
 from simgen.spec.recipe import Photons
 
+EXPLORATION_SEED = 0
+"""What is found before photons are drawn decides their cost, not where they fall: with one seed for all,
+datasets that differ in nothing but their seed have it in common."""
+FIRST_RAYS = 1 << 14
+"""Rays of the first pilot, all of which are followed; the second has no fewer."""
+RAYS_PER_PHOTON = 2.5
+"""Rays of the second pilot for each photon that is wanted, until tiles are as fine as they get."""
+MAX_RAYS = RAYS_PER_TILE * TILES_ACROSS**2
+FOLLOWED_SHARE = 0.5
+AIMED_RAYS = 1 << 13
+"""Rays that are aimed at what shines, and as many at what is bright of the surroundings: where these are seen
+through glass or in a gap, rays that are spread over the films may miss them."""
+RAYS_PER_CONTRAST = 300
+"""Rays by which openings are looked for where surroundings are as bright as the mean, and as many times more
+as they are brighter: 3 of them meet an opening that holds 1 % of the light, and 5 % of such are missed."""
+MIN_CONTRAST = 10.0
+MAX_OPENING_RAYS = 1 << 21
+MAX_OPENINGS = 256
+"""Openings that are looked for in all views, at most: where the surroundings are seen on more tiles, they are
+no small part of the picture."""
+GUESSES, GUESSES_PER_VIEW = 1 << 20, (32, 1024)
+"""Rays by which all of them are looked for again, and the least and largest number for one in one view."""
+OPENING_SPREAD_PX = 1.0
+AMBIENT_SHARE = 3.0
+"""Light that surfaces throw at each other is guessed to be this many times the mean radiance."""
 WARM_UP_SHARE = 0.15
-"""The warm-up's rounds aim for this share of the photons, but take so many candidates at least, at most."""
+"""Share of the photons that a round of the warm-up aims for, within `WARM_UP_CANDIDATES`."""
 WARM_UP_CANDIDATES = (1 << 13, 1 << 17)
 WARM_UP_ROUNDS = 2
-REHEARSALS = 16
-"""Rehearsals at most, each of as many candidates as the photons take or of `REHEARSAL_PATHS`."""
+MAX_REHEARSALS = 16
+"""Each has as many candidates as the photons take, or `REHEARSAL_PATHS`."""
 REHEARSAL_PATHS = 1 << 18
-MOST_MISSING_SD = 0.2
+MAX_MISSING_SD = 0.2
 """Light that may lie above the bounds before photons are drawn, in standard deviations of their number: if
 none of it were drawn, n photons would be short by this times sqrt(n). What a draw meets of it is drawn."""
 MEAN_OF = 4
-"""Rehearsals end if the first is within `MOST_MISSING_SD`, or else the mean of this many is: of light in rare
+"""Rehearsals end if the first is within `MAX_MISSING_SD`, or else the mean of this many is: of light in rare
 paths one of them may have met little by chance. If neither is so, views are rendered."""
-MOST_REACH = 4
+MAX_REACH_TILES = 4
 EXCESS_SHARE = 1e-5
 """Share of the light that the warm-up leaves above the majorant."""
-LIKELY_SHARE = 0.3
+KEPT_SHARE_GUESS = 0.3
 """Share of the candidates that are kept, until it is known."""
-LEAST_SHARE = 1e-4
+MIN_KEPT_SHARE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +90,7 @@ class Exploration:
     majorant: Majorant | None
     emission: EmissionSampler
     ambient: np.ndarray
-    share: float
+    kept_share: float
     paths: int
     max_dark_candidates: int
     """Where so many candidates of a scope find no light it has none."""
@@ -63,48 +100,191 @@ class Exploration:
 
 
 def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
-    """The majorant for so many photons; see `thin_photons` for the arguments and for what is raised."""
-    if (photons_per_radiance is None) == (photons.scope == "exposure"):
-        raise ValueError("photons_per_radiance: needed for photons of scope 'exposure', and for no others")
-    groups, grid = cell_groups(photons.scope, setup.cfa), setup.grid
+    """The majorant for as many photons; see `thin_photons` for the arguments and for what is raised.
 
-    def expected(mean: np.ndarray) -> float:
-        """Photons in all, given the mean radiance of each colour."""
-        if photons_per_radiance is None:
-            return photons.budget * len(groups) * (1 if photons.scope == "scene" else grid.view_count)
-        cells = colour_cells(setup.cfa).ravel()
-        pixels = grid.view_count * grid.height * grid.width
-        return float(photons_per_radiance * mean[cells].mean() * pixels)
-
+    A first pilot of few rays measures the mean radiance. A second, also spread evenly, finds the surfaces;
+    tiles are so large that each holds several of its rays. Others are aimed at what is known to be bright.
+    Then the majorant is warmed up and rehearsed.
+    """
+    scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
     emission = EmissionSampler(setup)
-    share_of_emission = _share_of(emission, setup) if emission.mass else 0.0
-    pilot = send_pilot(setup, emission, expected)
+    kept_of_emission = _kept_share_of(emission, setup) if emission.mass else 0.0
+    pilot = _send_pilot(setup, emission, scopes)
     found = Exploration(
-        pilot.majorant, emission, pilot.ambient, LIKELY_SHARE, pilot.paths, pilot.max_dark_candidates
+        pilot.majorant, emission, pilot.ambient, KEPT_SHARE_GUESS, pilot.paths, pilot.max_dark_candidates
     )
     film_mass = 0.0
     if pilot.majorant is not None:
-        direct = emission.mass * share_of_emission
-        warmed = _Warming(setup, pilot.majorant, groups, pilot.ambient, expected(pilot.mean), direct)
-        warmed.warm_up()
-        is_bounded = warmed.rehearse()
-        film_mass = float(warmed.sampler().mass.mean())
-        paths = pilot.paths + warmed.paths
+        expected = scopes.expected_photons(pilot.mean)
+        warming = _Warming(setup, pilot.majorant, scopes.cell_groups, pilot.ambient, expected)
+        warming.warm_up()
+        is_bounded = warming.rehearse(direct=emission.mass * kept_of_emission)
+        film_mass = float(warming.sampler().mass.mean())
         found = replace(
-            found, share=warmed.share, paths=paths, is_bounded=is_bounded, excess_share=warmed.excess_share
+            found,
+            kept_share=warming.kept_share,
+            paths=pilot.paths + warming.paths,
+            is_bounded=is_bounded,
+            excess_share=warming.excess_share,
         )
     if emission.mass:
-        share = (film_mass * found.share + emission.mass * share_of_emission) / (film_mass + emission.mass)
-        found = replace(found, share=max(share, LEAST_SHARE))
+        kept = film_mass * found.kept_share + emission.mass * kept_of_emission
+        found = replace(found, kept_share=max(kept / (film_mass + emission.mass), MIN_KEPT_SHARE))
     return found
 
 
-def _share_of(emission: EmissionSampler, setup: Setup) -> float:
+def sampler_for(
+    setup: Setup,
+    majorant: Majorant,
+    groups: Sequence[np.ndarray],
+    ambient: np.ndarray,
+    below: Majorant | None = None,
+) -> CandidateSampler:
+    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around.
+
+    All at once where a compiled backend runs, else one by one. With `below` those of what lies between the
+    two majorants (see `CandidateSampler`).
+    """
+    if is_scalar(setup.render_scene.mi):
+        return ScalarSampler(setup, majorant, groups, below)
+    return WavefrontSampler(setup, majorant, groups, ambient, below)
+
+
+@dataclass(frozen=True)
+class _Pilot:
+    """A first majorant (see `Exploration`), mean radiance (C,) of all views, ambient light, paths it took."""
+
+    majorant: Majorant | None
+    mean: np.ndarray
+    ambient: np.ndarray
+    paths: int
+    max_dark_candidates: int
+
+
+def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> _Pilot:
+    """Find where there is light, and how much at most, with the effort that the photons deserve."""
+    surroundings = np.zeros(setup.channels)
+    if not is_scalar(setup.render_scene.mi):  # where candidates are guessed at
+        surroundings = surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
+    first, paths = _send_first_pilot(setup, surroundings)
+    mean = first.light.mean(axis=0)
+    if not mean.any():
+        max_dark_candidates = _sampler_of_films(setup, surroundings).max_dark_candidates
+        return _Pilot(None, mean, surroundings, paths, max_dark_candidates)
+    ambient = surroundings + AMBIENT_SHARE * mean.mean()
+    # A colour that the pilot did not find may be there nevertheless.
+    dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
+    sampler = _sampler_of_films(setup, ambient)
+    photons = scopes.expected_photons(mean)
+    rays = int(np.clip(RAYS_PER_PHOTON * photons / sampler.paths_each, FIRST_RAYS, MAX_RAYS))
+    followed = int(FOLLOWED_SHARE * rays)
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="second pilot")
+    samples = [first, sampler.trace(_spread_evenly(setup, rays, path_seed), followed, path_seed)]
+    aimed = _aimed_points(setup, emission)
+    if aimed.view.size:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
+        samples.append(sampler.trace(aimed, aimed.view.size, path_seed))
+        paths += paths_of(sampler, aimed.view.size, aimed.view.size)
+    contrast = float(surroundings.max() / mean.max())
+    if contrast >= MIN_CONTRAST:
+        openings, spent = _look_for_openings(setup, sampler, Samples.joined(samples).z_mm, contrast)
+        samples, paths = [*samples, openings], paths + spent
+    known = Samples.joined(samples)
+    layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
+    paths += paths_of(sampler, rays, followed)
+    return _Pilot(fit(setup.grid, layers, known, dim), mean, ambient, paths, sampler.max_dark_candidates)
+
+
+def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, int]:
+    """Paths spread evenly, more and more of them until some find light; and how many they were."""
+    sampler = _sampler_of_films(setup, surroundings)
+    round_number, rays, paths = 0, FIRST_RAYS, 0
+    while True:
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
+        samples = sampler.trace(_spread_evenly(setup, rays, path_seed), rays, path_seed)
+        samples = samples.take(samples.followed)
+        paths += paths_of(sampler, rays, rays)
+        if samples.light.any() or rays >= sampler.max_dark_candidates:
+            return samples, paths
+        round_number, rays = round_number + 1, rays * 4
+
+
+def _spread_evenly(setup: Setup, rays: int, seed: int) -> FilmPoints:
+    return even_film_points(setup.grid, rays, np.random.default_rng(seed))
+
+
+def _aimed_points(setup: Setup, emission: EmissionSampler) -> FilmPoints:
+    """Where what shines, and what is bright of the surroundings, would be seen if nothing stood before it."""
+    rng, rig, grid = seeds.generator(EXPLORATION_SEED, stage="aimed pilot"), setup.rig, setup.grid
+    view = np.arange(AIMED_RAYS) % grid.view_count
+    rows_px, columns_px = [np.zeros(0)], [np.zeros(0)]
+    if emission.mass:
+        points = emission.film_points(view, rng)
+        rows_px.append(points.row_px)
+        columns_px.append(points.col_px)
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=1)
+    direction = bright_directions(setup.render_scene, AIMED_RAYS, path_seed)
+    if len(direction):
+        k, l = np.divmod(view, grid.cols)
+        x, y, z = np.einsum("nba,nb->an", rig.rotation[k, l], direction)
+        ahead = np.where(z > 0, z, np.nan)
+        scale_px, axis_px = grid.focal_mm / grid.pixel_mm, rig.axis_px[k, l]
+        rows_px.append(y / ahead * scale_px + axis_px[:, 1])
+        columns_px.append(x / ahead * scale_px + axis_px[:, 0])
+    row, col = np.concatenate(rows_px) + 0.5, np.concatenate(columns_px) + 0.5
+    return FilmPoints(np.resize(view, row.size), row, col).on_film(grid)
+
+
+def _look_for_openings(
+    setup: Setup, sampler: CandidateSampler, z_mm: np.ndarray, contrast: float
+) -> tuple[Samples, int]:
+    """First hits in openings to surroundings `contrast` times as bright as the mean, and rays traced.
+
+    Rays that are followed no further find openings in some view. An opening moves from view to view with what
+    is around it, at one of the depths that are known, so it is looked for in every view at such places.
+    """
+    rays = int(min(RAYS_PER_CONTRAST * contrast, MAX_OPENING_RAYS))
+    path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=3)
+    openings = _trace_misses(sampler, _spread_evenly(setup, rays, path_seed), path_seed)
+    depths_mm = z_mm[np.isfinite(z_mm)].astype(np.float64)
+    if not openings.k.size or not depths_mm.size:
+        return openings, rays
+    grid, rng = setup.grid, seeds.generator(EXPLORATION_SEED, stage="aimed pilot", part=4)
+    cells = np.unique(np.stack([openings.row, openings.col]) // 2, axis=1, return_index=True)[1]
+    seen = openings.take(rng.permutation(cells)[:MAX_OPENINGS])
+    guesses = int(np.clip(GUESSES // (seen.k.size * grid.view_count), *GUESSES_PER_VIEW))
+    each = guesses * grid.view_count
+    k, l, row, col = (part.repeat(each) for part in (seen.k, seen.l, seen.row, seen.col))
+    view = np.tile(np.arange(grid.view_count).repeat(guesses), seen.k.size)
+    per_mm = grid.focal_mm / grid.pixel_mm / rng.choice(depths_mm, view.size)
+    down, right = OPENING_SPREAD_PX * (2 * rng.random((2, view.size)) - 1)
+    row = row + 0.5 + down - (view // grid.cols - k) * (grid.pitch_mm[1] * per_mm - grid.shear_px[1])
+    col = col + 0.5 + right - (view % grid.cols - l) * (grid.pitch_mm[0] * per_mm - grid.shear_px[0])
+    points = FilmPoints(view, row, col).on_film(grid)
+    again = _trace_misses(sampler, points, path_seed)
+    return Samples.joined([openings, again]), rays + points.view.size
+
+
+def _trace_misses(sampler: CandidateSampler, points: FilmPoints, seed: int) -> Samples:
+    """Rays that hit nothing: what they see needs no light path, the guess is right."""
+    samples = sampler.trace(points, 1, seed)
+    samples = samples.take(np.isinf(samples.z_mm))
+    return replace(samples, light=samples.guess)
+
+
+def _sampler_of_films(setup: Setup, ambient: np.ndarray) -> CandidateSampler:
+    """A sampler that knows of nothing but the films."""
+    nowhere = layers_for(setup.grid, tile_px_for(setup.grid, MAX_RAYS), np.array([np.inf]))
+    flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
+    return sampler_for(setup, flat, [np.arange(4)], ambient)
+
+
+def _kept_share_of(emission: EmissionSampler, setup: Setup) -> float:
     """The share of the candidates of what shines that are kept."""
     view = np.arange(AIMED_RAYS) % setup.grid.view_count
     path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-    kept = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
-    return kept.photons.k.size / AIMED_RAYS
+    accepted = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
+    return accepted.photons.k.size / AIMED_RAYS
 
 
 @dataclass
@@ -113,46 +293,45 @@ class _Warming:
 
     setup: Setup
     majorant: Majorant
-    groups: list[np.ndarray]
+    groups: Sequence[np.ndarray]
     ambient: np.ndarray
     photons: float
-    direct: float
-    """Light that comes straight from what shines, in one view, in the unit of `CandidateSampler.mass`."""
-    share: float = LIKELY_SHARE
+    kept_share: float = KEPT_SHARE_GUESS
     paths: int = 0
     rounds: int = 0
     excess_share: float = 0.0
 
     def warm_up(self) -> None:
         """Bring all bounds to about what the light needs."""
-        number = int(np.clip(WARM_UP_SHARE * self.photons / LIKELY_SHARE, *WARM_UP_CANDIDATES))
+        number = int(np.clip(WARM_UP_SHARE * self.photons / KEPT_SHARE_GUESS, *WARM_UP_CANDIDATES))
         for _ in range(WARM_UP_ROUNDS):
-            found = self._try(self.sampler(), number)
-            factor = _factor(found.ratio)
-            self.share = max(self.share / factor, LEAST_SHARE)
+            accepted = self._try(self.sampler(), number)
+            factor = _factor(accepted.ratio)
+            self.kept_share = max(self.kept_share / factor, MIN_KEPT_SHARE)
             self.majorant.scale(factor)
-            self.majorant.lift(found.over)
+            self.majorant.lift(accepted.exceeding)
 
-    def rehearse(self) -> bool:
-        """Rehearse and lift until little enough light is above the bounds; whether that is so in the end."""
-        allowed, shares = MOST_MISSING_SD / math.sqrt(max(self.photons, 1.0)), list[float]()
-        for turn in range(REHEARSALS):
+    def rehearse(self, direct: float) -> bool:
+        """Rehearse and lift until little enough light is above the bounds; whether that is so in the end.
+
+        `direct` is light that comes straight from what shines, in the unit of `CandidateSampler.mass`.
+        """
+        allowed, shares = MAX_MISSING_SD / math.sqrt(max(self.photons, 1.0)), list[float]()
+        for turn in range(MAX_REHEARSALS):
             sampler = self.sampler()
             most = REHEARSAL_PATHS // sampler.paths_each
-            found = self._try(sampler, int(np.clip(self.photons / self.share, WARM_UP_CANDIDATES[0], most)))
+            number = int(np.clip(self.photons / self.kept_share, WARM_UP_CANDIDATES[0], most))
+            accepted = self._try(sampler, number)
             # Rare light shows on few tiles at a time, so tiles farther away are raised too.
-            self.majorant.lift(found.over, reach=min(1 + turn // 2, MOST_REACH))
-            shares.append(self._share_above(sampler, found))
+            self.majorant.lift(accepted.exceeding, reach=min(1 + turn // 2, MAX_REACH_TILES))
+            of_films = float(sampler.mass.mean()) * self.kept_share
+            ratio = accepted.ratio.astype(np.float64)
+            above = float(np.maximum(ratio - 1, 0).sum()) / max(float(ratio.sum()), 1.0)
+            shares.append(above * of_films / (of_films + direct))
             self.excess_share = float(np.mean(shares[-MEAN_OF:]))
             if (turn == 0 or turn >= MEAN_OF - 1) and self.excess_share <= allowed:
                 return True
         return False
-
-    def _share_above(self, sampler: CandidateSampler, found: Accepted) -> float:
-        """The share of all light that these candidates found above the bounds."""
-        of_films = float(sampler.mass.mean()) * self.share
-        photons = max(float(found.ratio.sum(dtype=np.float64)), 1.0)
-        return excess(found.ratio) / photons * of_films / (of_films + self.direct)
 
     def sampler(self) -> CandidateSampler:
         """Candidates by the majorant as it is now."""
@@ -160,16 +339,11 @@ class _Warming:
 
     def _try(self, sampler: CandidateSampler, number: int) -> Accepted:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=self.rounds)
-        found = sampler.try_candidates(np.arange(number) % len(self.groups), None, path_seed)
+        accepted = sampler.try_candidates(np.arange(number) % len(self.groups), None, path_seed)
         self.rounds += 1
-        self.paths += paths_of(sampler, number, found.ratio.size)
-        self.share = max(found.photons.k.size / number, LEAST_SHARE)
-        return found
-
-
-def excess(ratio: np.ndarray) -> float:
-    """Photons that paths of these ratios of radiance to bound should have given and did not."""
-    return float(np.maximum(ratio.astype(np.float64) - 1, 0).sum())
+        self.paths += paths_of(sampler, number, accepted.ratio.size)
+        self.kept_share = max(accepted.photons.k.size / number, MIN_KEPT_SHARE)
+        return accepted
 
 
 def _factor(ratio: np.ndarray) -> float:

@@ -28,13 +28,13 @@ COARSE_TILES = 8
 DIM_SHARE = 0.08
 """Coarse tiles take what is dimmer than this share of the mean radiance."""
 DIM_MARGIN = 1.5
-"""Their bound is so many times that."""
+"""The bound of a coarse tile is this many times that."""
 SMALL_SAMPLE = 16
-"""A bound comes from at least so many followed paths."""
+"""Least number of followed paths that a bound comes from."""
 FAINT = 4.0
 """A coarse tile's bound is raised for what exceeds it by less; for more a tile is listed."""
 GAP_TILES = 3
-"""Of a layer gaps of so many tiles to every side are closed."""
+"""Gaps of this many tiles to every side are closed in a layer."""
 LIFT = 1.25
 """Where a path exceeds its bound, the bound is raised above it by this factor."""
 
@@ -101,46 +101,46 @@ class Majorant:
         self.bound[listed] = np.maximum(self.bound[listed] * factor, self.dim)
         self.radiance_ratio_bound[listed] *= factor
 
-    def lift(self, over: Samples, reach: int = 1) -> None:
+    def lift(self, exceeding: Samples, reach: int = 1) -> None:
         """Raise limits above the radiance of these paths, on their tiles and on those up to `reach` away."""
-        owner = self.owner_of(over)
-        faint = (owner < self.coarse_count) & (over.light < FAINT * self.bound[owner]).all(axis=1)
+        owner = self.owner_of(exceeding)
+        faint = (owner < self.coarse_count) & (exceeding.light < FAINT * self.bound[owner]).all(axis=1)
         if faint.any():
-            _raise(self.bound, owner[faint], LIFT * over.light[faint])
-            over = over.take(~faint)
-        if not over.k.size:
+            _raise(self.bound, owner[faint], LIFT * exceeding.light[faint])
+            exceeding = exceeding.take(~faint)
+        if not exceeding.k.size:
             return
-        around = self.layers.around(self.layers.tiles_of(over), reach)
+        around = self.layers.around(self.layers.tiles_of(exceeding), reach)
         near = around.ravel()
         unlisted = _distinct(near[self.entry_of[near] < 0])
-        nothing = np.zeros((unlisted.size, over.light.shape[1]))
+        nothing = np.zeros((unlisted.size, exceeding.light.shape[1]))
         self.list_tiles(unlisted, nothing, nothing)
-        self._raise_to(self.entry_of[around], over)
+        self._raise_to(self.entry_of[around], exceeding)
 
-    def raise_bounds(self, over: Samples, reach: int) -> None:
+    def raise_bounds(self, exceeding: Samples, reach: int) -> None:
         """Raise limits above the radiance of these paths, on their own tiles and those up to `reach` away.
 
         No tile is listed, so that each path belongs to the same one as before and no limit of it falls.
         """
-        owner, layers = self.owner_of(over), self.layers
+        owner, layers = self.owner_of(exceeding), self.layers
         coarse = owner < self.coarse_count
         if coarse.any():
             row, col = self.row[owner[coarse]], self.col[owner[coarse]]
             near = np.argwhere(np.ones((2 * reach - 1, 2 * reach - 1))) - (reach - 1)
             rows = np.clip(row[:, None] + near[:, 0], 0, self.row[self.coarse_count - 1])
             entry = rows * self.coarse_cols + np.clip(col[:, None] + near[:, 1], 0, self.coarse_cols - 1)
-            self._raise_to(entry, over.take(coarse))
+            self._raise_to(entry, exceeding.take(coarse))
         if not coarse.all():
             entry = owner[~coarse]
             tiles = layers.flat(self.layer[entry], self.row[entry], self.col[entry])
             near = self.entry_of[layers.around(tiles, reach)]
-            self._raise_to(np.where(near < 0, entry[:, None], near), over.take(~coarse))
+            self._raise_to(np.where(near < 0, entry[:, None], near), exceeding.take(~coarse))
 
-    def _raise_to(self, entries: np.ndarray, over: Samples) -> None:
+    def _raise_to(self, entries: np.ndarray, exceeding: Samples) -> None:
         """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
         for levels, needed in (
-            (self.bound, over.light),
-            (self.radiance_ratio_bound, over.light / over.guess),
+            (self.bound, exceeding.light),
+            (self.radiance_ratio_bound, exceeding.light / exceeding.guess),
         ):
             _raise(levels, entries.ravel(), LIFT * needed.repeat(entries.shape[1], axis=0))
 
@@ -165,9 +165,9 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
     near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
     table = np.zeros((layers.tiles, dim.size), dtype=np.float32)
     _raise(table, tiles, samples.guess)
-    found = np.flatnonzero(table.any(axis=1))
-    bright = (table[found] * near.largest(found)[:, dim.size :] > dim).any(axis=1)
-    listed = _without_gaps(layers, _distinct(layers.around(found[bright]).ravel()))
+    hit = np.flatnonzero(table.any(axis=1))
+    is_bright = (table[hit] * near.largest(hit)[:, dim.size :] > dim).any(axis=1)
+    listed = _without_gaps(layers, _distinct(layers.around(hit[is_bright]).ravel()))
     guess = _filled(layers, listed, _highest(table, layers.around(listed)))
     highest = near.largest(listed)
     light, radiance_ratio_bound = highest[:, : dim.size], highest[:, dim.size :]

@@ -15,9 +15,9 @@ from pcii.io.dataset_writer import write_counts as save_counts
 from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import ROUNDING, Capture, Plan, two_digits
-from simgen.photons.rendering_noise import NOISE_SHARE
-from simgen.photons.thinning import places, thin_photons
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan
+from simgen.photons.scopes import Scopes, places
+from simgen.photons.thinning import thin_photons
 from simgen.sensor.detector import detect, nested_subset
 from simgen.sensor.frame_readout import counts_of, in_frames, read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals
@@ -28,7 +28,7 @@ from simgen.spec.recipe import MOST_PHOTONS, Sensor
 def thin(
     capture: Capture,
     setup: Setup,
-    made: Plan,
+    plan: Plan,
     report: Report = silent,
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them; see `thin_photons`."""
@@ -38,12 +38,12 @@ def thin(
         capture.photons,
         seed=capture.seed,
         photons_per_radiance=capture.photons_per_radiance,
-        explored=made.explored,
-        keeps_origins=made.keeps_origins,
+        explored=plan.explored,
+        keeps_origins=plan.keeps_origins,
         report=report,
     )
     return photons, log | {
-        "dense_paths_instead": made.samples * grid.view_count * grid.height * grid.width,
+        "dense_paths_instead": plan.samples * grid.view_count * grid.height * grid.width,
         "normaliser_standard_error": 0.0,
     }
 
@@ -52,26 +52,28 @@ def draw_from_views(
     capture: Capture,
     mosaic_of: Callable[[int, int], np.ndarray],
     variance_of: Callable[[int, int], np.ndarray],
-    made: Plan,
+    plan: Plan,
     report: Report,
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn from rendered ones, (H, W) each; and what the manifest says of them.
 
     `variance_of` is the noise (C,) of a view in each colour, summed over its pixels. Raises `InputError` for
-    noise that adds more than `NOISE_SHARE` to the variance of the counts, and for too much light in a pixel.
+    noise that adds more than `MAX_NOISE_SHARE` to the variance of the counts, and for too much light in a
+    pixel.
     """
-    grid, cfa, photons, gain = capture.grid, capture.cfa, capture.photons, capture.photons_per_radiance
-    views = list(np.ndindex(grid.rows, grid.cols))
+    scopes, cfa, photons, gain = capture.scopes, capture.cfa, capture.photons, capture.photons_per_radiance
+    views = list(np.ndindex(capture.grid.rows, capture.grid.cols))
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
-    dark = int((energies <= 0).all(axis=1).sum())
-    normalisers = np.tile(energies.sum(axis=0), (len(views), 1)) if photons.scope == "scene" else energies
-    noise = _measured_noise(capture, energies, normalisers, [variance_of(k, l) for k, l in views])
-    if noise > NOISE_SHARE:
-        most = two_digits(made.photons_per_view * NOISE_SHARE / noise / ROUNDING)
+    normalisers = energies
+    if scopes.is_of_all_views:
+        normalisers = np.tile(energies.sum(axis=0), (len(views), 1))
+    noise = _measure_noise(scopes, energies, normalisers, [variance_of(k, l) for k, l in views])
+    if noise > MAX_NOISE_SHARE:
+        most = 0.95 * plan.photons_per_view * MAX_NOISE_SHARE / noise
         raise InputError(
-            f"photons: the noise of views rendered with {made.samples} samples per pixel adds {noise:.2g} of "
-            f"their own variance to the counts, and {NOISE_SHARE:g} is allowed, since some light comes in "
-            f"rare and bright paths; take at most {most} photons per view, larger lamps or rougher metals"
+            f"photons: the noise of views rendered with {plan.samples} samples per pixel adds {noise:.2g} of "
+            f"their own variance to the counts, and {MAX_NOISE_SHARE:g} is allowed, as some light comes in "
+            f"rare and bright paths; take at most {most:.2g} photons per view, larger lamps or rougher metals"
         )
     totals = fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
     columns: list[list[np.ndarray]] = []
@@ -90,36 +92,34 @@ def draw_from_views(
         i, j = np.nonzero(counts)
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", number + 1, len(views))
-    k, l, i, j, n = (np.concatenate(part) for part in zip(*columns, strict=True))
-    arrivals = PhotonTable(k, l, i, j, n)
+    arrivals = PhotonTable(*(np.concatenate(part) for part in zip(*columns, strict=True)))
     if photons.nested:
-        arrivals = _one_by_one(arrivals, capture)
+        arrivals = _rank(arrivals, capture)
     return arrivals, {
         "method": "dense",
-        "samples_per_pixel": made.samples,
+        "samples_per_pixel": plan.samples,
         "rendering_noise": float(f"{noise:.3g}"),
-        "rendering_noise_forecast": made.noise,
-        "rendering_noise_allowed": NOISE_SHARE,
-        "views_without_light": dark,
-        "normaliser_standard_error": made.normaliser_error,
+        "rendering_noise_forecast": plan.noise,
+        "rendering_noise_allowed": MAX_NOISE_SHARE,
+        "views_without_light": int((energies <= 0).all(axis=1).sum()),
+        "normaliser_standard_error": plan.normaliser_error,
     }
 
 
-def _measured_noise(
-    capture: Capture, energies: np.ndarray, normalisers: np.ndarray, variances: Sequence[np.ndarray]
+def _measure_noise(
+    scopes: Scopes, energies: np.ndarray, normalisers: np.ndarray, variances: Sequence[np.ndarray]
 ) -> float:
     """Variance that the noise of all views adds to counts, as a share of their own.
 
     Energies and what they are divided by are (V, S), of each view and scope; variances are (C,) of each view.
     """
-    if capture.photons_per_radiance is not None:
-        gain = np.full_like(energies, capture.photons_per_radiance)
+    if scopes.photons_per_radiance is not None:
+        gain = np.full_like(energies, scopes.photons_per_radiance)
     else:
-        lit = normalisers > 0
-        gain = np.divide(capture.photons.budget, normalisers, out=np.zeros_like(energies), where=lit)
+        is_lit = normalisers > 0
+        gain = np.divide(scopes.photons.budget, normalisers, out=np.zeros_like(energies), where=is_lit)
     photons = float((gain * energies).sum())
-    added = float((gain**2 * np.stack(variances)).sum()) if photons > 0 else 0.0
-    return added / photons if photons > 0 else 0.0
+    return float((gain**2 * np.stack(variances)).sum()) / photons if photons > 0 else 0.0
 
 
 def write_counts(
@@ -131,44 +131,39 @@ def write_counts(
     with_origins: bool,
     keeps_frames: bool = False,
 ) -> dict[str, Any]:
-    """What the sensor counts of the arrivals, written; for the budget and for each that is nested in it.
+    """Write what the sensor counts of the arrivals, for the budget and for each that is nested in it.
 
-    With where each photon came from, if that is asked for and known, and its frame, if that is asked for.
-    What the manifest says of them.
+    `with_origins` also where each photon came from, if that is known; with `keeps_frames` also its frame.
+    Returns what the manifest says of them.
     """
     grid, cfa, photons = capture.grid, capture.cfa, capture.photons
     counts = detect(arrivals, grid, cfa, sensor, capture.seed)
-    found: dict[str, Any] = {"arrived": int(arrivals.n.sum()), "detected": int(counts.n.sum())}
+    log: dict[str, Any] = {"arrived": int(arrivals.n.sum()), "detected": int(counts.n.sum())}
     if photons.nested and (sensor.bits is not None or keeps_frames):
         counts = in_frames(counts, sensor, capture.seed)  # the same ones in each budget
     for budget in (None, *photons.nested):
-        kept = counts
+        of_budget = counts
         if budget is not None:
-            kept = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
-        kept = read_out(kept, grid, sensor, capture.seed, keeps_frames=keeps_frames)
-        events = counts_of(kept, grid, cfa, sensor, keeps_frames=keeps_frames)
+            of_budget = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
+        of_budget = read_out(of_budget, grid, sensor, capture.seed, keeps_frames=keeps_frames)
+        events = counts_of(of_budget, grid, cfa, sensor, keeps_frames=keeps_frames)
         save_counts(out / nested_name(COUNTS, budget), events)
-        if with_origins and kept.object_id is not None and kept.z_mm is not None:
-            origins = kept.object_id.repeat(kept.n), kept.z_mm.repeat(kept.n)
+        if with_origins and of_budget.object_id is not None and of_budget.z_mm is not None:
+            origins = of_budget.object_id.repeat(of_budget.n), of_budget.z_mm.repeat(of_budget.n)
             write_photon_truth(out / nested_name(PHOTON_TRUTH, budget), *origins)
-        totals_here = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
+        totals = {"total": events.total, "pixels_with_photons": int(events.events.n.size)}
         if budget is None:
-            found |= totals_here
+            log |= totals
         else:
-            found.setdefault("nested", []).append({"budget": budget, **totals_here})
-    return found
+            log.setdefault("nested", []).append({"budget": budget, **totals})
+    return log
 
 
-def _one_by_one(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
+def _rank(arrivals: PhotonTable, capture: Capture) -> PhotonTable:
     """A row for each photon, with its scope and a random rank there, so that budgets can be nested."""
-    total = int(arrivals.n.sum())
     rows = arrivals.one_by_one()
-    scope = rows.k * capture.grid.cols + rows.l
-    if capture.photons.scope == "scene":
-        scope = np.zeros_like(scope)
-    elif capture.photons.scope == "channel" and capture.cfa is not None:
-        scope = 3 * scope + rows.colours(capture.cfa)
-    order = np.lexsort((seeds.generator(capture.seed, stage="nested ranks").random(total), scope))
-    rank = np.empty(total, dtype=np.int64)
+    scope = capture.scopes.scope_of(rows)
+    order = np.lexsort((seeds.generator(capture.seed, stage="nested ranks").random(scope.size), scope))
+    rank = np.empty(scope.size, dtype=np.int64)
     rank[order] = places(scope[order])
     return replace(rows, scope=scope, rank=rank)

@@ -75,10 +75,8 @@ class ScalarSampler:
         bound = self.majorant.bound[candidates.entry, candidates.colour]
         floor = 0.0 if self.below is None else self.below.bound[candidates.entry, candidates.colour]
         ratio = own / bound
-        kept, over = (
-            np.flatnonzero(chance * bound < np.minimum(own, bound) - floor),
-            np.flatnonzero(ratio > 1),
-        )
+        kept = np.flatnonzero(chance * bound < np.minimum(own, bound) - floor)
+        exceeding = np.flatnonzero(ratio > 1)
         photon = candidates.take(kept)
         return Accepted(
             photons=PhotonTable(
@@ -92,7 +90,7 @@ class ScalarSampler:
             ),
             candidate=candidate[kept],
             ratio=ratio,
-            over=self._samples(candidates.take(over), z_mm[over], light[over]),
+            exceeding=self._samples(candidates.take(exceeding), z_mm[exceeding], light[exceeding]),
         )
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:

@@ -261,9 +261,9 @@ class WavefrontSampler:
             ),
             candidate=np.array(candidate),
             ratio=np.array(ratio),
-            over=self._exceeding(candidates, first, light, over)
+            exceeding=self._exceeding(candidates, first, light, over)
             if len(over)
-            else nothing(setup.channels).over,
+            else nothing(setup.channels).exceeding,
         )
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:

@@ -19,7 +19,8 @@ from simgen.cameras import disparities
 from simgen.cameras.calibration import turn
 from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
 from simgen.photons.candidates import even_film_points
-from simgen.photons.thinning import WAVEFRONT, candidates_needed, places
+from simgen.photons.scopes import places
+from simgen.photons.thinning import WAVEFRONT, candidates_needed
 from simgen.sensor.detector import detect, full_light_image, nested_subset
 from simgen.sensor.frame_readout import read_out
 from simgen.sensor.mosaic import draw_counts, fixed_totals, photons_per_radiance

@@ -15,7 +15,7 @@ from simgen.dataset.prepared import needs_of
 from simgen.dataset.resources import Needs, check_resources, peak_bytes, shortage, tile_count
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import layers_for, tile_px_for
-from simgen.photons.pilot import MOST_RAYS
+from simgen.photons.exploration import MAX_RAYS
 from simgen.spec.recipe import Recipe
 
 ROOM = 8e9
@@ -71,7 +71,7 @@ def test_ordinary_recipes_fit() -> None:
 )
 def test_tiles_are_counted_as_the_majorant_has_them(grid: dict[str, Any]) -> None:
     cameras, z_mm = needs(grid=grid).grid.camera_grid(), np.array([480.0, 500, 503, 640, 2000, np.inf])
-    made = layers_for(cameras, tile_px_for(cameras, MOST_RAYS), z_mm).tiles
+    made = layers_for(cameras, tile_px_for(cameras, MAX_RAYS), z_mm).tiles
     assert tile_count(cameras, z_mm) == pytest.approx(made, rel=0.02)  # shifts there are whole and even
 
 

@@ -18,11 +18,10 @@ from simgen.cameras.rig import Rig, as_rig
 from simgen.dataset.prepared import capture_of
 from simgen.photons import scalar_sampler, wavefront_sampler
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan
+from simgen.photons.counting_plan import Plan, probe
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.exploration import explore
 from simgen.photons.photon_counting import draw_from_views
-from simgen.photons.rendering_noise import probe
 from simgen.photons.shining_pieces import look_of, pieces_in_view
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend

@@ -7,8 +7,8 @@ import pytest
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
+from simgen.photons.exploration import MAX_RAYS
 from simgen.photons.majorant import Majorant, fit
-from simgen.photons.pilot import MOST_RAYS
 
 GRID = CameraGrid(rows=3, cols=4, pitch_mm=(8.0, 5.0), focal_mm=50.0, pixel_mm=0.5, height=96, width=128)
 DIM = np.array([0.02, 0.01, 0.03])
@@ -35,7 +35,7 @@ def pilot(seed: int, number: int = 4000) -> Samples:
 @pytest.fixture
 def majorant() -> Majorant:
     samples = pilot(1)
-    return fit(GRID, layers_for(GRID, tile_px_for(GRID, MOST_RAYS), samples.z_mm), samples, DIM)
+    return fit(GRID, layers_for(GRID, tile_px_for(GRID, MAX_RAYS), samples.z_mm), samples, DIM)
 
 
 def test_each_path_belongs_to_one_entry_whose_tile_holds_its_pixel(majorant: Majorant) -> None:
@@ -107,7 +107,7 @@ def test_raising_keeps_owners_and_lowers_no_limit(majorant: Majorant) -> None:
 def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(shear_px: tuple[float, float]) -> None:
     # A point at 300 mm, seen by all cameras where the contract says.
     sheared = replace(GRID, shear_px=shear_px)
-    layers = layers_for(sheared, tile_px_for(GRID, MOST_RAYS), np.array([300.0, 420.0, np.inf]))
+    layers = layers_for(sheared, tile_px_for(GRID, MAX_RAYS), np.array([300.0, 420.0, np.inf]))
     assert layers.row_shift.min() == layers.col_shift.min() == 0
     k, l = (index.ravel() for index in np.indices((3, 4)))
     row = 47.5 + shear_px[1] * (k - 1) + 100 * (10.0 - (k - 1) * 5.0) / 300
@@ -123,7 +123,7 @@ def test_tiles_of_a_layer_stay_on_the_same_piece_of_surface(shear_px: tuple[floa
 def test_a_gap_in_a_surface_is_listed_with_the_bound_of_what_is_around_it() -> None:
     # One camera, one depth; rays everywhere but in a square of 3 x 3 tiles.
     grid = replace(GRID, rows=1, cols=1)
-    tile_px = tile_px_for(grid, MOST_RAYS)
+    tile_px = tile_px_for(grid, MAX_RAYS)
     row, col = (part.ravel() for part in np.mgrid[0:96, 0:128])
     gap = (row // tile_px >= 20) & (row // tile_px < 23) & (col // tile_px >= 30) & (col // tile_px < 33)
     row, col = row[~gap], col[~gap]

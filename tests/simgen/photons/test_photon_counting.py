@@ -20,9 +20,8 @@ from simgen.dataset.prepared import capture_of, least_samples
 from simgen.photons import counting_plan as module
 from simgen.photons import photon_counting
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import PROBE_SEED, Plan
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, MAX_NORMALISER_ERROR, PROBE_SEED, Plan, probe
 from simgen.photons.photon_counting import draw_from_views, write_counts
-from simgen.photons.rendering_noise import NOISE_SHARE, NORMALISER_ERROR, probe
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.detector import nested_subset
@@ -213,7 +212,7 @@ def test_views_without_light_have_no_photons_of_any_budget() -> None:
 def test_too_many_photons_to_be_told_apart_are_refused_before_any_view_is_rendered(
     monkeypatch: pytest.MonkeyPatch, two_objects: RenderScene
 ) -> None:
-    monkeypatch.setattr(module, "MOST_SINGLE_PHOTONS", 300)
+    monkeypatch.setattr(module, "MAX_SINGLE_PHOTONS", 300)
     planned(recipe(grid=PROBED, photons={"budget": 120}), two_objects, "scalar")
     with pytest.raises(InputError, match=r"photons\.nested: .* photons are too many"):
         planned(recipe(grid=PROBED, photons=nested(budget=120)), two_objects, "scalar")
@@ -356,8 +355,8 @@ def test_what_is_made_in_either_way_is_exact_at_every_budget(
             assert planned(recipe(grid=PROBED, photons={"budget": 10}), scene, kind).thins
             for budget in (1e3, 1e7, 1e9):
                 made = planned(recipe(grid=PROBED, photons={"budget": budget}), scene, kind)
-                assert made.thins or made.noise <= NOISE_SHARE
-                assert made.keeps_origins == (6 * budget <= module.MOST_SINGLE_PHOTONS)
+                assert made.thins or made.noise <= MAX_NOISE_SHARE
+                assert made.keeps_origins == (6 * budget <= module.MAX_SINGLE_PHOTONS)
                 ways.add((made.thins, made.keeps_origins))
     assert len(ways) == 4
 
@@ -425,11 +424,11 @@ def test_a_budget_is_divided_by_light_that_is_known_well(
     made = planned(dim, two_objects, "llvm")
     error = np.sqrt(seen.variance / (made.samples * pixels)) / seen.mean
     assert made.normaliser_error == pytest.approx(error)
-    assert error <= NORMALISER_ERROR
+    assert error <= MAX_NORMALISER_ERROR
     share = made.samples / (
         made.samples - 1
     )  # and one sample less would be too few for this or for the counts
-    assert error * np.sqrt(share) > NORMALISER_ERROR or made.noise * share > NOISE_SHARE
+    assert error * np.sqrt(share) > MAX_NORMALISER_ERROR or made.noise * share > MAX_NOISE_SHARE
 
 
 def exposed(built: RenderScene, photons_per_view: float, **changes: Any) -> Recipe:
@@ -449,7 +448,7 @@ def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> N
     samples = [made.samples for made in plans]
     assert samples[0] == 1
     assert samples[0] < samples[1] < samples[2] < samples[3]
-    assert all(made.noise <= NOISE_SHARE for made in plans)
+    assert all(made.noise <= MAX_NOISE_SHARE for made in plans)
     images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
     with_images = exposed(two_objects, 1, **images)
     assert planned(with_images, two_objects, "scalar").samples == 33

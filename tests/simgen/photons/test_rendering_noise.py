@@ -10,7 +10,7 @@ from lit_scenes import two_balls
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
-from simgen.photons.rendering_noise import NOISE_SHARE, PROBE_SAMPLES, Probe, probe
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, PROBE_SAMPLES, Probe, probe
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 
@@ -56,9 +56,9 @@ def test_one_sample_less_would_be_too_few(mean: float, variance: float, gain: fl
     looked = Probe(mean, variance)
     samples = looked.samples_for(gain)
     tiny = 1 + 1e-12  # rounding of a quotient
-    assert looked.photon_noise(gain, samples) <= NOISE_SHARE * tiny
+    assert looked.photon_noise(gain, samples) <= MAX_NOISE_SHARE * tiny
     if samples > 1:
-        assert looked.photon_noise(gain, samples - 1) * tiny >= NOISE_SHARE
+        assert looked.photon_noise(gain, samples - 1) * tiny >= MAX_NOISE_SHARE
 
 
 @pytest.mark.renders
@@ -145,5 +145,5 @@ def test_planned_samples_keep_rendering_noise_out_of_the_counts(
     # The mean of n squared standard Poisson deviates, weighted by their rates, spreads by this.
     rates = gain * radiance
     spread = np.sqrt((2 * rates**2 + rates).sum() / DRAWS) / rates.sum()
-    assert excess(scene, radiance, gain, samples) < NOISE_SHARE + 4 * spread
-    assert excess(scene, radiance, gain, samples=1) > NOISE_SHARE + 4 * spread
+    assert excess(scene, radiance, gain, samples) < MAX_NOISE_SHARE + 4 * spread
+    assert excess(scene, radiance, gain, samples=1) > MAX_NOISE_SHARE + 4 * spread

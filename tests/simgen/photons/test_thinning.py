@@ -14,10 +14,9 @@ from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import as_rig
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, plan
+from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, plan
 from simgen.photons.exploration import Exploration, explore
 from simgen.photons.majorant import Majorant, fit
-from simgen.photons.rendering_noise import NOISE_SHARE
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.backend import load_drjit
@@ -416,7 +415,7 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
         done = [count for name, count, _ in reported if name == stage]
         assert done == sorted(done)
     # The fault: paths that exceed their bound give one photon, and nothing is drawn of what lies above.
-    monkeypatch.setattr("simgen.photons.thinning._Found.take_over", lambda _: None)
+    monkeypatch.setattr("simgen.photons.thinning._Photons.take_exceeding", lambda _: None)
     monkeypatch.setattr("simgen.photons.thinning._Drawing._draw_above", lambda *_: None)
     thin = thin_photons(setup, settings, seed=5, photons_per_radiance=gain, explored=known)[0]
     expected = on_tiles(rates_of(radiance, float(thin.k.size) / 4))
@@ -426,7 +425,7 @@ def test_what_exceeds_the_bounds_is_drawn_after_all(
 def test_light_that_exceeds_every_bound_is_refused(
     scene: RenderScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("simgen.photons.thinning.MOST_RAISES", 1)
+    monkeypatch.setattr("simgen.photons.thinning.MAX_RAISES", 1)
     monkeypatch.setattr("simgen.photons.majorant.LIFT", 0.3)  # never above what exceeded
     settings, setup = Photons(budget=2000), setup_of(scene)
     known = too_low(explore(setup, settings), 0.05)
@@ -454,7 +453,7 @@ def above_bound(scene: RenderScene) -> float:
 def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("simgen.photons.exploration.REHEARSALS", 0)  # which would mend them
+    monkeypatch.setattr("simgen.photons.exploration.MAX_REHEARSALS", 0)  # which would mend them
     scene = lit([WALL, ball("grey", 0.0, 600.0, (0.5, 0.5, 0.5))])
     held = above_bound(scene)
     assert held < 5e-4
@@ -485,7 +484,7 @@ def test_a_mirror_that_throws_light_on_a_wall_has_no_bound_and_a_matt_ball_has()
         capture = Capture(as_rig(grid), "GRBG", Photons(budget=3000), None, seed=1)
         made = plan(capture, setup, backend.choose().kind)
         assert (made.thins, bool(made.why_rendered)) == (is_bounded, not is_bounded)
-        assert made.noise <= NOISE_SHARE
+        assert made.noise <= MAX_NOISE_SHARE
 
 
 def test_photons_per_radiance_are_asked_for_with_an_exposure_and_no_budget(scene: RenderScene) -> None:
