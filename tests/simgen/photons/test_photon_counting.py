@@ -322,16 +322,6 @@ def test_frames_are_written_on_request_and_nested_like_the_photons(tmp_path: Pat
     assert "frame" not in zarr.open_group(without / COUNTS, mode="r")
 
 
-def test_no_photons_at_all_are_written_too(tmp_path: Path) -> None:
-    made = recipe()
-    black = draw_from_views(
-        capture_of(made, made.seed), lambda k, l: 0 * mosaic_of(k, l), no_noise, PLAN, silent
-    )[0]
-    told = write_counts(capture_of(made, made.seed), made.sensor, black, tmp_path, with_origins=True)
-    assert told["total"] == 0
-    assert (stored(tmp_path, made, 8) == 0).all()
-
-
 PROBED = {"rows": 2, "cols": 3, "height": 64, "width": 64, "pixel_mm": 0.5}
 
 
@@ -397,22 +387,6 @@ def test_all_seeds_of_a_recipe_are_made_alike(two_objects: RenderScene, scope: d
 
 
 @pytest.mark.renders
-def test_light_is_not_probed_where_it_cannot_change_the_plan(
-    two_objects: RenderScene, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(*_: Any) -> None:
-        raise AssertionError("probed")
-
-    monkeypatch.setattr(module, "probe", refuse)
-    # One sample for each of 4096 pixels takes as long as 218 photons.
-    assert planned(recipe(grid=PROBED, photons={"budget": 215}), two_objects, "llvm").thins
-    exposure = recipe(grid=PROBED, photons={"scope": "exposure"}, exposure={})
-    for needs_probe in (recipe(grid=PROBED, photons={"budget": 221}), exposure):
-        with pytest.raises(AssertionError, match="probed"):
-            planned(needs_probe, two_objects, "llvm")
-
-
-@pytest.mark.renders
 @pytest.mark.parametrize(
     ("scope", "budget", "pixels"), [("view", 250, 4096), ("channel", 84, 1024), ("scene", 1500, 6 * 4096)]
 )
@@ -452,17 +426,6 @@ def test_a_plan_takes_more_samples_for_more_light(two_objects: RenderScene) -> N
     images = {"products": {"radiance": "rgb"}, "render": {"samples_per_pixel": 33}}
     with_images = exposed(two_objects, 1, **images)
     assert planned(with_images, two_objects, "scalar").samples == 33
-
-
-@pytest.mark.renders
-def test_a_plan_asks_for_no_more_paths_than_one_pass_can_count(
-    wall: RenderScene, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    large = {"rows": 1, "cols": 1, "height": 2048, "width": 2048, "pixel_mm": 0.0156}
-    bright = recipe(grid=large, photons={"budget": 4e9})
-    assert planned(bright, wall, "scalar").thins  # which takes longer than rendering would
-    monkeypatch.setattr(module, "MOST_PATHS", 1 << 50)
-    assert not planned(bright, wall, "scalar").thins
 
 
 @pytest.mark.renders
@@ -524,14 +487,3 @@ def test_photons_of_every_budget_know_their_origin(nested_dataset: Path) -> None
 def test_a_budget_that_is_not_there_is_refused(nested_dataset: Path) -> None:
     with pytest.raises(InputError, match=r"no photons of budget 31 here; there are 400, 30, 120"):
         open_dataset(nested_dataset).at_budget(31)
-
-
-def test_an_exposure_has_no_budgets() -> None:
-    made = recipe(photons={"scope": "exposure"}, exposure={})
-    manifest = {"recipe": made.model_dump(mode="json"), "files": {}}
-    exposed = Dataset(Path("exposed"), manifest, made.grid.camera_grid(), made.cfa)
-    with pytest.raises(InputError, match="exposed: no photons of budget 1000 here; there are none"):
-        exposed.at_budget(made.photons.budget)  # the default, which an exposure does not use
-    elsewhere = replace(exposed, manifest={"files": {}})  # made by other software
-    with pytest.raises(InputError, match="there are none"):
-        elsewhere.at_budget(5)
