@@ -56,7 +56,11 @@ class Surface:
             self._lose("surfaces that are all clear")
             self.values = None
             return
-        self._set_colour(base, self.values)
+        factor = np.array(self.material.base_color_factor[:3])
+        if base is None:
+            self.values["reflectance"] = srgb_of(factor)
+        else:
+            self.values["texture"] = self._keep("colour", _tinted(base[..., :3], factor))
         self._set_finish(self.values)
         self._set_normals(self.values)
         self._set_emission(self.values, cd_m2_per_emission)
@@ -137,13 +141,6 @@ class Surface:
             above = HALF + HALF * (alpha - cutoff) / max(1 - cutoff, 1e-6)
             values["opacity"] = self._keep("opacity", _stored(np.where(alpha < cutoff, below, above)))
         return True
-
-    def _set_colour(self, base: np.ndarray | None, values: dict[str, Any]) -> None:
-        factor = np.array(self.material.base_color_factor[:3])
-        if base is None:
-            values["reflectance"] = srgb_of(factor)
-        else:
-            values["texture"] = self._keep("colour", _tinted(base[..., :3], factor))
 
     def _set_finish(self, values: dict[str, Any]) -> None:
         material = self.material

@@ -21,6 +21,9 @@ FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
 MIN_EDGE_DEG = 0.1
 """A spot's light falls off within this angle at least."""
+MIN_SIZE, MAX_SIZE = 1e-9, 1e9
+"""Of scales and places, in the file's unit."""
+NOWHERE = "which is scaled to nothing, or moved or scaled beyond numbers that can be rendered"
 MAX_TRIANGLES = 1 << 24
 """Of all objects; the renderer makes those of each instance anew, and needs 100 bytes for each."""
 TRIANGLES, FAN = 4, 6
@@ -30,8 +33,8 @@ CD_M2_PER_EMISSION: dict[EmissionUnit, float] = {"nit": 1.0, "watt": 683.0}
 """Luminance of an emission of 1, which is in cd/m^2, as the specification says, or in W/(sr m^2). Blender's
 exporter writes watts of lights times 683 lm/W, whatever their colour, but emission as it is."""
 MAY_BE_IN_WATTS = (
-    "the ratio of surfaces that shine to lights, if Blender exported the file in its lighting mode Standard: "
-    "its surfaces are 683 times too dim, which --emission-unit watt mends"
+    "the ratio of surfaces that shine to lights, 683 times too small for a file of Blender's lighting mode "
+    "Standard: give --emission-unit watt"
 )
 
 
@@ -79,11 +82,20 @@ def _placed_nodes(gltf: GltfFile) -> Iterator[tuple[int, np.ndarray]]:
 
 def _matrices(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Matrices (N, 4, 4) that scale by (N, 3), turn by quaternions (N, 4) and move by (N, 3)."""
-    quaternions = np.where(rotation.any(axis=1, keepdims=True), rotation, [0.0, 0.0, 0.0, 1.0])
+    norms = np.linalg.norm(rotation, axis=1, keepdims=True)
+    quaternions = np.where(norms > 0, rotation, [0.0, 0.0, 0.0, 1.0])
     matrices = np.tile(np.eye(4), (len(quaternions), 1, 1))
     matrices[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix() * scale[:, None, :]
     matrices[:, :3, 3] = translation
     return matrices
+
+
+def _can_stand(matrix: np.ndarray) -> bool:
+    """Whether a matrix leaves a size and a place that can be told."""
+    if not np.abs(matrix).max() <= MAX_SIZE:  # or nan
+        return False
+    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
+    return sizes.min() >= MIN_SIZE and abs(np.linalg.det(matrix[:3, :3] / sizes)) >= MIN_SIZE
 
 
 class _Reader:
@@ -106,6 +118,9 @@ class _Reader:
             for number, copy in enumerate(copies):
                 ending = "" if node.copies is None else f"-{number + 1}"
                 self._add_mesh(node, node.mesh, matrix @ copy, index, ending)
+        if (node.camera is not None or node.light is not None) and not _can_stand(matrix):
+            self.scene.lose(f"nodes[{index}], {NOWHERE}")
+            return
         if node.camera is not None:
             camera = self.gltf.item(document.cameras, node.camera, "cameras")
             angle_deg = None
@@ -140,8 +155,8 @@ class _Reader:
             matrix = np.eye(4)
         name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
         stem = mesh.name or node.name or name
-        if not np.linalg.det(matrix[:3, :3]):
-            self.scene.lose(f"'{name}', which is scaled to nothing")
+        if not _can_stand(matrix):
+            self.scene.lose(f"'{name}', {NOWHERE}")
             return
         for part, primitive in enumerate(mesh.primitives):
             key = number, part, node.skin

@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,6 +33,8 @@ MAX_LEFT_OUT = 100
 Unit = Literal["mm", "cm", "m", "in", "ft"]
 METRES: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 GLTF, MITSUBA = (".glb", ".gltf"), ".xml"
+Meshes = dict[tuple[int, bytes], tuple[str, Triangles]]
+"""File and triangles by the id of the part's triangles and the bytes of the matrix that moves them."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,12 @@ class ImportedScene:
         if self.files:
             yield f"refers to {', '.join(self.files)}"
         else:
-            size = " x ".join(f"{side:.4g}" for side in self.size_mm)
-            yield (
-                f"objects: {self.objects}; triangles: {self.triangles}; lights: {self.lights}; "
-                f"size: {size} mm (X, Y, Z)"
-            )
+            yield f"objects: {self.objects}; triangles: {self.triangles}; lights: {self.lights}"
+            yield f"size: {' x '.join(f'{side:.4g}' for side in self.size_mm)} mm (X, Y, Z)"
         if self.camera is not None:
-            angle = self.camera_angle_deg
-            seen = "" if angle is None else f", which sees {angle:.3g} degrees across"
-            yield f"the virtual centre is the camera '{self.camera}'{seen}"
+            yield f"the virtual centre is the camera '{self.camera}'"
+        if self.camera_angle_deg is not None:
+            yield f"which sees {self.camera_angle_deg:.3g} degrees across"
         yield from (f"not represented: {what}" for what in self.left_out)
 
 
@@ -139,7 +137,7 @@ def _copy_reference(path: Path, file: MitsubaFile, out: Path) -> ImportedScene:
 
 def _write_scene(scene: ForeignScene, to_world: np.ndarray, camera: str | None, out: Path) -> ImportedScene:
     """Write the folder of a translated scene."""
-    meshes = _Meshes()
+    meshes: Meshes = {}
     names = names_of_objects([part.name for part in scene.parts])
     objects = [_object(part, name, to_world, meshes) for part, name in zip(scene.parts, names, strict=True)]
     growth = float(np.linalg.norm(to_world[:3, 0])) / scene.mm
@@ -147,9 +145,9 @@ def _write_scene(scene: ForeignScene, to_world: np.ndarray, camera: str | None, 
     if not lights and not any("emission" in part.material for part in scene.parts):
         lights.append(EVEN_LIGHT)
         scene.lose("the file has no light: the scene is lit evenly from all around")
-    left_out = tuple(islice(scene.left_out, MAX_LEFT_OUT))
-    if len(scene.left_out) > MAX_LEFT_OUT:
-        left_out += (f"{len(scene.left_out) - MAX_LEFT_OUT} more",)
+    left_out = (*scene.left_out,)
+    if len(left_out) > MAX_LEFT_OUT:
+        left_out = (*left_out[:MAX_LEFT_OUT], f"{len(left_out) - MAX_LEFT_OUT} more")
     values = {"title": shorten(scene.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
     written = validate(Scene, values, f"{scene.path}: the scene made of it")
     comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in left_out)]
@@ -159,7 +157,7 @@ def _write_scene(scene: ForeignScene, to_world: np.ndarray, camera: str | None, 
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
         (new / "scene.toml").write_bytes(text)
-        for name, mesh in meshes.files.items():
+        for name, mesh in meshes.values():
             (new / name).write_bytes(ply_bytes(mesh))
         for name, pixels in scene.images.items():
             write_png(new / name, pixels)
@@ -176,29 +174,24 @@ def _write_scene(scene: ForeignScene, to_world: np.ndarray, camera: str | None, 
     )
 
 
-class _Meshes:
-    """Files of meshes by name: one for all parts that have the same triangles."""
-
-    def __init__(self) -> None:
-        self.files: dict[str, Triangles] = {}
-        self._names: dict[tuple[int, bytes], str] = {}
-
-    def name(self, part: Part, matrix: np.ndarray | None) -> str:
-        """The file of a part's mesh, moved by a matrix (3, 3) if there is one."""
-        key = id(part.triangles), b"" if matrix is None else matrix.tobytes()
-        if key not in self._names:
-            taken = {name.removesuffix(".ply") for name in self.files}
-            self._names[key] = f"{names_of_objects([part.stem], taken)[0]}.ply"
-            mesh = part.triangles
-            if matrix is not None:
-                normals = None if mesh.normals is None else mesh.normals @ np.linalg.inv(matrix)
-                faces = mesh.faces if np.linalg.det(matrix) > 0 else mesh.faces[:, ::-1]
+def _mesh_file(part: Part, matrix: np.ndarray | None, meshes: Meshes) -> str:
+    """The file of a part's mesh, moved by a matrix (3, 3) if there is one; the same meshes have one file."""
+    key = id(part.triangles), b"" if matrix is None else matrix.tobytes()
+    if key not in meshes:
+        taken = {file.removesuffix(".ply") for file, _ in meshes.values()}
+        mesh = part.triangles
+        if matrix is not None:
+            normals = None if mesh.normals is None else mesh.normals @ np.linalg.inv(matrix)
+            faces = mesh.faces if np.linalg.det(matrix) > 0 else mesh.faces[:, ::-1]
+            try:
                 mesh = Triangles.checked(mesh.positions @ matrix.T, faces, normals, mesh.texcoords)
-            self.files[self._names[key]] = mesh
-        return self._names[key]
+            except ValueError as fault:
+                raise InputError(f"the mesh '{part.stem}' {fault}") from None
+        meshes[key] = f"{names_of_objects([part.stem], taken)[0]}.ply", mesh
+    return meshes[key][0]
 
 
-def _object(part: Part, name: str, to_world: np.ndarray, meshes: _Meshes) -> dict[str, Any]:
+def _object(part: Part, name: str, to_world: np.ndarray, meshes: Meshes) -> dict[str, Any]:
     matrix = to_world @ part.matrix
     linear = matrix[:3, :3]
     scales = np.linalg.norm(linear, axis=0)
@@ -209,24 +202,20 @@ def _object(part: Part, name: str, to_world: np.ndarray, meshes: _Meshes) -> dic
     elif np.linalg.det(rotation) < 0:
         rotation, scales = rotation * [-1, 1, 1], scales * [-1, 1, 1]
     alike = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Y by a right angle: of the turns about X and Z only one is needed
+        angles_deg = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
     return {
         "name": name,
         "position_mm": _rounded(matrix[:3, 3], 6),
-        "rotation_deg": _angles_deg(rotation),
+        "rotation_deg": _rounded(angles_deg, 9),
         "shape": {
             "type": "mesh",
-            "file": meshes.name(part, linear if is_sheared else None),
+            "file": _mesh_file(part, linear if is_sheared else None, meshes),
             "scale": _significant(scales[0]) if alike else [_significant(scale) for scale in scales],
         },
         "material": part.material,
     }
-
-
-def _angles_deg(rotation: np.ndarray) -> list[float]:
-    """Turns about the fixed X, Y and Z axes, in this order."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Y by a right angle: of the turns about X and Z only one is needed
-        return _rounded(Rotation.from_matrix(rotation).as_euler("xyz", degrees=True), 9)
 
 
 def _light(matrix: np.ndarray, values: dict[str, Any], growth: float) -> dict[str, Any]:

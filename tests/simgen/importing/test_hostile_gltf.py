@@ -94,6 +94,8 @@ FILES: dict[str, tuple[bytes, str]] = {
     "NaN vertices": (plate(positions=NAN).glb(), r"accessors\[0\]: has numbers that are nan"),
     "no such joint": (with_joint(1), "JOINTS_0: expected whole numbers below 1"),
     "a circle of nodes": (changed("nodes.0.children", [0]), "stands in a circle"),
+    "far away": (changed("nodes.0.translation", [1e308, 0, 0]), "no surface in it; not represented: 'plate'"),
+    "too large": (changed("nodes.0.scale", [1e200, 1e-200, 1]), "no surface in it; not represented: 'plate'"),
     "Draco": (
         changed("extensionsRequired", ["KHR_draco_mesh_compression"]),
         "KHR_draco_mesh_compression; export it without compression",
