@@ -32,7 +32,7 @@ MAX_LEFT_OUT = 100
 """Of what is left out so many are named, and the others counted."""
 Unit = Literal["mm", "cm", "m", "in", "ft"]
 METRES: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
-GLTF, MITSUBA = (".glb", ".gltf"), ".xml"
+MITSUBA = ".xml"
 Meshes = dict[tuple[int, bytes], tuple[str, Triangles]]
 """File and triangles by the id of the part's triangles and the bytes of the matrix that moves them."""
 
@@ -93,7 +93,7 @@ def import_scene(
     """
     path, folder = Path(file), Path(out)
     suffix = path.suffix.lower()
-    if suffix not in (*GLTF, MITSUBA):
+    if suffix not in (".glb", ".gltf", MITSUBA):
         raise InputError(f"{path}: expected a glTF file (.glb or .gltf) or a Mitsuba scene (.xml)")
     if unit not in METRES:
         raise InputError(f"--unit: expected one of {', '.join(METRES)}, got {unit!r}")
@@ -121,8 +121,6 @@ def _copy_reference(path: Path, file: MitsubaFile, out: Path) -> ImportedScene:
 
     Raises `InputError` for a file that names others outside its folder, or that are missing.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
     names = (path.name, *files_named_by(path.parent, path.name))
     scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=file)
     out.parent.mkdir(parents=True, exist_ok=True)
