@@ -8,51 +8,46 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
-from simgen.base.strict_models import validate
-from simgen.importing.foreign_scene import ForeignScene, Lamp, Part, Viewpoint
-from simgen.importing.gltf_arrays import numbers, triangles_of
+from simgen.importing.foreign_scene import ForeignScene, Part
+from simgen.importing.gltf_document import Node, Primitive, PunctualLight
 from simgen.importing.gltf_file import GltfFile, read_gltf
-from simgen.importing.gltf_materials import GltfMaterials, fitted, light_values
-from simgen.importing.gltf_models import Instancing, Node, Primitive, PunctualLight
+from simgen.importing.gltf_materials import Surface, light_values
 from simgen.spec.scene import MOST_OBJECTS
 
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 """From axes with Y up that look along -Z to Y down and +Z, and back."""
-LARGEST_CONE_DEG = 89.0
-LEAST_EDGE_DEG = 0.1
+MIN_EDGE_DEG = 0.1
 """A spot's light falls off within this angle at least."""
-DEEPEST = 500
-"""Nodes that may lie within each other."""
+MIN_SIZE, MAX_SIZE = 1e-9, 1e9
+"""Of scales and places, in the file's unit."""
+NOWHERE = "which is scaled to nothing, or moved or scaled beyond numbers that can be rendered"
+MAX_TRIANGLES = 1 << 24
+"""Of all objects; the renderer makes those of each instance anew, and needs 100 bytes for each."""
+TRIANGLES, FAN = 4, 6
+"""Modes of primitives, as OpenGL numbers them; strips are between them, points and lines below."""
 EmissionUnit = Literal["nit", "watt"]
-"""Of emission, which is a factor times a strength: cd/m^2, as the specification says, or W/(sr m^2)."""
-LUMENS_PER_WATT = 683.0
-"""Blender's exporter multiplies the watts of lights by it, whatever their colour, to write candela and lux.
-It writes the emission of materials in W/(sr m^2)."""
-CD_M2_PER_EMISSION: dict[EmissionUnit, float] = {"nit": 1.0, "watt": LUMENS_PER_WATT}
-"""Luminance of an emission of 1."""
+CD_M2_PER_EMISSION: dict[EmissionUnit, float] = {"nit": 1.0, "watt": 683.0}
+"""Luminance of an emission of 1, which is in cd/m^2, as the specification says, or in W/(sr m^2). Blender's
+exporter writes watts of lights times 683 lm/W, whatever their colour, but emission as it is."""
 MAY_BE_IN_WATTS = (
-    "the ratio of surfaces that shine to lights, if Blender exported the file in its lighting mode Standard: "
-    f"its surfaces are {LUMENS_PER_WATT:g} times too dim, which --emission-unit watt mends"
+    "the ratio of surfaces that shine to lights, 683 times too small for a file of Blender's lighting mode "
+    "Standard: give --emission-unit watt"
 )
 
 
 def foreign_gltf(path: Path, metres_per_unit: float, emission_unit: EmissionUnit) -> ForeignScene:
     """Read a .gltf or .glb file. Raises `InputError` for one that is wrong, or that cannot be read."""
     gltf = read_gltf(path)
-    scene = ForeignScene(title=path.stem, mm=1000 * metres_per_unit, upright=FLIP[:3, :3])
-    for what in gltf.clamped:
+    scene = ForeignScene(path, mm=1000 * metres_per_unit, upright=FLIP)
+    for what in gltf.left_out:
         scene.lose(what)
     places = dict(_placed_nodes(gltf))
     reader = _Reader(gltf, scene, CD_M2_PER_EMISSION[emission_unit], places)
     for index, matrix in places.items():
         reader.add(gltf.document.nodes[index], index, matrix)
-    for name in gltf.unread_extensions:
-        if not any(name in what for what in scene.left_out):
-            scene.lose(name)
-    if gltf.document.animations:
-        scene.left_out.append("animations: everything stands as the file begins")
     if emission_unit == "nit" and scene.lamps and any("emission" in part.material for part in scene.parts):
         scene.lose(MAY_BE_IN_WATTS)
     return scene
@@ -63,196 +58,215 @@ def _placed_nodes(gltf: GltfFile) -> Iterator[tuple[int, np.ndarray]]:
 
     Raises `InputError` for nodes that are missing, within themselves, or within two others.
     """
-    document = gltf.document
-    number = document.scene or 0
-    if document.scenes:
-        if number >= len(document.scenes):
-            raise gltf.fault(f"scene: there is no scenes[{number}]")
-        roots = document.scenes[number].nodes
+    nodes, scenes = gltf.document.nodes, gltf.document.scenes
+    if scenes:
+        roots = gltf.item(scenes, gltf.document.scene, "scenes").nodes
     else:
-        inner = {child for node in document.nodes for child in node.children}
-        roots = tuple(index for index in range(len(document.nodes)) if index not in inner)
-    waiting = [(root, np.eye(4), 0) for root in reversed(roots)]
-    seen = set[int]()
+        children = {child for node in nodes for child in node.children}
+        roots = tuple(index for index in range(len(nodes)) if index not in children)
+    waiting = [(root, np.eye(4)) for root in reversed(roots)]
+    visited = set[int]()
     while waiting:
-        index, outer, depth = waiting.pop()
-        if index >= len(document.nodes):
-            raise gltf.fault(f"nodes: there is no nodes[{index}]")
-        if index in seen:
+        index, outer = waiting.pop()
+        node = gltf.item(nodes, index, "nodes")
+        if index in visited:
             raise gltf.fault(f"nodes[{index}]: stands in a circle, or in two places; a node has one parent")
-        if depth > DEEPEST:
-            raise gltf.fault(f"nodes[{index}]: lies within more than {DEEPEST} others")
-        seen.add(index)
-        node = document.nodes[index]
-        matrix = outer @ _matrix(node)
+        visited.add(index)
+        if node.matrix is None:
+            matrix = outer @ _matrices(*np.atleast_2d(node.translation, node.rotation, node.scale))[0]
+        else:  # by columns
+            matrix = outer @ np.reshape(node.matrix, (4, 4)).T
         yield index, matrix
-        waiting += [(child, matrix, depth + 1) for child in reversed(node.children)]
+        waiting += [(child, matrix) for child in reversed(node.children)]
 
 
-def _matrix(node: Node) -> np.ndarray:
-    """Of a node in its parent: given as it is, by columns; or scaled, turned by a quaternion, moved."""
-    if node.matrix is not None:
-        return np.array(node.matrix).reshape(4, 4).T
-    x, y, z, w = np.array(node.rotation) / (np.linalg.norm(node.rotation) or 1)
-    turn = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = turn * node.scale, node.translation
-    return matrix
+def _matrices(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Matrices (N, 4, 4) that scale by (N, 3), turn by quaternions (N, 4) and move by (N, 3)."""
+    norms = np.linalg.norm(rotation, axis=1, keepdims=True)
+    quaternions = np.where(norms > 0, rotation, [0.0, 0.0, 0.0, 1.0])
+    matrices = np.tile(np.eye(4), (len(quaternions), 1, 1))
+    matrices[:, :3, :3] = Rotation.from_quat(quaternions).as_matrix() * scale[:, None, :]
+    matrices[:, :3, 3] = translation
+    return matrices
+
+
+def _can_stand(matrix: np.ndarray) -> bool:
+    """Whether a matrix leaves a size and a place that can be told."""
+    if not np.abs(matrix).max() <= MAX_SIZE:  # or nan
+        return False
+    sizes = np.linalg.norm(matrix[:3, :3], axis=0)
+    return sizes.min() >= MIN_SIZE and abs(np.linalg.det(matrix[:3, :3] / sizes)) >= MIN_SIZE
 
 
 class _Reader:
     """What the nodes hold, put into the scene."""
 
     def __init__(
-        self,
-        gltf: GltfFile,
-        scene: ForeignScene,
-        cd_m2_per_emission: float,
-        places: dict[int, np.ndarray],
+        self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float, places: dict[int, np.ndarray]
     ) -> None:
         self.gltf, self.scene, self.places = gltf, scene, places
-        self.materials = GltfMaterials(gltf, scene, cd_m2_per_emission)
+        self.cd_m2_per_emission = cd_m2_per_emission
+        self._surfaces: dict[tuple[int | None, bool], Surface] = {}
         self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
-        self._faces = 0
+        self._triangles = 0
 
     def add(self, node: Node, index: int, matrix: np.ndarray) -> None:
         """The mesh, camera and light of a node."""
-        where = f"nodes[{index}]"
+        document = self.gltf.document
         if node.mesh is not None:
-            copies = node.extensions.mesh_gpu_instancing
-            for number, copy in enumerate([np.eye(4)] if copies is None else self._copies(copies, where)):
-                self._add_mesh(node, index, matrix @ copy, f"-{number + 1}" if copies is not None else "")
+            copies = [np.eye(4)] if node.copies is None else self._copies(node.copies)
+            for number, copy in enumerate(copies):
+                ending = "" if node.copies is None else f"-{number + 1}"
+                self._add_mesh(node, node.mesh, matrix @ copy, index, ending)
+        if (node.camera is not None or node.light is not None) and not _can_stand(matrix):
+            self.scene.lose(f"nodes[{index}], {NOWHERE}")
+            return
         if node.camera is not None:
-            self._add_camera(node, where, matrix)
-        if node.extensions.lights_punctual is not None:
-            lights = self.gltf.document.extensions.lights_punctual.lights
-            number = node.extensions.lights_punctual.light
-            if number >= len(lights):
-                raise self.gltf.fault(f"{where}: there is no lights[{number}] of KHR_lights_punctual")
-            if lights[number].intensity > 0 and any(lights[number].color):
-                self.scene.lamps.append(Lamp(matrix @ FLIP, _lamp(lights[number])))
+            camera = self.gltf.item(document.cameras, node.camera, "cameras")
+            angle_deg = None
+            if camera.yfov is not None and camera.aspect_ratio is not None:
+                half = np.tan(camera.yfov / 2) * camera.aspect_ratio
+                angle_deg = float(np.degrees(2 * np.arctan(half)))
+            name = node.name or camera.name or f"camera-{node.camera}"
+            name = f"{name}-{index}" if name in self.scene.cameras else name
+            self.scene.cameras[name] = matrix @ FLIP, angle_deg
+        if node.light is not None:
+            light = self.gltf.item(document.lights, node.light, "lights")
+            if light.intensity > 0 and any(light.color):
+                self.scene.lamps.append((matrix @ FLIP, _lamp(light)))
 
-    def _copies(self, copies: Instancing, where: str) -> list[np.ndarray]:
-        """Matrices (4, 4) of the copies of a mesh, in the node's axes (EXT_mesh_gpu_instancing)."""
+    def _copies(self, attributes: dict[str, int]) -> np.ndarray:
+        """Matrices (N, 4, 4) of the copies of a mesh, in the node's axes (EXT_mesh_gpu_instancing)."""
         kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
         columns = {
-            name.lower(): numbers(self.gltf, copies.attributes[name], where, kind, MOST_OBJECTS)
+            name: self.gltf.numbers(attributes[name], kind, MOST_OBJECTS)
             for name, kind in kinds.items()
-            if name in copies.attributes
+            if name in attributes
         }
         count = min((len(column) for column in columns.values()), default=1)
-        rows = [{name: column[row] for name, column in columns.items()} for row in range(count)]
-        source = f"{self.gltf.path}: {where}"
-        return [
-            _matrix(validate(Node, {name: part.tolist() for name, part in row.items()}, source))
-            for row in rows
-        ]
+        values = {name: np.zeros((count, 4 if kind == "VEC4" else 3)) for name, kind in kinds.items()}
+        values["SCALE"] += 1
+        values |= {name: column[:count].astype(np.float64) for name, column in columns.items()}
+        return _matrices(*values.values())
 
-    def _skinned(self, skin: int, primitive: Primitive, where: str) -> np.ndarray:
+    def _add_mesh(self, node: Node, number: int, matrix: np.ndarray, index: int, copy: str) -> None:
+        mesh = self.gltf.item(self.gltf.document.meshes, number, "meshes")
+        if node.skin is not None:
+            matrix = np.eye(4)
+        name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
+        stem = mesh.name or node.name or name
+        if not _can_stand(matrix):
+            self.scene.lose(f"'{name}', {NOWHERE}")
+            return
+        for part, primitive in enumerate(mesh.primitives):
+            key = number, part, node.skin
+            if key not in self._primitives:
+                self._primitives[key] = self._translated(primitive, node.skin, f"meshes[{number}]")
+            if (translated := self._primitives[key]) is None:
+                continue
+            ending = ""
+            if len(mesh.primitives) > 1:
+                materials = self.gltf.document.materials
+                of = "" if primitive.material is None else materials[primitive.material].name
+                ending = f"-{of or part + 1}"
+            triangles, material = translated
+            self.scene.parts.append(Part(f"{name}{ending}", matrix, triangles, f"{stem}{ending}", material))
+            self._triangles += len(triangles.faces)
+            if len(self.scene.parts) > MOST_OBJECTS or self._triangles > MAX_TRIANGLES:
+                raise self.gltf.fault(
+                    f"has more than {MOST_OBJECTS} objects or {MAX_TRIANGLES} triangles; join objects of one "
+                    "material, and simplify meshes"
+                )
+
+    def _translated(
+        self, primitive: Primitive, skin: int | None, where: str
+    ) -> tuple[Triangles, dict[str, Any]] | None:
+        """Triangles and material of a primitive, None if there is no surface."""
+        if primitive.mode < TRIANGLES:
+            self.scene.lose("points and lines, which have no surface")
+            return None
+        surface = self._surface(primitive.material, pictures=True)
+        if f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:
+            surface = self._surface(primitive.material, pictures=False)
+        if surface.values is None:
+            return None
+        triangles = self._triangles_of(primitive, surface, skin, where)
+        material = surface.material_on(triangles)
+        return None if material is None else (triangles, material)
+
+    def _surface(self, material: int | None, *, pictures: bool) -> Surface:
+        key = material, pictures
+        if key not in self._surfaces:
+            self._surfaces[key] = Surface(self.gltf, self.scene, material, self.cd_m2_per_emission, pictures)
+        return self._surfaces[key]
+
+    def _triangles_of(
+        self, primitive: Primitive, surface: Surface, skin: int | None, where: str
+    ) -> Triangles:
+        """A primitive as triangles in its own axes and unit, or in the file's axes if it has a skin."""
+        positions = self._attribute(primitive, "POSITION", "VEC3", where)
+        normals = uv = None
+        if "NORMAL" in primitive.attributes:
+            normals = self._attribute(primitive, "NORMAL", "VEC3", where, len(positions))
+            if not normals.any(axis=1).all():
+                normals = None  # an exporter's normals of faces without area
+        if surface.texcoord is not None:
+            uv = self._attribute(primitive, f"TEXCOORD_{surface.texcoord}", "VEC2", where, len(positions))
+            # The file's run down from the picture's upper left, ours up from its lower left.
+            uv = np.column_stack([uv.astype(np.float64), np.ones(len(uv))]) @ surface.uv_matrix[:2].T
+            uv = uv * [1, -1] + [0, 1]
+        if skin is not None:
+            moved = self._skinned(skin, primitive, len(positions), where)
+            positions = np.einsum("nab,nb->na", moved[:, :3, :3], positions) + moved[:, :3, 3]
+            normals = None if normals is None else np.einsum("nab,nb->na", moved[:, :3, :3], normals)
+        corners = np.arange(len(positions))
+        if primitive.indices is not None:
+            corners = self.gltf.numbers(primitive.indices, "SCALAR", 3 * MOST_FACES)[:, 0].astype(np.int64)
+        faces = _faces(corners, primitive.mode)
+        flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
+        try:
+            return Triangles.checked(positions, faces[~flat], normals, uv)
+        except ValueError as fault:
+            raise self.gltf.fault(f"{where}: {fault}") from None
+
+    def _attribute(
+        self, primitive: Primitive, name: str, kind: str, where: str, count: int | None = None
+    ) -> np.ndarray:
+        """The values (N, C) of a primitive's vertices, `count` of them if that is known."""
+        if name not in primitive.attributes:
+            raise self.gltf.fault(f"{where}: has no {name}")
+        values = self.gltf.numbers(primitive.attributes[name], kind, MOST_VERTICES)
+        if count is not None and len(values) != count:
+            raise self.gltf.fault(f"{where}: has {len(values)} elements of {name}, and {count} of POSITION")
+        return values
+
+    def _skinned(self, skin: int, primitive: Primitive, count: int, where: str) -> np.ndarray:
         """Matrices (N, 4, 4) that bring each vertex of a skinned mesh to where its joints stand.
 
         Section 3.7.3.3: the place of the node itself is of no account.
         """
-        skins = self.gltf.document.skins
-        if skin >= len(skins):
-            raise self.gltf.fault(f"{where}: there is no skins[{skin}]")
-        if not {"JOINTS_0", "WEIGHTS_0"} <= primitive.attributes.keys():
-            raise self.gltf.fault(f"{where}: a mesh with a skin needs JOINTS_0 and WEIGHTS_0")
-        joints = np.array([self.places.get(joint, np.eye(4)) for joint in skins[skin].joints])
-        number = skins[skin].inverse_bind_matrices
-        if number is not None:
-            inverse = numbers(self.gltf, number, where, "MAT4", len(joints)).reshape(-1, 4, 4)
-            joints = joints[: len(inverse)] @ inverse.transpose(0, 2, 1)
-        which, weight = (
-            numbers(self.gltf, primitive.attributes[name], where, "VEC4", MOST_VERTICES)
-            for name in ("JOINTS_0", "WEIGHTS_0")
-        )
-        if len(which) != len(weight) or which.dtype.kind != "u" or which.max() >= len(joints):
-            raise self.gltf.fault(
-                f"{where}: JOINTS_0: expected a whole number below {len(joints)}, the joints of "
-                f"skins[{skin}], for each of WEIGHTS_0"
-            )
+        values = self.gltf.item(self.gltf.document.skins, skin, "skins")
+        joints = np.array([self.places.get(joint, np.eye(4)) for joint in values.joints])
+        if values.inverse_bind_matrices is not None:
+            inverse = self.gltf.numbers(values.inverse_bind_matrices, "MAT4", len(joints))
+            joints = joints[: len(inverse)] @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
+        which = self._attribute(primitive, "JOINTS_0", "VEC4", where, count)
+        weight = self._attribute(primitive, "WEIGHTS_0", "VEC4", where, count)
+        if which.dtype.kind != "u" or which.max() >= len(joints):
+            raise self.gltf.fault(f"{where}: JOINTS_0: expected whole numbers below {len(joints)}")
         share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
         return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
 
-    def _add_mesh(self, node: Node, index: int, matrix: np.ndarray, copy: str) -> None:
-        meshes, number = self.gltf.document.meshes, node.mesh
-        assert number is not None
-        if number >= len(meshes):
-            raise self.gltf.fault(f"nodes[{index}]: there is no meshes[{number}]")
-        if node.skin is not None:
-            matrix = np.eye(4)
-            self.scene.lose("skeletons: meshes stand as the file begins")
-        mesh = meshes[number]
-        name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
-        stem = mesh.name or node.name or name
-        if not np.linalg.det(matrix[:3, :3]):
-            self.scene.lose(f"'{name}', which is scaled to nothing")
-            return
-        for part, primitive in enumerate(mesh.primitives):
-            made = self._primitive(number, part, node.skin)
-            if made is None:
-                continue
-            triangles, material = made
-            several = len(mesh.primitives) > 1
-            materials = self.gltf.document.materials
-            of = materials[primitive.material].name if several and primitive.material is not None else ""
-            ending = f"-{of or part + 1}" if several else ""
-            self.scene.parts.append(Part(f"{name}{ending}", matrix, triangles, f"{stem}{ending}", material))
 
-    def _primitive(self, mesh: int, part: int, skin: int | None) -> tuple[Triangles, dict[str, Any]] | None:
-        """Triangles and material of a primitive, None if there are none; those of one primitive are one."""
-        key = mesh, part, skin
-        if key not in self._primitives:
-            self._primitives[key] = self._read_primitive(mesh, part, skin)
-        return self._primitives[key]
-
-    def _read_primitive(
-        self, mesh: int, part: int, skin: int | None
-    ) -> tuple[Triangles, dict[str, Any]] | None:
-        where = f"meshes[{mesh}].primitives[{part}]"
-        primitive = self.gltf.document.meshes[mesh].primitives[part]
-        surface = self.materials.surface(primitive.material, where)
-        if surface is not None and f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:
-            surface = self.materials.surface(primitive.material, where, with_pictures=False)
-        if surface is None:
-            self.scene.lose("surfaces that are all clear")
-            return None
-        moved = None if skin is None else self._skinned(skin, primitive, where)
-        triangles = triangles_of(self.gltf, primitive, surface.texcoord, surface.uv_matrix, where, moved)
-        if triangles is None:
-            self.scene.lose("points and lines, which have no surface")
-            return None
-        if primitive.targets:
-            self.scene.lose("shapes that meshes can take (morph targets): they stand as they were modelled")
-        if "COLOR_0" in primitive.attributes:
-            self.scene.lose("colours of vertices")
-        self._faces += len(triangles.faces)
-        if self._faces > MOST_FACES:
-            raise self.gltf.fault(f"has more than {MOST_FACES} triangles; simplify its meshes")
-        material = fitted(surface.material, triangles, self.scene, pictures_repeat=surface.pictures_repeat)
-        return None if material is None else (triangles, material)
-
-    def _add_camera(self, node: Node, where: str, matrix: np.ndarray) -> None:
-        cameras, number = self.gltf.document.cameras, node.camera
-        assert number is not None
-        if number >= len(cameras):
-            raise self.gltf.fault(f"{where}: there is no cameras[{number}]")
-        camera = cameras[number]
-        name = node.name or camera.name or f"camera-{number}"
-        angle = None
-        if camera.perspective is None:
-            self.scene.lose(f"the parallel view of camera '{name}': cameras here have a focal length")
-        elif camera.perspective.aspect_ratio is not None:
-            half = np.tan(camera.perspective.yfov / 2) * camera.perspective.aspect_ratio
-            angle = float(np.degrees(2 * np.arctan(half)))
-        self.scene.viewpoints.append(Viewpoint(name, matrix @ FLIP, angle))
+def _faces(corners: np.ndarray, mode: int) -> np.ndarray:
+    """Triangles (M, 3) of the corners of a primitive."""
+    if mode == TRIANGLES:
+        return corners[: len(corners) // 3 * 3].reshape(-1, 3)
+    first = np.arange(max(len(corners) - 2, 0))
+    if mode == FAN:
+        return np.stack([corners[first + 1], corners[first + 2], np.full(len(first), corners[0])], axis=-1)
+    odd = first % 2  # of a strip every other triangle turns the other way
+    return np.stack([corners[first], corners[first + 1 + odd], corners[first + 2 - odd]], axis=-1)
 
 
 def _lamp(light: PunctualLight) -> dict[str, Any]:
@@ -260,13 +274,7 @@ def _lamp(light: PunctualLight) -> dict[str, Any]:
     field = "illuminance_lux" if light.type == "directional" else "intensity_cd"
     values = {"type": light.type, **light_values(field, light.intensity * np.array(light.color))}
     if light.type == "spot":
-        beam, cutoff = light.spot.inner_cone_angle, light.spot.outer_cone_angle
-        values |= _cone_values(float(np.degrees(beam)), float(np.degrees(cutoff)))
+        cutoff_deg = float(np.degrees(light.outer_cone_angle))
+        beam_deg = min(float(np.degrees(light.inner_cone_angle)), cutoff_deg - MIN_EDGE_DEG)
+        values |= {"beam_deg": round(beam_deg, 6), "cutoff_deg": round(cutoff_deg, 6)}
     return values
-
-
-def _cone_values(beam_deg: float, cutoff_deg: float) -> dict[str, float]:
-    """The angles of a spot, within what a scene allows."""
-    cutoff_deg = min(max(cutoff_deg, LEAST_EDGE_DEG), LARGEST_CONE_DEG)
-    beam_deg = min(max(beam_deg, 0.0), cutoff_deg - LEAST_EDGE_DEG)
-    return {"beam_deg": round(beam_deg, 6), "cutoff_deg": round(cutoff_deg, 6)}

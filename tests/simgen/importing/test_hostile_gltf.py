@@ -1,10 +1,8 @@
-"""glTF files that are damaged or made to harm: one sentence each, and nothing is written."""
+"""glTF files that are damaged or made to harm: one sentence each, soon, and nothing is written."""
 
 import json
-import struct
 import time
 import zlib
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,35 +18,26 @@ LIMIT_S = 2.0
 AT_600: dict[str, Any] = {"place_at_mm": (0.0, 0.0, 600.0)}
 
 
-def plate() -> GltfDraft:
+def plate(**mesh: Any) -> GltfDraft:
     draft = GltfDraft()
-    draft.node(mesh=draft.mesh(uv=QUAD_UV), name="plate")
+    draft.node(mesh=draft.mesh(uv=QUAD_UV, **mesh), name="plate")
     return draft
 
 
-def with_json(change: Callable[[dict[str, Any]], None]) -> bytes:
-    """A sound binary file whose JSON is changed."""
+def changed(path: str, value: Any) -> bytes:
+    """A sound binary file with another value at a dotted path of its JSON."""
     draft = plate()
     document = json.loads(json.dumps(draft.document()))
-    change(document)
+    *steps, last = [int(step) if step.isdigit() else step for step in path.split(".")]
+    target: Any = document
+    for step in steps:
+        target = target[step]
+    target[last] = value
     return glb(json.dumps(document).encode(), draft.bytes)
 
 
 def with_uri(uri: str) -> bytes:
-    return with_json(lambda document: document["buffers"].__setitem__(0, {"uri": uri, "byteLength": 4}))
-
-
-def changed(path: str, value: Any) -> bytes:
-    """With a value at a dotted path."""
-
-    def change(document: dict[str, Any]) -> None:
-        *steps, last = [int(step) if step.isdigit() else step for step in path.split(".")]
-        target: Any = document
-        for step in steps:
-            target = target[step]
-        target[last] = value
-
-    return with_json(change)
+    return changed("buffers", [{"uri": uri, "byteLength": 4}])
 
 
 def with_picture(content: bytes) -> bytes:
@@ -58,68 +47,58 @@ def with_picture(content: bytes) -> bytes:
     return draft.glb()
 
 
-def with_nan() -> bytes:
-    draft = GltfDraft()
-    positions = np.array([(0, 0, 0), (1, 0, 0), (0, np.nan, 0)], "<f4")
-    draft.node(mesh=draft.mesh(positions, np.array([0, 1, 2], "<u2")))
+def with_joint(number: int) -> bytes:
+    draft = plate()
+    draft.json["meshes"][0]["primitives"][0]["attributes"] |= {
+        "JOINTS_0": draft.numbers(np.full((4, 4), number, "<u2")),
+        "WEIGHTS_0": draft.numbers(np.ones((4, 4), "<f4")),
+    }
+    draft.json["nodes"][0]["skin"] = draft.put("skins", {"joints": [draft.node(name="bone")]})
     return draft.glb()
 
 
-def chain(length: int) -> bytes:
-    def change(document: dict[str, Any]) -> None:
-        document["nodes"] = [{"children": [number + 1]} for number in range(length)] + [{"mesh": 0}]
-
-    return with_json(change)
-
-
-def requires(*names: str) -> bytes:
-    return changed("extensionsRequired", list(names))
-
-
+NAN = np.array([(0, 0, 0), (1, 0, 0), (0, np.nan, 0), (0, 1, 0)], "<f4")
+MANY_NODES = b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 1_500_000 + b"[]]}"
 BOMB = png(width=60_000, height=60_000, data=zlib.compress(bytes(1 << 20)))
 FILES: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "not a glTF file"),
     "no JSON": (b"\x00\x01\x02 this is no scene", "not a glTF file"),
     "not UTF-8": (b'{"asset": "\xff"}', "not a glTF file"),
-    "a list": (b"[]", "no asset.version"),
-    "version 1": (b'{"asset": {"version": "1.0"}}', "glTF of version 1.0"),
-    "nested deeply": (b'{"asset":' + b"[" * 100_000, "nested too deeply|not a glTF file"),
-    "many parts": (
-        b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 1_500_000 + b"[]]}",
-        "more than 2000000",
-    ),
-    "NaN in JSON": (b'{"asset": {"version": "2.0"}, "nodes": [{"scale": [NaN, 1, 1]}]}', "NaN"),
-    "1e999": (b'{"asset": {"version": "2.0"}, "nodes": [{"scale": [1e999, 1, 1]}]}', r"nodes\[0\].scale"),
+    "a list": (b"[]", "its JSON is no table"),
+    "version 1": (b'{"asset": {"version": "1.0"}}', r"'asset.version'.* got '1.0'"),
+    "nested deeply": (b'{"asset":' + b"[" * 100_000, "not a glTF file"),
+    "many parts": (MANY_NODES, "more than 2000000"),
+    "NaN in JSON": (b'{"asset": {"version": "2.0"}, "nodes": [{"scale": [NaN, 1, 1]}]}', r"nodes\[0\].scale"),
+    "NaN in a range": (changed("materials", [{"alphaCutoff": float("nan")}]), r"materials\[0\].alphaCutoff"),
+    "400 digits": (changed("materials", [{"alphaCutoff": 10**400}]), r"materials\[0\].alphaCutoff"),
+    "65 000 digits": (b'{"asset": {"version": ' + b"9" * 65_000 + b"}}", "not a glTF file"),
     "cut off": (plate().glb()[:300], "cut off"),
-    "no JSON part": (struct.pack("<4sII", b"glTF", 2, 12), "without its JSON part"),
-    "http": (with_uri("http://example.org/a.bin"), "only files beside the scene's"),
-    "file": (with_uri("file:///etc/passwd"), "only files beside the scene's"),
-    "absolute": (with_uri("/etc/passwd"), "only files beside the scene's"),
-    "outside": (with_uri("../../../etc/passwd"), "lies outside"),
+    "http": (with_uri("http://example.org/a.bin"), "there is no file"),
+    "absolute": (with_uri("/etc/passwd"), "lies outside"),
     "outside, encoded": (with_uri("%2e%2e/%2e%2e/etc/passwd"), "lies outside"),
     "a device": (with_uri("../../../dev/zero"), "lies outside"),
-    "missing": (with_uri("gone.bin"), "there is no file 'gone.bin'"),
+    "a long name": (with_uri("a" * 65_000), "there is no file"),
     "bad base64": (with_uri("data:;base64,%%%"), "base64"),
-    "short buffer": (changed("buffers.0.byteLength", 10_000), r"buffers\[0\]: has \d+ bytes"),
-    "view beyond": (changed("bufferViews.0.byteLength", 10_000), r"bufferViews\[0\]: ends at byte"),
-    "accessor beyond": (changed("accessors.0.count", 1000), r"accessors\[0\]: its 1000 elements"),
-    "10^8 indices": (changed("accessors.2.count", 10**8), "has 100000000 elements"),
+    "short buffer": (with_uri("data:;base64,AAAA"), r"accessors\[0\]: its 4 elements do not fit"),
+    "short view": (changed("bufferViews.0.byteLength", 10), r"accessors\[0\]: its 4 elements do not fit"),
+    "accessor beyond": (changed("accessors.0.count", 1000), r"accessors\[0\]: its 1000 elements do not fit"),
     "10^8 zeros": (
         changed("accessors.0", {"componentType": 5126, "count": 10**8, "type": "VEC3"}),
-        "at most",
+        "at most 4194304 elements of VEC3 .* got 100000000",
     ),
     "negative": (changed("accessors.0.byteOffset", -4), "byteOffset"),
     "no such accessor": (changed("meshes.0.primitives.0.indices", 99), r"no accessors\[99\]"),
-    "index beyond": (changed("accessors.0.count", 3), "3 elements|vertex 3"),
-    "wrong type": (changed("accessors.0.type", "VEC2"), "is a VEC2; a VEC3 is needed"),
-    "NaN vertices": (with_nan(), "nan"),
+    "index beyond": (changed("accessors.0.count", 3), "vertex 3, but only"),
+    "wrong type": (changed("accessors.0.type", "VEC2"), "elements of VEC3 .* got 4 of VEC2"),
+    "sparse": (changed("accessors.0.sparse", {}), "not sparse"),
+    "NaN vertices": (plate(positions=NAN).glb(), r"accessors\[0\]: has numbers that are nan"),
+    "no such joint": (with_joint(1), "JOINTS_0: expected whole numbers below 1"),
     "a circle of nodes": (changed("nodes.0.children", [0]), "stands in a circle"),
-    "10^4 nodes deep": (chain(10_000), "more than 500"),
-    "no such mesh": (changed("nodes.0.mesh", 7), r"no meshes\[7\]"),
-    "Draco": (requires("KHR_draco_mesh_compression"), "KHR_draco_mesh_compression.*without compression"),
-    "meshopt": (
-        requires("EXT_meshopt_compression", "KHR_texture_basisu"),
-        "needs EXT_meshopt_compression; export it without compression",
+    "far away": (changed("nodes.0.translation", [1e308, 0, 0]), "no surface in it; not represented: 'plate'"),
+    "too large": (changed("nodes.0.scale", [1e200, 1e-200, 1]), "no surface in it; not represented: 'plate'"),
+    "Draco": (
+        changed("extensionsRequired", ["KHR_draco_mesh_compression"]),
+        "KHR_draco_mesh_compression; export it without compression",
     ),
     "picture bomb": (with_picture(BOMB), r"images\[0\]: "),
     "no picture": (with_picture(b"GIF89a"), r"images\[0\]: not a PNG, JPEG or TIFF"),
@@ -132,10 +111,10 @@ def test_one_sentence_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     content, sentence = FILES[name]
     path = tmp_path / "scene.glb"
     path.write_bytes(content)
-    began = time.perf_counter()
+    began = time.process_time()
     with pytest.raises(InputError, match=sentence) as refused:
-        import_scene(path, tmp_path / "out", place_at_mm=(0.0, 0.0, 600.0))
-    assert time.perf_counter() - began < LIMIT_S
+        import_scene(path, tmp_path / "out", **AT_600)
+    assert time.process_time() - began < LIMIT_S
     text = str(refused.value)
     assert text.startswith(str(path))
     assert "\n" not in text
@@ -143,10 +122,17 @@ def test_one_sentence_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_sound_file_is_read(tmp_path: Path) -> None:
-    """What all of them are but for one fault."""
-    (tmp_path / "a.glb").write_bytes(plate().glb())
-    assert import_scene(tmp_path / "a.glb", tmp_path / "out", place_at_mm=(0.0, 0.0, 600.0)).triangles == 2
+def test_time_and_length_do_not_grow_with_what_is_left_out(tmp_path: Path) -> None:
+    """300 000 extensions: the first are named and the others counted."""
+    (tmp_path / "a.glb").write_bytes(
+        changed("extensionsUsed", [f"EXT_{number}" for number in range(300_000)])
+    )
+    began = time.process_time()
+    imported = import_scene(tmp_path / "a.glb", tmp_path / "out", **AT_600)
+    assert time.process_time() - began < LIMIT_S
+    assert imported.triangles == 2
+    assert imported.left_out[0] == "EXT_0"
+    assert imported.left_out[100:] == ("299901 more",)
 
 
 @pytest.mark.parametrize(
@@ -154,12 +140,14 @@ def test_a_sound_file_is_read(tmp_path: Path) -> None:
     [
         ({"fit_mm": 0.0}, "--fit-mm: expected a length above 0, got 0"),
         ({"unit": "mile"}, "--unit: expected one of mm, cm, m, in, ft, got 'mile'"),
-        ({"emission_unit": "lumen"}, "--emission-unit: expected one of nit, watt, got 'lumen'"),
+        ({"emission_unit": "lumen"}, "--emission-unit: expected nit, or watt for a glTF file, got 'lumen'"),
         ({"place_at_mm": (0.0, 0.0, float("nan"))}, "--place-at-mm: expected three finite numbers"),
         ({"place_at_mm": (0.0, 0.0, 1e9)}, "position_mm"),
     ],
 )
-def test_options_that_make_no_sense_are_told(tmp_path: Path, options: dict[str, Any], sentence: str) -> None:
+def test_options_that_make_no_sense_are_refused(
+    tmp_path: Path, options: dict[str, Any], sentence: str
+) -> None:
     (tmp_path / "a.glb").write_bytes(plate().glb())
     with pytest.raises(InputError, match=sentence):
         import_scene(tmp_path / "a.glb", tmp_path / "out", **(AT_600 | options))
@@ -169,10 +157,8 @@ def test_nothing_of_the_users_is_overwritten(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(plate().glb())
     (tmp_path / "out").mkdir()
     with pytest.raises(InputError, match="out: is there already"):
-        import_scene(tmp_path / "a.glb", tmp_path / "out", place_at_mm=(0.0, 0.0, 600.0))
+        import_scene(tmp_path / "a.glb", tmp_path / "out", **AT_600)
     with pytest.raises(InputError, match=r"expected a glTF file \(.glb or .gltf\)"):
         import_scene(tmp_path / "a.obj", tmp_path / "other")
     with pytest.raises(InputError, match="there is no such file"):
         import_scene(tmp_path / "b.glb", tmp_path / "other")
-    with pytest.raises(InputError, match="--emission-unit: is for glTF files"):
-        import_scene(tmp_path / "a.xml", tmp_path / "other", emission_unit="watt")
