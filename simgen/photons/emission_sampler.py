@@ -76,7 +76,6 @@ class EmissionSampler:
             return
         self.look = look_of(self.surfaces, setup.cfa, setup.render_scene.filters is not None)
         self.pieces = pieces_in_view(self.surfaces, self.look, setup.rig)
-        self.normal = self.pieces.normal
         self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
         self.mass = float(self.running[-1]) if self.running.size else 0.0
 
@@ -92,15 +91,9 @@ class EmissionSampler:
         for number, own in enumerate(cells):
             is_of_group[number, own] = True
         light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
-        photons = PhotonTable(
-            k=view[light.candidate] // self.setup.grid.cols,
-            l=view[light.candidate] % self.setup.grid.cols,
-            i=light.row,
-            j=light.col,
-            n=np.ones(light.row.size, dtype=np.int64),
-            object_id=self.numbers[light.surface],
-            z_mm=light.z_mm,
-        )
+        k, l = np.divmod(view[light.candidate], self.setup.grid.cols)
+        origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
+        photons = PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin)
         return replace(nothing(self.setup.channels), photons=photons, candidate=light.candidate)
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
@@ -130,7 +123,7 @@ class EmissionSampler:
         shares = np.stack([1 - across, across * (1 - along), across * along], axis=1)
         point_mm = np.einsum("nc,ncd->nd", shares, pieces.corners_mm[piece])
         texcoord = np.einsum("nc,ncd->nd", shares, pieces.texcoords[piece])
-        normal, stretch, surface = self.normal[piece].copy(), np.ones(view.size), pieces.surface[piece]
+        normal, stretch, surface = pieces.normal[piece], np.ones(view.size), pieces.surface[piece]
         for number, one in enumerate(self.surfaces):
             if one.ball is not None:
                 here = np.flatnonzero(surface == number)
@@ -157,15 +150,10 @@ class EmissionSampler:
         scale_px = self.setup.grid.focal_mm / self.setup.grid.pixel_mm
         axis_px = rig.axis_px[k, l]
         sent = scale_px**2 * stretch * np.maximum(-(normal * away).sum(axis=1), 0) / z**3
+        row_px, col_px = y / z * scale_px + axis_px[:, 1], x / z * scale_px + axis_px[:, 0]
+        bound = pieces.bound[piece]
         return ShiningPoints(
-            surface=surface,
-            point_mm=point_mm,
-            camera_mm=camera_mm,
-            texcoord=texcoord,
-            row_px=y / z * scale_px + axis_px[:, 1],
-            col_px=x / z * scale_px + axis_px[:, 0],
-            sent=np.nan_to_num(sent),
-            bound=pieces.bound[piece],
+            surface, point_mm, camera_mm, texcoord, row_px, col_px, np.nan_to_num(sent), bound
         )
 
     def _radiance(self, surface: np.ndarray, texcoord: np.ndarray) -> np.ndarray:

@@ -62,7 +62,8 @@ class ScalarSampler:
         """See `candidates`."""
         rng = np.random.default_rng(seed)
         candidates, chance = self._draw(rng, group, view), rng.random(group.size)
-        candidate = self._inside(candidates)
+        grid, row, col = self.setup.grid, candidates.row, candidates.col
+        candidate = np.flatnonzero((row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width))
         candidates, chance = candidates.take(candidate), chance[candidate]
         object_id, z_mm = self._first_hits(candidates)
         followed = self.majorant.owner_of(self._samples(candidates, z_mm)) == candidates.entry
@@ -77,20 +78,12 @@ class ScalarSampler:
         ratio = own / bound
         kept = np.flatnonzero(chance * bound < np.minimum(own, bound) - floor)
         exceeding = np.flatnonzero(ratio > 1)
-        photon = candidates.take(kept)
+        photon, origin = candidates.take(kept), {"object_id": object_id[kept], "z_mm": z_mm[kept]}
         return Accepted(
-            photons=PhotonTable(
-                k=photon.k,
-                l=photon.l,
-                i=photon.row,
-                j=photon.col,
-                n=np.ones(kept.size, dtype=np.int64),
-                object_id=object_id[kept],
-                z_mm=z_mm[kept],
-            ),
-            candidate=candidate[kept],
-            ratio=ratio,
-            exceeding=self._samples(candidates.take(exceeding), z_mm[exceeding], light[exceeding]),
+            PhotonTable(photon.k, photon.l, photon.row, photon.col, np.ones_like(photon.k), **origin),
+            candidate[kept],
+            ratio,
+            self._samples(candidates.take(exceeding), z_mm[exceeding], light[exceeding]),
         )
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
@@ -125,11 +118,10 @@ class ScalarSampler:
         cell = np.empty(group.size, dtype=np.int64)
         for number, chances_here in enumerate(self.groups):
             here = group == number
-            found = np.searchsorted(
-                chances_here.running, target[here] * chances_here.running[-1], side="right"
-            )
-            found = np.minimum(found, chances_here.running.size - 1)
-            entry[here], cell[here] = chances_here.entry[found], chances_here.cell[found]
+            running = chances_here.running
+            place = np.searchsorted(running, target[here] * running[-1], side="right")
+            place = np.minimum(place, running.size - 1)
+            entry[here], cell[here] = chances_here.entry[place], chances_here.cell[place]
         side, layer = majorant.side_px[entry], majorant.layer[entry]
         k, l = np.divmod(view, grid.cols)
         # One number gives the pixel (its whole part) and the place within the pixel (the rest).
@@ -147,11 +139,6 @@ class ScalarSampler:
         if self.setup.rig.lens is None:
             return np.zeros((2, number))
         return self.setup.rig.lens_points(rng.random((2, number)))
-
-    def _inside(self, candidates: _Candidates) -> np.ndarray:
-        """Numbers of those that fall on the film."""
-        grid, row, col = self.setup.grid, candidates.row, candidates.col
-        return np.flatnonzero((row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width))
 
     def _first_hits(self, candidates: _Candidates) -> tuple[np.ndarray, np.ndarray]:
         """Object id int16 and planar depth float32 (+inf a miss) of what each hits first."""
@@ -209,12 +196,5 @@ class ScalarSampler:
 
     def _samples(self, candidates: _Candidates, z_mm: np.ndarray, light: np.ndarray | None = None) -> Samples:
         guess = np.full((candidates.k.size, self.setup.channels), GUESS)
-        return Samples(
-            candidates.k,
-            candidates.l,
-            candidates.row,
-            candidates.col,
-            z_mm,
-            guess,
-            guess if light is None else light,
-        )
+        place = candidates.k, candidates.l, candidates.row, candidates.col
+        return Samples(*place, z_mm, guess, guess if light is None else light)

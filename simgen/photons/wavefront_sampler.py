@@ -67,14 +67,10 @@ class MajorantArrays:
         self.entry = unsigned(mi, np.concatenate([one.entry for one in of_groups]))
         self.cell = unsigned(mi, np.concatenate([one.cell for one in of_groups]))
         self.colour = unsigned(mi, colour_cells(setup.cfa).ravel())
-        self.layer, self.row, self.col = (
-            signed(mi, part) for part in (majorant.layer, majorant.row, majorant.col)
-        )
-        self.side_px = signed(mi, majorant.side_px)
-        self.bound, self.radiance_ratio_bound = (
-            floats(mi, majorant.bound),
-            floats(mi, majorant.radiance_ratio_bound),
-        )
+        places = majorant.layer, majorant.row, majorant.col, majorant.side_px
+        self.layer, self.row, self.col, self.side_px = (signed(mi, part) for part in places)
+        self.bound = floats(mi, majorant.bound)
+        self.radiance_ratio_bound = floats(mi, majorant.radiance_ratio_bound)
         # Without an earlier majorant the same kernel runs, with a bound of 0 everywhere.
         nowhere = np.zeros_like(majorant.bound)
         self.bound_below = floats(mi, nowhere if below is None else below.bound)
@@ -99,10 +95,8 @@ class MajorantArrays:
         for _ in range(self.steps):
             middle = (low + high) >> 1
             beyond = dr.gather(mi.Float64, self.running, middle) <= target
-            low, high = (
-                dr.select(beyond, dr.minimum(middle + 1, high), low),
-                dr.select(beyond, high, middle),
-            )
+            low = dr.select(beyond, dr.minimum(middle + 1, high), low)
+            high = dr.select(beyond, high, middle)
         entry, cell = dr.gather(mi.UInt32, self.entry, low), dr.gather(mi.UInt32, self.cell, low)
         side = dr.gather(mi.Int32, self.side_px, entry)
         k, l = view // grid.cols, view % grid.cols
@@ -176,10 +170,8 @@ class MajorantArrays:
         for aside in reversed(NEXT_LAYERS):
             layer = dr.clip(nearest + aside, 0, self.last_layer)
             shift_row, shift_col = self._shifts(layer, candidates.k, candidates.l, candidates.inside)
-            row, col = (
-                (candidates.row + shift_row) // layers.tile_px,
-                (candidates.col + shift_col) // layers.tile_px,
-            )
+            row = (candidates.row + shift_row) // layers.tile_px
+            col = (candidates.col + shift_col) // layers.tile_px
             listed = gathered(self.entry_of, (layer * self.rows + row) * self.cols + col, candidates.inside)
             owner = dr.select(listed < 0, owner, listed)
         return owner
@@ -249,22 +241,14 @@ class WavefrontSampler:
         candidate = dr.gather(mi.UInt32, rest, kept)
         dr.eval(vars(photon), hit.shape, hit.z_mm, candidate)
         self._require_finite(ratio, first)
-        return Accepted(
-            photons=PhotonTable(
-                k=np.array(photon.k),
-                l=np.array(photon.l),
-                i=np.array(photon.row),
-                j=np.array(photon.col),
-                n=np.ones(len(kept), dtype=np.int64),
-                object_id=setup.render_scene.object_of_shape[np.array(hit.shape)],
-                z_mm=np.array(hit.z_mm),
-            ),
-            candidate=np.array(candidate),
-            ratio=np.array(ratio),
-            exceeding=self._exceeding(candidates, first, light, over)
-            if len(over)
-            else nothing(setup.channels).exceeding,
-        )
+        exceeding = nothing(setup.channels).exceeding
+        if len(over):
+            exceeding = self._exceeding(candidates, first, light, over)
+        k, l, i, j = (np.array(part) for part in (photon.k, photon.l, photon.row, photon.col))
+        object_id = setup.render_scene.object_of_shape[np.array(hit.shape)]
+        origin = {"object_id": object_id, "z_mm": np.array(hit.z_mm)}
+        photons = PhotonTable(k, l, i, j, np.ones(len(kept), np.int64), **origin)
+        return Accepted(photons, np.array(candidate), np.array(ratio), exceeding)
 
     def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
         """See `candidates`."""
