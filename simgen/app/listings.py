@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from pcii.base.errors import InputError
-from simgen.base.locations import recipe_roots
+from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import shorten
 from simgen.spec.scene_lookup import drawn_scenes, load_scene, scene_names
 from simgen.spec.sweeps import load_sweep

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pcii.base.errors import InputError
 from pcii.store.safe_files import new_folder_safely, write_bytes_safely
-from simgen.base.locations import scene_roots
+from simgen.base.file_lookup import scene_roots
 from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
 from simgen.check.scene_probe import probe_scene
 from simgen.check.targets import load_target

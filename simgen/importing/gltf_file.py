@@ -11,7 +11,7 @@ from urllib.parse import unquote
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.base.asset_names import LARGEST_FILE_BYTES, asset
+from simgen.base.file_lookup import LARGEST_FILE_BYTES, asset
 from simgen.base.strict_models import LONGEST_PART, shorten, validate
 from simgen.importing.gltf_models import Document
 
