@@ -14,6 +14,7 @@ from simgen.app.scene_commands import (
     Json,
     Out,
     Overrides,
+    TrustPython,
     check,
     import_scene,
     new_recipe,
@@ -56,8 +57,6 @@ def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
     ----------
     require_compiled
         Leave with exit code 1 if neither CUDA nor LLVM works (for scripts that install LLVM).
-    json
-        Print the same as JSON.
     """
     from dataclasses import asdict
 
@@ -87,7 +86,7 @@ def generate(
     set: Overrides = (),
     seeds: int | None = None,
     scenes: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
@@ -109,15 +108,11 @@ def generate(
         Path of a recipe file, or name of one that ships; or a scene, seen by the paper's cameras.
     out
         Folder for the dataset or collection: new, empty, or an unfinished one of the same recipe.
-    set
-        Override one value of the recipe, such as photons.budget=300; may be repeated.
     seeds
         Make so many datasets, of the recipe's seed and those that follow. Each is whole; radiance is rendered
         for each, so leave it out where nothing needs it.
     scenes
         Make datasets of this many drawn scenes, from the recipe's scene_number on.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
     """
     from simgen.app.library import RecipeFile, generate_sweep
     from simgen.app.library import generate as generate_dataset
@@ -274,8 +269,6 @@ def verify(dataset: Path, *, json: Json = False) -> None:
     ----------
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
-    json
-        Print the number of files, or what is wrong, as JSON.
     """
     from pcii.io.verification import verify_and_tell
 

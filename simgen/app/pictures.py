@@ -16,7 +16,7 @@ from pcii.core.truth import Truth
 from pcii.core.view_figures import colours_and_samples
 from pcii.figures.exposure import block_px, exposed
 from pcii.figures.object_maps import named_width
-from pcii.figures.panels import hide_frame, new_figure, write_in_middle
+from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import to_srgb8, white_level
 from pcii.imaging.blocks import evenly_chosen
 from pcii.io.dataset import Dataset, open_dataset
@@ -49,7 +49,6 @@ BLOCKS_PER_PHOTON = 2.0
 """More blocks show smaller things, and leave more of them dark."""
 BLOCKS = 24, 128
 """Blocks along the longer side of a view's photons, at least and at most."""
-MAX_BARS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,39 +150,31 @@ def write_sheet(path: Path, out: Path) -> None:
 
 
 def draw_sheet(dataset: Dataset) -> "Figure":
-    """The contact sheet of a dataset as a figure."""
-    grid = dataset.grid
-    counts = dataset.counts if dataset.has(COUNTS) else None
+    """The contact sheet of a dataset as a figure; the place of what it does not have stays empty."""
+    grid, truth, views = dataset.grid, dataset.truth, dataset.views
     aspect = float(np.clip(grid.width / grid.height, *ASPECTS))
-    rows, cols = (min(number, MAX_TILES) for number in (grid.rows, grid.cols))
-    photons = 2 * float(np.clip(aspect * cols / rows, *ASPECTS))
-    widths = photons, aspect + 0.2, max(aspect * named_width(aspect), 1.4)
-    figure = new_figure(PANEL_IN * sum(widths) + 1.0, 2 * PANEL_IN + 2.0, "constrained")
-    panels = figure.subplot_mosaic(
-        [["photons", "depth", "objects"], ["photons", "full light", "histogram"]], width_ratios=widths
-    )
-    if counts is None:
-        _say_absent("photon counts", panels["photons"], panels["histogram"])
-    else:
-        _draw_photons(panels["photons"], counts)
-        _draw_histogram(panels["histogram"], counts)
-    if dataset.truth is None:
-        _say_absent("truth", panels["depth"], panels["objects"])
-    else:
-        _draw_truth(panels["depth"], panels["objects"], dataset.truth)
-    if dataset.views is None:
-        _say_absent("full-light images", panels["full light"])
-    else:
-        dataset.views.plot(panels["full light"])
-    title = str(dataset.manifest.get("title") or dataset.name)
-    figure.suptitle("\n".join((title, *_facts(dataset, counts))), fontsize=12, parse_math=False)
-    return figure
-
-
-def _say_absent(product: str, *panels: "Axes") -> None:
-    for axes in panels:
+    second = float(np.clip(aspect * grid.cols / grid.rows, aspect * named_width(aspect), 4.0))
+    widths = aspect + 0.2, second
+    figure = new_figure(PANEL_IN * sum(widths), 2 * PANEL_IN + 1.5, "constrained")
+    panels = figure.subplot_mosaic([["view", "photons"], ["depth", "objects"]], width_ratios=widths)
+    lines = [
+        str(dataset.manifest.get("title") or dataset.name),
+        f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, "
+        f"{dataset.cfa or 'monochrome'}, pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm",
+    ]
+    if views is not None:
+        views.plot(panels["view"])
+    if dataset.has(COUNTS):
+        counts = dataset.counts
+        lines.append(f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view")
+        panels["photons"].set_title(f"photons of up to {MAX_TILES} x {MAX_TILES} views")
+        panels["photons"].imshow(photon_tiles(counts), interpolation="nearest")
+    if truth is not None:
+        _draw_truth(panels["depth"], panels["objects"], truth)
+    for axes in panels.values():
         hide_frame(axes)
-        write_in_middle(axes, f"this dataset has no {product}")
+    figure.suptitle("\n".join(lines), fontsize=12, parse_math=False)
+    return figure
 
 
 def photon_tiles(counts: PhotonCounts) -> np.ndarray:
@@ -202,34 +193,3 @@ def photon_tiles(counts: PhotonCounts) -> np.ndarray:
     _, h, w, _ = tiles.shape
     sheet = tiles.reshape(-1, len(cols), h, w, 3).transpose(0, 2, 1, 3, 4)
     return sheet.reshape(-1, len(cols) * w, 3)[:-GAP_PX, :-GAP_PX]
-
-
-def _draw_photons(axes: "Axes", counts: PhotonCounts) -> None:
-    rows, cols = (min(number, MAX_TILES) for number in (counts.grid.rows, counts.grid.cols))
-    axes.set_title(f"photons of {rows} x {cols} views")
-    hide_frame(axes)
-    axes.imshow(photon_tiles(counts), interpolation="nearest")
-
-
-def _draw_histogram(axes: "Axes", counts: PhotonCounts) -> None:
-    n, pixels = counts.events.n, int(np.prod(counts.grid.shape_KLHW))
-    step = int(n.max(initial=0)) // MAX_BARS + 1
-    bars = np.bincount(n // step, minlength=1)
-    bars[0] += pixels - n.size
-    axes.bar(np.arange(bars.size) * step, bars, width=0.85 * step, align="edge")
-    axes.set(yscale="log", ylim=(0.5, 3 * pixels), ylabel="pixels", title="counts per pixel, all views")
-    axes.set_xlabel("photons in a pixel" + ("" if step == 1 else f", in steps of {step}"))
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def _facts(dataset: Dataset, counts: PhotonCounts | None) -> list[str]:
-    """A line on the cameras, and one on the light."""
-    grid = dataset.grid
-    lines = [
-        f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, "
-        f"pixel {1000 * grid.pixel_mm:.4g} um, {dataset.cfa or 'monochrome'}, "
-        f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm, focal length {grid.focal_mm:g} mm"
-    ]
-    if counts is not None:
-        lines.append(f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view")
-    return lines

@@ -8,9 +8,18 @@ from cyclopts import Parameter
 
 from pcii.base.command_output import answer, answer_json, say, say_next
 
-Json = Annotated[bool, Parameter(name="--json")]
+Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
-Overrides = Annotated[tuple[str, ...], Parameter(name="--set")]
+Overrides = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set", help="Override one value of the recipe, such as photons.budget=300; may be repeated."
+    ),
+]
+TrustPython = Annotated[
+    bool,
+    Parameter(help="Run the Python function that a recipe file names as its scene, if you trust its author."),
+]
 
 
 def scenes() -> None:
@@ -68,7 +77,7 @@ def check(
     *,
     set: Overrides = (),
     scene: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     json: Json = False,
 ) -> int:
     """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
@@ -87,14 +96,8 @@ def check(
     ----------
     target
         A recipe, or a scene, which is looked at with the paper's camera grid; by name or path.
-    set
-        Override one value of the recipe, such as photons.budget=300; may be repeated.
     scene
         Which scene of those that a Python function draws; the first unless you say.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
-    json
-        Print the findings as JSON.
     """
     from simgen.check.targets import lint
 
@@ -120,7 +123,7 @@ def preview(
     out: Out,
     set: Overrides = (),
     scene: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     samples_per_pixel: int = 32,
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
@@ -139,12 +142,8 @@ def preview(
         A recipe, or a scene, which is looked at with the paper's field of view; by name or path.
     out
         The picture to write, .png or .jpg, in a folder that exists.
-    set
-        Override one value of the recipe, such as grid.pixel_mm=0.02; may be repeated.
     scene
         Which scene of those that a Python function draws.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from string import Template
 
@@ -19,46 +20,31 @@ from simgen.spec.sweeps import load_sweep
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 LONGEST_FAULT = 100
-MAX_NAMES = 6
-"""Largest number of objects that the line of a scene names."""
 
 
 def list_scenes() -> list[str]:
     """A line for each scene by name, then for those that Python functions draw."""
     drawn = [f"{name:20} Made by {package} (drawn by number)" for name, package in drawn_scenes().items()]
-    return [f"{name:20} {_describe_scene(name)}" for name in scene_names()] + drawn
-
-
-def _describe_scene(name: str) -> str:
-    try:
-        scene, _ = load_scene(name)
-    except InputError as fault:
-        return _describe_fault(fault)
-    names = [thing.name for thing in scene.objects]
-    if len(names) > MAX_NAMES:
-        names = [*names[: MAX_NAMES - 1], f"{len(names) - MAX_NAMES + 1} more"]
-    return f"{scene.title} ({', '.join(names) or 'no objects'})"
+    return [_line(name, lambda name: load_scene(name)[0].title) for name in scene_names()] + drawn
 
 
 def list_recipes() -> list[str]:
-    """A line for each recipe by name; of one that makes several datasets the first is described."""
+    """A line for each recipe by name."""
     names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-    return [f"{name:20} {_describe_recipe(name)}" for name in sorted(names)]
+    return [_line(name, _title_of_recipe) for name in sorted(names)]
 
 
-def _describe_recipe(name: str) -> str:
+def _title_of_recipe(name: str) -> str:
+    recipe = load_sweep(f"{name}.toml").recipe(0)
+    return recipe.title or recipe.scene
+
+
+def _line(name: str, title_of: Callable[[str], str]) -> str:
+    """A name and its title, or what is wrong with its file."""
     try:
-        sweep = load_sweep(f"{name}.toml")
-        recipe = sweep.recipe(0)
+        return f"{name:20} {title_of(name)}"
     except InputError as fault:
-        return _describe_fault(fault)
-    grid, several = recipe.grid, f"; {len(sweep)} datasets" if len(sweep) > 1 else ""
-    size = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width}"
-    return f"{recipe.title or recipe.scene} ({size}{several})"
-
-
-def _describe_fault(fault: InputError) -> str:
-    return f"not valid: {shorten(str(fault), LONGEST_FAULT)}"
+        return f"{name:20} not valid: {shorten(str(fault), LONGEST_FAULT)}"
 
 
 def write_new_scene(name: str, source: str | None = None) -> Path:
