@@ -98,7 +98,6 @@ def generate(
 
         simgen generate data_recipes/paper.toml -o out/paper
         simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
-        simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
         simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
         simgen generate drawn_crossing -o out/crossings --scenes 1000
 
@@ -231,11 +230,8 @@ def export(
     Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
-        simgen export out/small --format hci -o out/hci/small
         simgen export out/small --format nerfstudio -o out/small-poses
         simgen export out/spad --format photoncube -o out/spad-cubes
-        simgen export out/paper --format saii --budget 300 -o out/paper-300
-        simgen export out/sweep --format events -o out/sweep-events
 
     Parameters
     ----------
@@ -260,10 +256,9 @@ def verify(dataset: Path, *, json: Json = False) -> None:
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Examples of use:
+    Example of use:
 
         simgen verify out/paper
-        simgen verify out/paper --json
 
     Parameters
     ----------
