@@ -13,6 +13,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from simgen.app.in_memory import draw_photons, render
     from simgen.app.library import (
         Executor,
         RecipeFile,
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
         load_scene,
         preview,
     )
-    from simgen.app.without_files import draw_photons, render
     from simgen.importing.scene_import import ImportedScene, import_scene
     from simgen.spec.camera_grid import CalibrationErrors, Lens
     from simgen.spec.lights import (
@@ -87,7 +87,7 @@ __all__ = [
 ]
 _MODULES = (
     "app.library",
-    "app.without_files",
+    "app.in_memory",
     "importing.scene_import",
     "spec.scene",
     "spec.shapes",

@@ -43,31 +43,6 @@ def said_in_json(app: object, words: list[str], capsys: pytest.CaptureFixture[st
     return json.loads(capsys.readouterr().out)
 
 
-def test_lists_for_scripts_have_what_lists_for_people_have(capsys: pytest.CaptureFixture[str]) -> None:
-    for what, name in (("scenes", "two_objects"), ("recipes", "paper")):
-        assert command_line.run(simgen_cli.app, [what]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        listed = said_in_json(simgen_cli.app, [what], capsys)
-        assert isinstance(listed, list)
-        assert [entry["name"] for entry in listed] == [line.split()[0] for line in lines]
-        assert name in {entry["name"] for entry in listed}
-        assert not [entry for entry in listed if entry["fault"]]
-
-
-def test_a_broken_scene_does_not_hide_the_others(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    for file in (Path("scenes/mine/scene.toml"), Path("data_recipes/mine.toml")):
-        file.parent.mkdir(parents=True)
-        file.write_text("titel = 3")
-    for what in ("scenes", "recipes"):
-        assert command_line.run(simgen_cli.app, [what]) == 0
-        lines = {line.split()[0]: line for line in capsys.readouterr().out.splitlines()}
-        assert "not valid: " in lines["mine"]
-        assert "not valid: " not in lines["blank"]
-
-
 def test_a_verification_for_scripts_tells_the_fault(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -170,27 +170,23 @@ def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
         assert np.asarray(picture).std(axis=2).max() > 10  # grey would have none
 
 
-def test_bad_input_to_simgen_is_told_in_one_sentence(
+def test_bad_input_to_simgen_is_refused_in_one_sentence(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    recipe, out = tmp_path / "r.toml", str(tmp_path / "out")
-    recipe.write_text('scene = "two_objects"\n[photon]\nbudget = 3\n')
-    assert "did you mean 'photons'" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
-    recipe.write_text('scene = "nowhere"\n')
-    assert "there is no scene 'nowhere'" in refusal(
-        simgen_cli.app, ["generate", str(recipe), "-o", out], capsys
-    )
-    recipe.write_text('scene = "two_objects"\n[sensor]\ncfa = "GRGB"\n')
-    assert "GRBG" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
-    recipe.write_text("scene = ")
-    assert "not valid TOML" in refusal(simgen_cli.app, ["generate", str(recipe), "-o", out], capsys)
+    recipe, out = tmp_path / "r.toml", tmp_path / "out"
+    generate = ["generate", str(recipe), "-o", str(out)]
+    for text, message in (
+        ('scene = "two_objects"\n[photon]\nbudget = 3\n', "did you mean 'photons'"),
+        ('scene = "nowhere"\n', "there is no scene 'nowhere'"),
+        ("scene = ", "not valid TOML"),
+    ):
+        recipe.write_text(text)
+        assert message in refusal(simgen_cli.app, generate, capsys)
     recipe.write_text('scene = "two_objects"\n')
-    assert "holds something else" in refusal(
-        simgen_cli.app, ["generate", str(recipe), "-o", str(tmp_path)], capsys
-    )
+    assert "holds something else" in refusal(simgen_cli.app, [*generate[:3], str(tmp_path)], capsys)
     refusal(simgen_cli.app, ["generate"], capsys)
-    refusal(simgen_cli.app, ["generate", str(recipe), "-o", out, "--colour"], capsys)
-    assert not Path(out).exists()
+    refusal(simgen_cli.app, [*generate, "--colour"], capsys)
+    assert not out.exists()
 
 
 def test_bad_input_to_pcii_is_told_in_one_sentence(
@@ -293,15 +289,11 @@ def test_a_budget_that_is_not_there_is_refused(
     ("app", "command"),
     [
         (simgen_cli.app, "generate paper --seeds 2 --workers"),
-        (simgen_cli.app, "generate paper --seeds"),
-        (simgen_cli.app, "generate paper --scenes"),
-        (simgen_cli.app, "check drawn_room --scene"),
         (simgen_cli.app, "preview drawn_room --scene"),
-        (simgen_cli.app, "preview drawn_room --samples-per-pixel"),
         (pcii_cli.app, "evaluate somewhere --workers"),
     ],
 )
-@pytest.mark.parametrize("given", ["2.5", "2.0", "1e3", "two"])
+@pytest.mark.parametrize("given", ["2.5", "1e3", "two"])
 def test_a_number_that_is_not_whole_is_refused_where_one_is_due(
     app: object, command: str, given: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -332,23 +324,16 @@ def test_help_of_every_command_has_an_example(capsys: pytest.CaptureFixture[str]
                 assert "Example" in capsys.readouterr().out, command
 
 
-def test_doctor_and_scenes_and_schema_speak(capsys: pytest.CaptureFixture[str]) -> None:
-    assert command_line.run(simgen_cli.app, ["doctor"]) == 0
-    assert "Rendering will run with" in capsys.readouterr().out
-    assert command_line.run(simgen_cli.app, ["scenes"]) == 0
-    assert "two_objects" in capsys.readouterr().out
-    for what in ("scene", "recipe"):
-        assert command_line.run(simgen_cli.app, ["schema", what]) == 0
-        schema = json.loads(capsys.readouterr().out)
-        assert schema["additionalProperties"] is False
-
-
-def test_preview_writes_a_picture(tmp_path: Path) -> None:
-    from PIL import Image
-
-    out = tmp_path / "look.png"
-    assert command_line.run(simgen_cli.app, ["preview", "two_objects", "-o", str(out)]) == 0
-    assert np.asarray(Image.open(out)).std() > 10
+def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    for command, answer in (
+        ("doctor", "Rendering will run with"),
+        ("scenes", "\ntwo_objects "),
+        ("recipes", "\npaper "),
+        ("schema scene", '"additionalProperties": false'),
+        ("schema recipe", '"additionalProperties": false'),
+    ):
+        assert command_line.run(simgen_cli.app, command.split()) == 0
+        assert answer in capsys.readouterr().out
 
 
 def test_export_writes_the_photons_of_a_budget(

@@ -1,34 +1,47 @@
-"""The `simgen` command."""
+"""The `simgen` command: datasets, and what they are made with."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from cyclopts import Parameter
+from cyclopts import App, Parameter
 
 from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from simgen.app.authoring_commands import import_scene, new_recipe, new_scene
-from simgen.app.benchmark_commands import benchmark
-from simgen.app.scene_commands import Json, Out, Overrides, check, preview, recipes, scenes, schema
+from pcii.io.collection_layout import Half
+from simgen.app.scene_commands import (
+    Json,
+    Out,
+    Overrides,
+    TrustPython,
+    check,
+    import_scene,
+    new_recipe,
+    new_scene,
+    preview,
+    recipes,
+    scenes,
+    schema,
+)
 
 app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
-for command in (
-    scenes,
-    recipes,
-    schema,
-    check,
-    preview,
-    new_scene,
-    new_recipe,
-    import_scene,
-    benchmark,
-):
+for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, import_scene):
     app.command(command)
+
+benchmark = App(
+    name="benchmark",
+    help="""Make the public benchmark, and certify it.
+
+    Example of use:
+
+        simgen benchmark make -o out/bench
+    """,
+)
+app.command(benchmark)
 
 
 @app.command
@@ -44,8 +57,6 @@ def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
     ----------
     require_compiled
         Leave with exit code 1 if neither CUDA nor LLVM works (for scripts that install LLVM).
-    json
-        Print the same as JSON.
     """
     from dataclasses import asdict
 
@@ -75,7 +86,7 @@ def generate(
     set: Overrides = (),
     seeds: int | None = None,
     scenes: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     executor: Annotated[Executor, Parameter(name="*")] = ALONE,
 ) -> int:
     """Make the dataset of a recipe, a collection where fields have several values; run again to resume.
@@ -87,7 +98,6 @@ def generate(
 
         simgen generate data_recipes/paper.toml -o out/paper
         simgen generate paper -o out/dim --set photons.budget=100 --set seed=3
-        simgen generate paper -o out/twenty --seeds 20 --set products.radiance=none
         simgen generate paper -o out/dimmer --set photons.budget=[100,300,1000] --seeds 5 --workers 2
         simgen generate drawn_crossing -o out/crossings --scenes 1000
 
@@ -97,53 +107,86 @@ def generate(
         Path of a recipe file, or name of one that ships; or a scene, seen by the paper's cameras.
     out
         Folder for the dataset or collection: new, empty, or an unfinished one of the same recipe.
-    set
-        Override one value of the recipe, such as photons.budget=300; may be repeated.
     seeds
         Make so many datasets, of the recipe's seed and those that follow. Each is whole; radiance is rendered
         for each, so leave it out where nothing needs it.
     scenes
         Make datasets of this many drawn scenes, from the recipe's scene_number on.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
     """
-    from pcii.exporting.card_files import write_card
-    from simgen.dataset.dataset_collection import generate_collection
-    from simgen.dataset.generation import generate as make
+    from simgen.app.library import RecipeFile, generate_sweep
+    from simgen.app.library import generate as generate_dataset
     from simgen.renderer import backend
     from simgen.spec.sweeps import load_sweep
 
     sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes, trust_python=trust_python)
-    terms = sweep.recipe(0).publication.terms()
     say(f"backend: {backend.choose().line()}")
     with Stages() as report:
         if not sweep.axes:
-            manifest = make(sweep.recipe(0), sweep.recipe_folder, out, report)
-            write_card(out, terms)
-            say(_made(out, manifest))
+            manifest = generate_dataset(RecipeFile(sweep.recipe(0), sweep.recipe_folder), out, report)
+            photons = f", {manifest['photons']['total']} photons" if manifest["photons"] else ""
+            seconds = sum(manifest["timings_s"].values())
+            say(f"{out}: {len(manifest['files'])} files{photons}, made in {seconds:.1f} s")
             say_next("pcii", "run", out, "-o", results_folder(out))
             return 0
-        if len(sweep) > 1 and sweep.recipe(0).products.radiance != "none":
-            say(
-                f"radiance is rendered for each of {len(sweep)} datasets, which may take most of the time; "
-                "--set products.radiance=none leaves it out"
-            )
-        faults = generate_collection(sweep, out, executor, report)
-        write_card(out, terms)
+        faults = generate_sweep(sweep, out, executor, report)
     say(f"{out}: {len(sweep) - len(faults)} of {len(sweep)} datasets are finished")
-    if not faults:
-        say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
-        return 0
-    complain_of(faults, "not made: ", " were not made")
-    return 1
+    if faults:
+        complain_of(faults, "not made: ", " were not made")
+        return 1
+    say_next("pcii", "evaluate", out, "-o", out.parent / f"{out.name}-compared")
+    return 0
 
 
-def _made(folder: Path, manifest: dict[str, Any]) -> str:
-    """One line about a finished dataset."""
-    seconds = sum(manifest["timings_s"].values())
-    photons = manifest["photons"]
-    caught = f", {photons['total']} photons" if photons else ""
-    return f"{folder}: {len(manifest['files'])} files{caught}, made in {seconds:.1f} s"
+@benchmark.command
+def make(
+    name: str = "pcii-bench-1",
+    *,
+    out: Out,
+    half: Half | None = None,
+    scene: tuple[str, ...] = (),
+    executor: Annotated[Executor, Parameter(name="*")] = ALONE,
+) -> int:
+    """Make the datasets of a benchmark, and compare them with the published ones; run again to resume.
+
+    OUT is a collection with a folder for each dataset, and certificate.json, which says whether they have the
+    published bytes or, on another kind of machine, are draws of the same light, on which a simple method has
+    the published scores.
+
+    Examples of use:
+
+        simgen benchmark make -o out/bench
+        simgen benchmark make -o out/bench --half development --workers 2
+        simgen benchmark make -o out/bench --scene ball-and-bird --scene foliage
+
+    Parameters
+    ----------
+    name
+        The benchmark, one that ships or the path of its file.
+    out
+        Folder for the collection: new, empty, or one of the same benchmark.
+    half
+        Make the scenes of this half only; the others may follow.
+    scene
+        Make this scene only; may be repeated.
+    """
+    from simgen.dataset.definition import load_definition
+    from simgen.dataset.making import CERTIFICATE, certify, make_benchmark
+    from simgen.renderer import backend
+
+    definition, file = load_definition(name)
+    say(f"backend: {backend.choose().line()}")
+    with Stages() as report:
+        faults = make_benchmark(
+            definition, file, out, half=half, names=scene, executor=executor, report=report
+        )
+        if faults:
+            complain_of(faults, "not made: ")
+            return 1
+        verdict = certify(definition, file, out, report)
+    complain_of(verdict.problems)
+    say(f"{out / CERTIFICATE}: {verdict.sentence()}")
+    say_next("pcii", "benchmark", "run", "likelihood", "--data", out, "-o", out.parent / "submission")
+    return 1 if verdict.problems else 0
 
 
 @app.command
@@ -161,7 +204,7 @@ def sheet(dataset: Path, *, out: Out) -> None:
     out
         The picture to write, .png or .jpg, in a folder that exists.
     """
-    from simgen.app.contact_sheet import write_sheet
+    from simgen.app.pictures import write_sheet
 
     write_sheet(dataset, out)
     say(f"{out}")
@@ -187,11 +230,8 @@ def export(
     Examples of use:
 
         simgen export out/paper --format events -o out/paper-events
-        simgen export out/small --format hci -o out/hci/small
         simgen export out/small --format nerfstudio -o out/small-poses
         simgen export out/spad --format photoncube -o out/spad-cubes
-        simgen export out/paper --format saii --budget 300 -o out/paper-300
-        simgen export out/sweep --format events -o out/sweep-events
 
     Parameters
     ----------
@@ -216,17 +256,14 @@ def verify(dataset: Path, *, json: Json = False) -> None:
 
     Names what is missing, truncated or changed, and what the manifest does not list.
 
-    Examples of use:
+    Example of use:
 
         simgen verify out/paper
-        simgen verify out/paper --json
 
     Parameters
     ----------
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
-    json
-        Print the number of files, or what is wrong, as JSON.
     """
     from pcii.io.verification import verify_and_tell
 

@@ -10,8 +10,7 @@ from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.exporting.card_files import write_card
 from pcii.io.collection import Collection, open_collection
-from simgen.app.picture_parts import check_picture_path
-from simgen.app.preview_picture import Preview, draw_preview
+from simgen.app.pictures import Preview, check_picture_path, draw_preview
 from simgen.check.targets import load_target, target_of_scene
 from simgen.dataset import dataset_collection as collections
 from simgen.dataset import generation
@@ -19,7 +18,7 @@ from simgen.spec import recipe as recipes
 from simgen.spec import scene_lookup
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene, scene_of
-from simgen.spec.sweeps import load_sweep
+from simgen.spec.sweeps import Sweep, load_sweep
 
 
 @dataclass(frozen=True)
@@ -47,15 +46,7 @@ def load_scene(
     'Fog'
     """
     if isinstance(scene, dict):
-        if number is not None:
-            raise InputError(
-                "number: these are values of one scene, of which there are no draws; leave it out"
-            )
         return scene_of(scene, None if folder is None else Path(folder), "scene")
-    if not isinstance(scene, str | Path):
-        raise InputError(f"scene: expected a name, a path or a dict, got {type(scene).__name__}")
-    if folder is not None:
-        raise InputError("folder: a scene by name or path has its own; leave it out")
     return scene_lookup.load_scene(str(scene), number=number)[0]
 
 
@@ -83,27 +74,15 @@ def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = 
     Raises `pcii.InputError` for a recipe that is missing or wrong, whose fields have several values, or that
     this machine cannot hold, and for a folder that holds something else.
     """
-    loaded = _loaded(recipe)
-    manifest = generation.generate(loaded.recipe, loaded.folder, Path(out), report)
-    write_card(Path(out), loaded.recipe.publication.terms())
+    if not isinstance(recipe, RecipeFile):
+        sweep = load_sweep(str(recipe))
+        if sweep.axes:
+            fields = ", ".join(sweep.fields)
+            raise InputError(f"{sweep.source}: {fields}: several values; use simgen.generate_collection")
+        recipe = RecipeFile(sweep.recipe(0), sweep.recipe_folder)
+    manifest = generation.generate(recipe.recipe, recipe.folder, Path(out), report)
+    write_card(Path(out), recipe.recipe.publication.terms())
     return manifest
-
-
-def _loaded(recipe: RecipeFile | str | Path) -> RecipeFile:
-    if isinstance(recipe, RecipeFile):
-        return recipe
-    if not isinstance(recipe, str | Path):
-        raise InputError(
-            "recipe: expected the name or path of a recipe, or what simgen.load_recipe gives, got a "
-            f"{type(recipe).__name__}"
-        )
-    sweep = load_sweep(str(recipe))
-    if sweep.axes:
-        fields = ", ".join(axis.field for axis in sweep.axes)
-        raise InputError(
-            f"{sweep.source}: several values of {fields} make datasets each: use simgen.generate_collection"
-        )
-    return RecipeFile(sweep.recipe(0), sweep.recipe_folder)
 
 
 def generate_collection(
@@ -130,8 +109,7 @@ def generate_collection(
     sweep = load_sweep(str(name_or_path), overrides, seeds=seeds, scenes=scenes, trust_python=trust_python)
     if not sweep.axes:
         raise InputError(f"{sweep.source}: no field has several values; use simgen.generate for one dataset")
-    faults = collections.generate_collection(sweep, Path(out), executor, report)
-    write_card(Path(out), sweep.recipe(0).publication.terms())
+    faults = generate_sweep(sweep, Path(out), executor, report)
     if faults:
         raise InputError(
             f"{len(faults)} of {len(sweep)} datasets were not made, the first because {faults[0]}"
@@ -139,16 +117,27 @@ def generate_collection(
     return open_collection(out)
 
 
+def generate_sweep(sweep: Sweep, out: Path, executor: Executor, report: Report) -> list[str]:
+    """Make all datasets of a sweep and their card; a sentence for each that could not be made."""
+    faults = collections.generate_collection(sweep, out, executor, report)
+    write_card(out, sweep.recipe(0).publication.terms())
+    return faults
+
+
 def preview(
     scene: Scene | str | Path,
     out: str | Path | None = None,
     samples_per_pixel: int = 32,
     scene_number: int | None = None,
+    *,
+    overrides: Sequence[str] = (),
+    trust_python: bool = False,
 ) -> Preview:
     """A picture of a scene from the virtual centre, with depth and objects, which notebooks show.
 
     With `out` it is written too, as PNG or JPEG. The scene, or a recipe with its scene, may be given by name
-    or path; of a drawn scene `scene_number` says which one. It takes seconds.
+    or path, with `overrides` and `trust_python` as of `load_recipe`; of a drawn scene `scene_number` says
+    which one. It takes seconds.
 
     Raises `pcii.InputError` for a bad scene or recipe, or a picture that cannot be written.
 
@@ -156,12 +145,10 @@ def preview(
     """
     if out is not None:
         check_picture_path(Path(out))
-    if not isinstance(scene, Scene):
-        target = load_target(str(scene), scene_number=scene_number)
-    elif scene_number is None:
+    if isinstance(scene, Scene):
         target = target_of_scene(scene)
     else:
-        raise InputError("scene_number: this is one scene, of which there are no draws; leave it out")
+        target = load_target(str(scene), overrides, scene_number, trust_python=trust_python)
     picture = draw_preview(target, samples_per_pixel)
     if out is not None:
         picture.write(out)

@@ -1,4 +1,4 @@
-"""Commands about scenes and recipes: list, describe, check, look at."""
+"""Commands about scenes and recipes: list, write, check, look at."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -8,58 +8,47 @@ from cyclopts import Parameter
 
 from pcii.base.command_output import answer, answer_json, say, say_next
 
-Json = Annotated[bool, Parameter(name="--json")]
+Json = Annotated[bool, Parameter(name="--json", help="Print the result as JSON.")]
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
-Overrides = Annotated[tuple[str, ...], Parameter(name="--set")]
+Overrides = Annotated[
+    tuple[str, ...],
+    Parameter(
+        name="--set", help="Override one value of the recipe, such as photons.budget=300; may be repeated."
+    ),
+]
+TrustPython = Annotated[
+    bool,
+    Parameter(help="Run the Python function that a recipe file names as its scene, if you trust its author."),
+]
 
 
-def scenes(*, json: Json = False) -> None:
+def scenes() -> None:
     """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
 
     Of drawn scenes a number says which one is meant: `--scene 17`.
 
-    Examples of use:
+    Example of use:
 
         simgen scenes
-        simgen scenes --json
-
-    Parameters
-    ----------
-    json
-        Print the same as JSON.
     """
-    from simgen.app.listings import list_scenes
+    from simgen.app.starting_points import list_scenes
 
-    listed = list_scenes()
-    if json:
-        answer_json([asdict(scene) for scene in listed])
-        return
-    for scene in listed:
-        answer(scene.line())
+    for line in list_scenes():
+        answer(line)
     say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")
 
 
-def recipes(*, json: Json = False) -> None:
+def recipes() -> None:
     """List the recipes that ship or stand in the working directory's `data_recipes/`, one line each.
 
-    Examples of use:
+    Example of use:
 
         simgen recipes
-        simgen recipes --json
-
-    Parameters
-    ----------
-    json
-        Print the same as JSON.
     """
-    from simgen.app.listings import list_recipes
+    from simgen.app.starting_points import list_recipes
 
-    listed = list_recipes()
-    if json:
-        answer_json([asdict(recipe) for recipe in listed])
-        return
-    for recipe in listed:
-        answer(recipe.line())
+    for line in list_recipes():
+        answer(line)
     say_next("simgen", "generate", "small", "-o", "out/small")
 
 
@@ -88,7 +77,7 @@ def check(
     *,
     set: Overrides = (),
     scene: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     json: Json = False,
 ) -> int:
     """Validate and lint a scene or recipe without rendering: one line a finding, in seconds.
@@ -107,29 +96,24 @@ def check(
     ----------
     target
         A recipe, or a scene, which is looked at with the paper's camera grid; by name or path.
-    set
-        Override one value of the recipe, such as photons.budget=300; may be repeated.
     scene
         Which scene of those that a Python function draws; the first unless you say.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
-    json
-        Print the findings as JSON.
     """
     from simgen.check.targets import lint
 
     line, findings = lint(target, set, scene, trust_python=trust_python)
-    bad = sum(finding.verdict == "bad" for finding in findings)
+    bad, warnings = (sum(one.verdict == verdict for one in findings) for verdict in ("bad", "warn"))
     if json:
         answer_json([asdict(finding) for finding in findings])
     else:
-        warnings = sum(finding.verdict == "warn" for finding in findings)
         answer(line)
         for finding in findings:
             answer(finding.line())
         answer(f"{bad} bad, {warnings} to be warned of, {len(findings)} findings in all")
         if not bad:
-            _say_next_after_check(target, set, scene)
+            number = [] if scene is None else ["--scene", scene]
+            values = [f"--set={text}" for text in set]
+            say_next("simgen", "preview", target, *number, *values, "-o", f"{Path(target).stem}.png")
     return 1 if bad else 0
 
 
@@ -139,7 +123,7 @@ def preview(
     out: Out,
     set: Overrides = (),
     scene: int | None = None,
-    trust_python: bool = False,
+    trust_python: TrustPython = False,
     samples_per_pixel: int = 32,
 ) -> None:
     """Draw a scene or recipe from the virtual centre, with its depth and its objects, in one picture.
@@ -158,48 +142,116 @@ def preview(
         A recipe, or a scene, which is looked at with the paper's field of view; by name or path.
     out
         The picture to write, .png or .jpg, in a folder that exists.
-    set
-        Override one value of the recipe, such as grid.pixel_mm=0.02; may be repeated.
     scene
         Which scene of those that a Python function draws.
-    trust_python
-        Run the Python function that a recipe file names as its scene: only if you trust its author.
     samples_per_pixel
         Light paths per pixel; more is slower and less noisy.
     """
-    from simgen.app.picture_parts import check_picture_path
-    from simgen.app.preview_picture import draw_preview
-    from simgen.check.targets import load_target
-    from simgen.spec.recipe import recipe_file
+    from simgen.app.library import preview
     from simgen.spec.scene_lookup import is_scene
 
-    check_picture_path(out)
-    draw_preview(load_target(target, set, scene, trust_python=trust_python), samples_per_pixel).write(out)
+    preview(target, out, samples_per_pixel, scene, overrides=set, trust_python=trust_python)
     say(f"{out}")
-    if is_scene(target) and scene is None:
-        name = _name_of(target)
-        if recipe_file(name) is None:
-            say_next("simgen", "new-recipe", name, "--scene", target)
-        else:
-            say_next("simgen", "generate", name, "-o", f"out/{name}")
+    if is_scene(target):
+        say_next("simgen", "new-recipe", "mine", "--scene", target)
+    else:
+        values = [f"--set={text}" for text in set]
+        say_next("simgen", "generate", target, *values, "-o", f"out/{Path(target).stem}")
 
 
-def _say_next_after_check(target: str, overrides: tuple[str, ...], scene: int | None) -> None:
-    """Of a scene: look at it. Of a recipe: make it."""
-    from simgen.spec.scene_lookup import is_drawn, is_scene
+def new_scene(name: str, *, from_: Annotated[str | None, Parameter(name="--from")] = None) -> None:
+    """Write scenes/NAME/scene.toml: a commented scene that works as it is written.
 
-    name = _name_of(target)
-    if not is_scene(target):
-        values = [word for text in overrides for word in ("--set", text)]
-        say_next("simgen", "generate", target, "-o", f"out/{name}", *values)
-        return
-    if scene is None and is_drawn(target):
-        scene = 0
-    number = [] if scene is None else ["--scene", scene]
-    say_next("simgen", "preview", target, *number, "-o", f"{name}.png")
+    Examples of use:
+
+        simgen new-scene mine
+        simgen new-scene my-desk --from desk
+
+    Parameters
+    ----------
+    name
+        What the scene is called: a letter, then letters, digits, _ and -.
+    from_
+        Copy this scene, one of `simgen scenes` or the path of a folder, with its files.
+    """
+    from simgen.app.starting_points import write_new_scene
+
+    say(f"{write_new_scene(name, from_)}")
+    say_next("simgen", "check", name)
 
 
-def _name_of(target: str) -> str:
-    """What a scene or recipe is called: the name of its folder or file."""
-    path = Path(target)
-    return path.resolve().parent.name if path.name == "scene.toml" else path.name.removesuffix(".toml")
+def new_recipe(name: str, *, scene: str | None = None) -> None:
+    """Write data_recipes/NAME.toml: a commented recipe that works as it is written, in seconds.
+
+    Examples of use:
+
+        simgen new-recipe mine
+        simgen new-recipe my-desk-dim --scene my-desk
+
+    Parameters
+    ----------
+    name
+        What the recipe is called: a letter, then letters, digits, _ and -.
+    scene
+        Name or path of its scene. Default: the scene of the same name, or else two_objects.
+    """
+    from simgen.app.starting_points import write_new_recipe
+
+    path = write_new_recipe(name, scene)
+    say(f"{path}")
+    say_next("simgen", "check", path)
+
+
+def import_scene(
+    file: Path,
+    *,
+    out: Out,
+    camera: str | None = None,
+    unit: Literal["mm", "cm", "m", "in", "ft"] = "m",
+    place_at_mm: tuple[float, float, float] | None = None,
+    fit_mm: float | None = None,
+    emission_unit: Literal["nit", "watt"] = "nit",
+) -> None:
+    """Make a scene of a glTF file (.glb, .gltf), as Blender and others export it, or a Mitsuba scene (.xml).
+
+    Objects keep their names. The scene stands before a camera of the file, or where you say. What cannot
+    be represented is listed.
+
+    Examples of use:
+
+        simgen import-scene room.glb -o scenes/room
+        simgen import-scene duck.glb -o scenes/duck --place-at-mm 0 0 600 --fit-mm 150
+        simgen import-scene blender.glb -o scenes/blender --emission-unit watt
+
+    Parameters
+    ----------
+    file
+        The file; others that it names must lie in its folder or below.
+    out
+        Folder for scene.toml, meshes and pictures; it must not be there yet.
+    camera
+        The camera of the file that becomes the virtual centre, if it has several.
+    unit
+        The file's unit of length.
+    place_at_mm
+        X, Y and Z of the middle of the scene, upright, instead of a camera.
+    fit_mm
+        Length of the longest side of the scene's bounding box, whatever the unit.
+    emission_unit
+        What emission of 1 means in a glTF file: 1 cd/m² (nit), or 1 W/(sr m²), which is 683 cd/m² (watt).
+        Choose watt for files that Blender exported in its lighting mode Standard.
+    """
+    from simgen.importing.scene_import import import_scene
+
+    imported = import_scene(
+        file,
+        out,
+        camera=camera,
+        unit=unit,
+        place_at_mm=place_at_mm,
+        fit_mm=fit_mm,
+        emission_unit=emission_unit,
+    )
+    for line in imported.lines():
+        say(line)
+    say_next("simgen", "preview", out, "-o", f"{out.name}.png")

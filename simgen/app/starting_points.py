@@ -1,115 +1,101 @@
-"""Scenes and recipes to start from: commented files that work as they are written."""
+"""Scenes and recipes to start from: what ships or stands in the working directory, and new ones as commented
+files that work as they are written."""
 
 import json
 import os
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
+from string import Template
 
 from pcii.base.errors import InputError
 from pcii.store.safe_files import new_folder_safely, write_bytes_safely
-from simgen.base.locations import scene_roots
-from simgen.base.strict_models import LONGEST_PART, shorten, suggestion
-from simgen.check.scene_probe import probe_scene
-from simgen.check.targets import load_target
+from simgen.base.file_lookup import recipe_roots
+from simgen.base.strict_models import shorten
 from simgen.spec.recipe import recipe_file
 from simgen.spec.scene import NAME
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
+from simgen.spec.sweeps import load_sweep
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
-ONE_PLANE_MM = 10.0
-"""Objects whose depths differ by less get one section."""
-FALLBACK_SCENE = "two_objects"
+LONGEST_FAULT = 100
 
 
-def write_new_scene(name: str, shipped: str | None = None) -> Path:
+def list_scenes() -> list[str]:
+    """A line for each scene by name, then for those that Python functions draw."""
+    drawn = [f"{name:20} Made by {package} (drawn by number)" for name, package in drawn_scenes().items()]
+    return [_line(name, lambda name: load_scene(name)[0].title) for name in scene_names()] + drawn
+
+
+def list_recipes() -> list[str]:
+    """A line for each recipe by name."""
+    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
+    return [_line(name, _title_of_recipe) for name in sorted(names)]
+
+
+def _title_of_recipe(name: str) -> str:
+    recipe = load_sweep(f"{name}.toml").recipe(0)
+    return recipe.title or recipe.scene
+
+
+def _line(name: str, title_of: Callable[[str], str]) -> str:
+    """A name and its title, or what is wrong with its file."""
+    try:
+        return f"{name:20} {title_of(name)}"
+    except InputError as fault:
+        return f"{name:20} not valid: {shorten(str(fault), LONGEST_FAULT)}"
+
+
+def write_new_scene(name: str, source: str | None = None) -> Path:
     """Write scenes/`name`/scene.toml in the working directory, and return its path.
 
-    A commented scene of two objects or, with `shipped`, a copy of a scene's folder. Raises `InputError` for a
-    name that is taken or no name, and for a scene that is no file to copy.
+    A commented scene of two objects or a copy of the folder of the scene `source`. Raises `InputError` for a
+    name that is taken or no name, and for a scene that is missing or drawn by Python.
     """
     _check_name(name)
     folder = Path("scenes") / name
-    if folder.exists():
-        raise InputError(f"{folder}: is there already; choose another name")
-    if is_scene(name):
-        raise InputError(f"{name!r} is the name of a scene that ships; choose another")
-    source = None if shipped is None else _scene_to_copy(shipped, name)
+    if folder.exists() or name in {*scene_names(), *drawn_scenes()}:
+        raise InputError(f"NAME: {name!r} is the name of a scene already; choose another")
+    files = None if source is None else load_scene(source)[1]
     folder.parent.mkdir(exist_ok=True)
     with new_folder_safely(folder) as new:
-        if source is None:
-            text = _filled("scene.toml", {"NAME": name})
+        if files is None:
+            (new / "scene.toml").write_text(_filled("scene.toml", NAME=name), encoding="utf-8")
         else:
-            shutil.copytree(source, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-            text = f"# {name}: begun as a copy of the scene {shipped}.\n\n"
-            text += (new / "scene.toml").read_text(encoding="utf-8")
-        (new / "scene.toml").write_text(text, encoding="utf-8")
+            shutil.copytree(files, new, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
     return folder / "scene.toml"
 
 
 def write_new_recipe(name: str, scene: str | None = None) -> Path:
     """Write data_recipes/`name`.toml in the working directory, and return its path.
 
-    A commented recipe of `scene`, by default of the scene `name` or, if there is none, of `FALLBACK_SCENE`.
-    Of drawn scenes it is the first. Raises `InputError` for a name that is taken or no name,
-    and for a scene that is missing or wrong.
+    A commented recipe of `scene`, by default of the scene `name` or, if there is none, of two_objects. Of
+    drawn scenes it is the first. Raises `InputError` for a name that is taken or no name, and for a scene
+    that is missing or wrong.
     """
     _check_name(name)
-    path = Path("data_recipes") / f"{name}.toml"
-    if path.exists():
-        raise InputError(f"{path}: is there already; choose another name")
     if recipe_file(name) is not None:
-        raise InputError(f"{name!r} is the name of a recipe that ships; choose another")
-    chosen = scene or (name if is_scene(name) else FALLBACK_SCENE)
-    named = chosen if Path(chosen).name == chosen else os.path.relpath(chosen, path.parent)
-    number = 0 if is_drawn(chosen) else None
-    z_mm = "# z_mm = [540, 620]            # sections; default: planes_mm of the scene"
-    if not load_scene(chosen, number=number)[0].planes_mm:
-        z_mm = f"z_mm = {json.dumps(_depths_mm(chosen, number))}"
-    quoted = json.dumps(named)
+        raise InputError(f"NAME: {name!r} is the name of a recipe already; choose another")
+    path = Path("data_recipes") / f"{name}.toml"
+    scene = scene or (name if is_scene(name) else "two_objects")
+    number = 0 if is_drawn(scene) else None
+    load_scene(scene, number=number)
+    text = json.dumps(scene if Path(scene).name == scene else os.path.relpath(scene, path.parent))
     if number is not None:
-        quoted += f"\nscene_number = {number}               # which scene of those that it draws"
-    text = _filled("recipe.toml", {"SCENE": quoted, "NAME": name, "FILE": str(path), "Z_MM": z_mm})
+        text += f"\nscene_number = {number}               # which scene of those that it draws"
     path.parent.mkdir(exist_ok=True)
-    write_bytes_safely(path, text.encode())
+    write_bytes_safely(path, _filled("recipe.toml", SCENE=text, NAME=name, FILE=str(path)).encode())
     return path
 
 
-def _filled(template: str, words: Mapping[str, str]) -> str:
-    """A template with its placeholders, which are in capitals, replaced."""
-    text = (TEMPLATES / template).read_text(encoding="utf-8")
-    return re.sub("|".join(map(re.escape, words)), lambda found: words[found[0]], text)
+def _filled(template: str, **words: str) -> str:
+    """A template with words in the place of its $NAMES."""
+    return Template((TEMPLATES / template).read_text(encoding="utf-8")).substitute(words)
 
 
 def _check_name(name: str) -> None:
     if not re.fullmatch(NAME, name):
-        shown = shorten(repr(name), LONGEST_PART)
         raise InputError(
-            f"NAME: expected a letter, then letters, digits, _ and -, such as my-scene, not {shown}"
+            f"NAME: expected a letter, then letters, digits, _ and -, such as my-scene, not {name!r}"
         )
-
-
-def _scene_to_copy(shipped: str, name: str) -> Path:
-    """Folder of a scene by name; `InputError` for one that is a Python function, or is not there."""
-    for root in scene_roots():
-        if (root / shipped / "scene.toml").is_file() and shipped in scene_names():
-            return root / shipped
-    if shipped in drawn_scenes():
-        raise InputError(
-            f"--from: {shipped!r} is drawn by Python, not a file; write one of its scenes by "
-            f"simgen.load_scene({shipped!r}, 0).save('scenes/{name}') in Python"
-        )
-    shown = shorten(repr(shipped), LONGEST_PART)
-    raise InputError(f"--from: there is no scene {shown}{suggestion(shipped, scene_names())}")
-
-
-def _depths_mm(scene: str, number: int | None) -> list[float]:
-    """Depths of what the virtual centre sees: of each object, or else of the backdrop; in whole mm."""
-    facts = probe_scene(load_target(scene, scene_number=number))
-    middles = sorted(thing.middle_mm for thing in facts.seen) or [facts.backdrop_mm or 600.0]
-    depths = [round(middles[0])]
-    for middle in middles:
-        if middle - depths[-1] >= ONE_PLANE_MM:
-            depths.append(round(middle))
-    return [float(depth) for depth in depths]

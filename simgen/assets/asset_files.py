@@ -11,7 +11,7 @@ from pcii.base.srgb import srgb_to_linear
 from pcii.pictures.picture_files import decode, kind_of, picture_of
 from simgen.assets.mesh_files import read_mesh
 from simgen.assets.triangles import Triangles
-from simgen.base.asset_names import EnvironmentName, ImageName, MeshName, asset, named_files
+from simgen.base.file_lookup import EnvironmentName, ImageName, MeshName, asset, named_files
 
 LARGEST_TOTAL_BYTES = 1 << 30
 MOST_TEXTURE_PIXELS = 1 << 26

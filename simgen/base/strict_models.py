@@ -1,40 +1,25 @@
-"""What scene and recipe files share: strict models, TOML, and errors that point at the field."""
+"""What scene and recipe files share: strict models, how they are read and written as TOML, and faults that
+name the field."""
 
 import difflib
+import json
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails, PydanticCustomError
 
 from pcii.base.errors import InputError
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80
 LONGEST_SENTENCE = 400
 MOST_FAULTS = 20
-"""An error tells so many faults of a file."""
-MOST_KEY_PARTS = 32
-# tomllib's time grows with the square of the parts of one key, so such keys are looked for first.
-_LONG_KEY = re.compile(
-    rb"(?:(?<![A-Za-z0-9_-])(?:[A-Za-z0-9_-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}"
-    % MOST_KEY_PARTS
-)
-
-
-_IN_TOML = {
-    "a valid tuple": "a list in brackets",
-    "a valid dictionary or object to extract fields from": 'a table such as { type = "..." }',
-    "a valid dictionary or instance of": "a table, as of",
-    "instance is frozen": "this is frozen, and change() gives a copy",
-}
-"""What pydantic calls things, and what they are to whoever writes TOML or Python."""
+"""Largest number of faults that one error lists."""
 
 
 class Strict(BaseModel):
@@ -43,15 +28,25 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
 
     def __init__(self, /, **values: Any) -> None:
-        with _as_input_errors(type(self), type(self).__name__):
+        with _as_input_errors(type(self).__name__, values):
             super().__init__(**values)
 
     # So pydantic validates a table within another without a call of it, and faults keep their place.
     __init__.__pydantic_base_init__ = True  # pyright: ignore[reportFunctionMemberAccess]
 
     def __setattr__(self, name: str, value: Any) -> None:
-        with _as_input_errors(type(self), type(self).__name__):
+        with _as_input_errors(type(self).__name__, {name: value}):
             super().__setattr__(name, value)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, values: Any) -> Any:
+        """Before pydantic does, which does not say what would be right."""
+        known = set(cls.model_fields)
+        unknown = [key for key in values if key not in known] if isinstance(values, Mapping) else []
+        if unknown:
+            raise PydanticCustomError("unknown_keys", "unknown", {"unknown": unknown, "known": known})
+        return values
 
     def change(self, **fields: Any) -> Self:
         """A copy with other values of these fields, checked as a new one is."""
@@ -69,45 +64,38 @@ Count = Annotated[Whole, Field(ge=1)]
 Vector = tuple[Real, Real, Real]
 SMALLEST_MM = 1e-6
 LARGEST_MM = 1e6
-"""Lengths are a nanometre to a kilometre: products of several still are numbers in single precision."""
+"""Lengths are a nanometre to a kilometre: products of several are still numbers in single precision."""
 Length = Annotated[Real, Field(ge=SMALLEST_MM, le=LARGEST_MM)]
 Coordinate = Annotated[Real, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 Position = tuple[Coordinate, Coordinate, Coordinate]
+Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
 LARGEST_COMPONENT = 1e6
 
 
 def _has_a_length(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    least = 1 / LARGEST_COMPONENT
-    if not least <= max(map(abs, direction)) <= LARGEST_COMPONENT:
+    if not 1 / LARGEST_COMPONENT <= max(map(abs, direction)) <= LARGEST_COMPONENT:
         raise ValueError(
-            f"the largest number of a direction must be {least:g} to {LARGEST_COMPONENT:g} in size, "
-            f"as in (0, 0, 1), got {direction}"
+            f"the largest number of a direction must be {1 / LARGEST_COMPONENT:g} to {LARGEST_COMPONENT:g} "
+            f"in size, as in (0, 0, 1), got {direction}"
         )
     return direction
 
 
 Direction = Annotated[Vector, AfterValidator(_has_a_length)]
-"""A direction, whose length is of no matter within what single precision can square."""
-LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]*$"
+"""A direction, whose length does not matter as long as single precision can square it."""
 
 
 def _one_line(title: str) -> str:
-    if not re.fullmatch(LINE, title):
+    if re.search(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]", title):
         raise ValueError(f"a title is one line without control characters, not {shown_value(title)}")
     return title
 
 
-Title = Annotated[str, Field(max_length=200, json_schema_extra={"pattern": LINE}), AfterValidator(_one_line)]
-Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
-
-
-def at_most(most: int) -> BeforeValidator:
-    """Keeps one item more than a list may have, so that no more than these are checked and reported."""
-    return BeforeValidator(lambda items: items[: most + 1] if isinstance(items, list | tuple) else items)
+Title = Annotated[str, Field(max_length=200), AfterValidator(_one_line)]
 
 
 def completed_by(key: Literal["enum", "examples"], names: Callable[[], list[str]]) -> Callable[[Any], None]:
-    """Puts names, looked up when it is asked for, into a field's JSON Schema: what editors complete."""
+    """Puts names into a field's JSON Schema, where editors find them; they are looked up only then."""
 
     def add(schema: dict[str, Any]) -> None:
         schema[key] = names()
@@ -126,193 +114,167 @@ def schema_of(model: type[BaseModel]) -> dict[str, Any]:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a dict; `InputError` if it is missing, too large or not TOML."""
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder, not a TOML file")
-    if not path.is_file():  # nor a pipe, which would block
+    if not path.is_file():  # a pipe would block
         raise InputError(f"{path}: there is no such file")
-    with path.open("rb") as file:
-        content = file.read(LARGEST_TOML_BYTES + 1)
-    if len(content) > LARGEST_TOML_BYTES:
+    if path.stat().st_size > LARGEST_TOML_BYTES:
         raise InputError(f"{path}: a TOML file here may have {LARGEST_TOML_BYTES} bytes, and this has more")
-    if _LONG_KEY.search(content):
-        raise InputError(f"{path}: not valid TOML: a key of more than {MOST_KEY_PARTS} parts")
     try:
-        return tomllib.loads(content.decode())
-    except RecursionError:
-        raise InputError(f"{path}: its arrays or tables are nested too deeply") from None
-    except ValueError as fault:  # of tomllib, of UTF-8, of a number of thousands of digits
+        return tomllib.loads(path.read_bytes().decode())
+    except (ValueError, RecursionError) as fault:
         raise InputError(f"{path}: not valid TOML: {shorten(str(fault))}") from None
+
+
+def toml_text(model: Strict, comments: Sequence[str] = ()) -> str:
+    """A scene or another model as TOML that gives an equal one: `[[objects]]` for lists of models, `[level]`
+    for one, and what lies deeper in the line, as `shape = { type = "sphere", radius_mm = 40.0 }`.
+
+    Fields at their defaults are left out, except for the `type` of a table. `comments` are lines at the top.
+    """
+    fields = dict(_written_fields(model))
+    tables = {name: value for name, value in fields.items() if _makes_tables(value)}
+    head = [f"# {_printable(line)}".rstrip() for text in comments for line in text.splitlines() or [""]]
+    blocks = [head, _lines({name: value for name, value in fields.items() if name not in tables})]
+    for name, value in tables.items():
+        if isinstance(value, BaseModel):
+            blocks.append([f"[{name}]", *_lines(dict(_written_fields(value)))])
+        else:
+            blocks += [[f"[[{name}]]", *_lines(dict(_written_fields(part)))] for part in value]
+    return "\n".join("".join(f"{line}\n" for line in block) for block in blocks if block)
+
+
+def _written_fields(model: BaseModel) -> Iterator[tuple[str, Any]]:
+    """Name and value of the fields that have to be written, the `type` first, which tells tables apart."""
+    for name, field in sorted(type(model).model_fields.items(), key=lambda item: item[0] != "type"):
+        value = getattr(model, name)
+        is_tag = name == "type" and len(get_args(field.annotation)) == 1
+        # Compared as they are shown: -0.0 is not 0.0.
+        if value is not None and (is_tag or repr(value) != repr(field.default)):
+            yield name, value
+
+
+def _makes_tables(value: Any) -> bool:
+    models = value if isinstance(value, tuple) and value else (value,)
+    return all(isinstance(part, BaseModel) for part in models)
+
+
+def _lines(fields: Mapping[str, Any]) -> list[str]:
+    """A line for each field; a string keeps its lines."""
+    texts = {
+        name: f'"""\n{_escaped(value)}"""' if isinstance(value, str) and "\n" in value else _inline(value)
+        for name, value in fields.items()
+    }
+    return [f"{name} = {text}" for name, text in texts.items()]
+
+
+def _inline(value: Any) -> str:
+    """A value in one line."""
+    if isinstance(value, BaseModel):
+        return f"{{ {', '.join(f'{name} = {_inline(part)}' for name, part in _written_fields(value))} }}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(_inline(part) for part in value)}]"
+    if isinstance(value, str):
+        return f'"{_escaped(value)}"'
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _escaped(text: str) -> str:
+    """The text between quotation marks, line by line: TOML has JSON's escapes, and one for DEL."""
+    lines = (json.dumps(line, ensure_ascii=False)[1:-1] for line in text.split("\n"))
+    return "\n".join(lines).replace("\x7f", "\\u007f")
 
 
 def validate(
     model: type[Model], values: Mapping[str, Any], source: str, context: dict[str, Any] | None = None
 ) -> Model:
-    """Build a model, or raise `InputError` that tells each fault in a sentence with field and remedy.
+    """Build a model, or raise `InputError` with a sentence for each fault that begins with its field.
 
-    `context` is what its validators are given.
+    `source` names the values, and `context` is handed to the model's validators.
     """
-    with _as_input_errors(model, source):
+    with _as_input_errors(source, values):
         return model.model_validate(values, context=context)
 
 
 @contextmanager
-def _as_input_errors(model: type[BaseModel], source: str) -> Iterator[None]:
-    """Raises what pydantic finds wrong with values of a model as `InputError`."""
+def _as_input_errors(source: str, values: Mapping[str, Any]) -> Iterator[None]:
+    """Raises what pydantic finds wrong with the values as `InputError`."""
     try:
         yield
     except ValidationError as fault:
-        raise faults_of(source, *_sentences(model, fault)) from None
-    except RecursionError:
-        raise InputError(f"{source}: its arrays or tables are nested too deeply") from None
+        # Unknown keys come first: they are often why others are missing.
+        errors = sorted(fault.errors(include_url=False), key=lambda error: error["type"] != "unknown_keys")
+        raise faults_of(source, [text for error in errors for text in _sentences(error, values)]) from None
 
 
-def faults_of(source: str, sentences: Sequence[str], number: int) -> InputError:
-    """An error that tells a `number` of faults of a file: the first in its text, the next as notes.
+def faults_of(source: str, sentences: Sequence[str]) -> InputError:
+    """An error with the first of these faults of a file in its text, and the next ones as notes, a line each.
 
-    The first `MOST_FAULTS` of `sentences` are listed, each in one line.
+    At most `MOST_FAULTS` are listed.
     """
     first, *others = (shorten(sentence) for sentence in sentences[:MOST_FAULTS])
-    fault = InputError(f"{source}: {first}" + (f" (and {number - 1} more)" if number > 1 else ""))
+    more = f" (and {len(sentences) - 1} more)" if others else ""
+    fault = InputError(f"{source}: {first}{more}")
     for other in others:
         fault.add_note(f"  {other}")
     return fault
+
+
+def _sentences(error: ErrorDetails, values: Mapping[str, Any]) -> list[str]:
+    """What is wrong according to one error: a sentence or, of unknown keys, one for each."""
+    kind, context = error["type"], error.get("ctx", {})
+    where = _field(error["loc"], values, is_missing=kind == "missing")
+    if kind == "unknown_keys":
+        table, known = f"{where}." if where else "", context["known"]
+        return [f"unknown key '{table}{key}'{suggestion(str(key), known)}" for key in context["unknown"]]
+    if kind == "missing":
+        return [f"'{where}' is missing"]
+    if kind == "union_tag_not_found":
+        return [f"'{where}.type' is missing"]
+    if kind == "union_tag_invalid":
+        types = re.findall(r"'(.*?)'", context["expected_tags"])
+        return [f"'{where}.type': there is no {context['tag']!r}{suggestion(context['tag'], types)}"]
+    field = f"'{where}': " if where else ""
+    if kind == "value_error":
+        return [f"{field}{context['error']}"]
+    message = error["msg"][0].lower() + error["msg"][1:]
+    return [f"{field}{message}, got {shown_value(error['input'])}"]
+
+
+def _field(location: Sequence[int | str], values: Any, *, is_missing: bool) -> str:
+    """`objects[1].shape.radius_mm`: pydantic's location, without the types of tables that it has beside keys.
+
+    Keys and places in lists are those of the `values`; the last one is not there if it `is_missing`.
+    """
+    text = ""
+    for number, part in enumerate(location, start=1):
+        items: Any = dict(enumerate(values)) if isinstance(values, list | tuple) else values
+        is_there = isinstance(items, Mapping) and part in items
+        if is_there:
+            values = items[part]
+        if is_there or (is_missing and number == len(location)):
+            text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
 
 
 def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
     """One line fit for a terminal: without control characters, and with its middle left out if long."""
     if len(text) > longest:
         text = f"{text[: longest * 3 // 4]}...{text[-longest // 4 :]}"
+    return _printable(text)
+
+
+def _printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def shown_value(value: Any) -> str:
-    """A TOML value as an error shows it, however large it is."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    try:
-        # A large array is not written out first.
-        return shorten(
-            repr(value[:20] if isinstance(value, str | list | tuple) and len(value) > 100 else value),
-            LONGEST_PART,
-        )
-    except (RecursionError, ValueError):  # nested deeply; an integer of thousands of digits
-        return f"a {type(value).__name__} that is too long to show"
-
-
-def _sentences(model: type[BaseModel], fault: ValidationError) -> tuple[list[str], int]:
-    """A sentence for each of the first faults, and the number of all.
-
-    Unknown keys come first, since they are most often the cause of missing ones.
-    """
-    errors = fault.errors(include_url=False)
-    unknown = [error for error in errors if error["type"] == "extra_forbidden"]
-    meant = set[tuple[int | str, ...]]()
-    sentences: list[str] = []
-    for error in unknown[:MOST_FAULTS]:
-        location, known, _ = _follow(model, error["loc"])
-        word = str(location[-1])
-        meant |= {(*location[:-1], near) for near in _nearest(word, known)}
-        sentences.append(f"unknown key '{_dotted(location)}'{suggestion(word, known)}")
-    # What an unknown key is to be called is not missing, and a list of wrong items not too short.
-    parents = {error["loc"][:end] for error in errors for end in range(len(error["loc"]))}
-    others = [
-        error
-        for error in errors
-        if error["type"] != "extra_forbidden"
-        and not (error["type"] == "too_short" and error["loc"] in parents)
-        and not (error["type"] == "missing" and _follow(model, error["loc"])[0] in meant)
-    ]
-    sentences += [_sentence(model, error) for error in others[: MOST_FAULTS - len(sentences)]]
-    return sentences, len(unknown) + len(others)
-
-
-def _sentence(model: type[BaseModel], error: "ErrorDetails") -> str:
-    """A sentence of an error other than an unknown key."""
-    location, _, types = _follow(model, error["loc"])
-    where = _dotted(location)
-    if error["type"] == "missing":
-        return f"'{where}' is missing"
-    if error["type"] == "union_tag_invalid":
-        given = error.get("ctx", {})["tag"]
-        return f"'{where}.type': there is no {given!r}{suggestion(given, types)}"
-    if error["type"] == "union_tag_not_found":
-        return f"'{where}.type' is missing{suggestion('', types)}"
-    if error["type"] == "value_error":
-        text = f"'{where}': " if where else ""
-        return text + str(error.get("ctx", {}).get("error"))
-    message = error["msg"][0].lower() + error["msg"][1:]
-    for theirs, ours in _IN_TOML.items():
-        message = message.replace(theirs, ours)
-    return f"'{where}': {message}, got {shown_value(error['input'])}"
-
-
-def _dotted(location: Iterable[int | str]) -> str:
-    """`objects[1].shape.radius_mm` from a location."""
-    text = ""
-    for part in location:
-        if isinstance(part, int):
-            text += f"[{part}]"
-        else:
-            text += f".{part}" if text else part
-    return text
+    """A TOML value as an error shows it."""
+    return str(value).lower() if isinstance(value, bool) else shorten(repr(value), LONGEST_PART)
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
     """'; did you mean ...?' for the nearest known word, else the list of what is known."""
     words = sorted(known)
-    if len(word) > LONGEST_PART:
-        return ""
-    near = _nearest(word, words)
+    near = difflib.get_close_matches(word[:LONGEST_PART], words, n=1)
     if near:
         return f"; did you mean '{near[0]}'?"
     return f"; known are {', '.join(words)}" if words else ""
-
-
-def _nearest(word: str, known: Iterable[str]) -> list[str]:
-    """The known word that is most like this one, if any is."""
-    if len(word) > LONGEST_PART:
-        return []
-    return difflib.get_close_matches(word, sorted(known), n=1, cutoff=0.6)
-
-
-def _follow(
-    model: type[BaseModel], location: tuple[int | str, ...]
-) -> tuple[tuple[int | str, ...], set[str], set[str]]:
-    """Pydantic's location without the tags of unions, the keys known at its last part, the types there."""
-    candidates: list[type[BaseModel]] = [model]
-    path: list[int | str] = []
-    last: set[str] = set()
-    tags: set[str] = set()
-    for part in location:
-        if part in tags:
-            tagged = [one for one in candidates if part == _tag(one)]
-            # Once the model is known what follows are its fields, even one that is named like a tag.
-            candidates, tags = (tagged, set()) if tagged else (candidates, tags - {str(part)})
-            continue
-        path.append(part)
-        if isinstance(part, str):
-            last = {key for candidate in candidates for key in candidate.model_fields}
-            fields = [one.model_fields[part] for one in candidates if part in one.model_fields]
-            candidates = [inner for field in fields for inner in _models_in(field.annotation)]
-            tags = {tag for field in fields for tag in _tags_in(field.annotation)}
-            tags |= {tag for one in candidates if (tag := _tag(one)) is not None}
-    return tuple(path), last, {tag for one in candidates if (tag := _tag(one)) is not None}
-
-
-def _tag(model: type[BaseModel]) -> str | None:
-    """The value of `type` by which a union recognises the model."""
-    field = model.model_fields.get("type")
-    return None if field is None else field.default
-
-
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for part in get_args(annotation) for model in _models_in(part)]
-
-
-def _tags_in(annotation: Any) -> list[str]:
-    """Names that a union gives to its parts."""
-    if isinstance(annotation, Tag):
-        return [annotation.tag]
-    return [tag for part in get_args(annotation) for tag in _tags_in(part)]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pcii.base.errors import InputError
-from simgen.base.locations import recipe_roots
+from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import suggestion
 from simgen.check.costs import cost_findings, hopeless
 from simgen.check.depths import depth_findings

@@ -12,7 +12,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from pcii.base.errors import InputError
 from pcii.io.collection_layout import Half
-from simgen.base.locations import recipe_roots
+from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import Strict, read_toml, suggestion, validate
 
 Kind = Literal["separate", "touching", "cluttered", "room", "leaning", "glossy", "nothing"]

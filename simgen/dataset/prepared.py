@@ -12,7 +12,7 @@ from pcii.io.dataset_layout import DATASET_FOLDER
 from pcii.store.hashes import hash_file, hash_json
 from simgen.assets.asset_files import read_assets
 from simgen.base import random_streams as seeds
-from simgen.base.asset_names import asset
+from simgen.base.file_lookup import asset
 from simgen.cameras.calibration import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import Needs

@@ -12,7 +12,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_texture
-from simgen.base.asset_names import LARGEST_FILE_BYTES, LONGEST_NAME, asset
+from simgen.base.file_lookup import LARGEST_FILE_BYTES, LONGEST_NAME, asset
 from simgen.base.strict_models import shorten
 from simgen.importing.gltf_document import Document, checked_document
 

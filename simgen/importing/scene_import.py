@@ -14,8 +14,7 @@ from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
 from simgen.assets.mesh_files import ply_bytes
 from simgen.assets.triangles import Triangles
-from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, validate
-from simgen.base.toml_layout import toml_text
+from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
 from simgen.importing.foreign_scene import ForeignScene, Part
 from simgen.importing.gltf_scene import CD_M2_PER_EMISSION, EmissionUnit, foreign_gltf
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by

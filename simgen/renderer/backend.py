@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pcii.base.errors import InputError
-from simgen.base.locations import kept
+from simgen.base.file_lookup import cached
 
 NEEDED = ("mitsuba", "drjit")
 Kind = Literal["cuda", "llvm", "scalar"]
@@ -217,7 +217,7 @@ def _try_llvm(path: Path) -> Candidate:
 def _try(kind: Kind, library: str, number: str) -> Candidate:
     """Run the probe kernel in a subprocess, or read what it showed before."""
     name = f"{kind.upper()} {number}".strip()
-    works, detail = kept(
+    works, detail = cached(
         "backend",
         _deciding(kind, library),
         lambda: dict(zip(("works", "detail"), _probe(kind, library), strict=True)),

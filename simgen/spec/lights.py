@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from simgen.base.asset_names import EnvironmentName
+from simgen.base.file_lookup import EnvironmentName
 from simgen.base.strict_models import (
     Colour,
     Direction,

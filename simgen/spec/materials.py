@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from simgen.base.asset_names import ImageName
+from simgen.base.file_lookup import ImageName
 from simgen.base.strict_models import Colour, Positive, Real, Share, Strict, completed_by
 from simgen.spec.lights import Illuminant
 from simgen.spec.textures import Texture

@@ -14,7 +14,7 @@ from xml.parsers import expat
 from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
-from simgen.base.asset_names import AssetName, asset
+from simgen.base.file_lookup import AssetName, asset
 from simgen.base.strict_models import Length, Position, Strict, shorten, shown_value
 
 LARGEST_BYTES = 1 << 24

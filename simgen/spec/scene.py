@@ -14,7 +14,7 @@ from pydantic import Field, PrivateAttr, field_validator, model_serializer, mode
 from pcii.base.errors import InputError
 from pcii.store.folder_kind import entries
 from pcii.store.safe_files import add_files_safely
-from simgen.base.asset_names import AssetName, asset, named_files
+from simgen.base.file_lookup import AssetName, asset, named_files
 from simgen.base.strict_models import (
     LARGEST_MM,
     LARGEST_TOML_BYTES,
@@ -25,14 +25,13 @@ from simgen.base.strict_models import (
     Strict,
     Title,
     Vector,
-    at_most,
     faults_of,
     shorten,
     shown_value,
     suggestion,
+    toml_text,
     validate,
 )
-from simgen.base.toml_layout import toml_text
 from simgen.spec.lights import EnvironmentLight, Level, Light, UniformLight
 from simgen.spec.materials import Material, Reflectance
 from simgen.spec.mitsuba_file import MitsubaScene, files_named_by
@@ -135,9 +134,9 @@ class Scene(Strict):
     """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
     """What it is for."""
-    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS), at_most(MOST_OBJECTS)] = ()
+    objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS)] = ()
     """What truth and scores know by name; none makes an empty scene."""
-    lights: Annotated[tuple[Light, ...], Field(max_length=MOST_LIGHTS), at_most(MOST_LIGHTS)] = ()
+    lights: Annotated[tuple[Light, ...], Field(max_length=MOST_LIGHTS)] = ()
     """Lamps, and light from all around; at least one, unless an object has a `material.emission`."""
     level: Level | None = None
     """Sets how bright it is; the luminances of lights then tell only how they compare."""
@@ -146,7 +145,7 @@ class Scene(Strict):
     mitsuba: MitsubaScene | None = None
     """A Mitsuba scene by the name of its XML file, or a table that says where it stands, too. All that it has
     is part of the scene, beside objects and lights of its own."""
-    planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES), at_most(MOST_PLANES)] = ()
+    planes_mm: Annotated[tuple[Length, ...], Field(max_length=MOST_PLANES)] = ()
     """Depths at which something is in focus; what a recipe without `analysis.z_mm` looks at."""
 
     @field_validator("lights")
@@ -277,7 +276,7 @@ def checked_folder(scene: Scene, source: str = "scene") -> Path:
         except InputError as fault:
             faults.append(str(fault))
     if faults:
-        raise faults_of(source, faults, len(faults))
+        raise faults_of(source, faults)
     return scene.folder or Path()
 
 

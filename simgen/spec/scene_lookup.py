@@ -17,7 +17,7 @@ from random import Random
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import package_of, registered
-from simgen.base.locations import find, scene_roots
+from simgen.base.file_lookup import find, scene_roots
 from simgen.base.strict_models import LONGEST_PART, read_toml, shorten, suggestion
 from simgen.spec.recipe import SEED_LIMIT
 from simgen.spec.scene import Scene, scene_of

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
-from simgen.base.asset_names import MeshName
+from simgen.base.file_lookup import MeshName
 from simgen.base.strict_models import Length, Positive, Strict, Vector
 
 

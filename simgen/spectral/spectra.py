@@ -15,7 +15,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, linear_to_srgb
-from simgen.base.locations import kept
+from simgen.base.file_lookup import cached
 from simgen.base.strict_models import suggestion
 
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
@@ -63,7 +63,7 @@ def measured(table: Any, *, outside: float | None = None) -> np.ndarray:
 def _standard() -> dict[str, dict[str, np.ndarray]]:
     """Spectra at `WAVELENGTH_NM` by kind and name; kept on the machine, since colour takes long to load."""
     depends_on = version("colour-science"), version("scipy"), Path(__file__).read_text()
-    return kept("spectra", depends_on, _from_colour_science, _as_arrays)
+    return cached("spectra", depends_on, _from_colour_science, _as_arrays)
 
 
 def _from_colour_science() -> dict[str, dict[str, Any]]:

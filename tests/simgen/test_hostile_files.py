@@ -164,8 +164,7 @@ shape = { type = "sphere", radius_mm = 5 }
 material = { reflectance = [1, 1, 1] }
 """
 TOMLS: dict[str, tuple[str, str]] = {
-    "deep array": ("x = " + "[" * 100_000, "nested too deeply"),
-    "deep key": (".".join("a" * 50_000) + " = 1", "a key of more than 32 parts"),
+    "deep array": ("x = " + "[" * 100_000, "not valid TOML"),
     "1e999": (scene_toml().replace("500]", "1e999]"), "'objects[0].position_mm[2]'"),
     "large integer": (scene_toml().replace("500]", "9" * 400 + "]"), "'objects[0].position_mm[2]'"),
     "huge integer": (scene_toml().replace("500]", "9" * 5000 + "]"), "not valid TOML"),
@@ -199,12 +198,6 @@ def test_a_scene_file_that_is_no_file(tmp_path: Path) -> None:
     (tmp_path / "scene.toml").touch()
     os.truncate(tmp_path / "scene.toml", 1 << 30)
     assert "this has more" in refusal(tmp_path)
-
-
-def test_dots_in_a_description_are_no_deep_key(tmp_path: Path) -> None:
-    text = f'description = "{"wait... " * 100}. {"." * 1000}"\n' + scene_toml()
-    (tmp_path / "scene.toml").write_text(text)
-    assert load_scene(str(tmp_path))[0].objects[0].name == "a"
 
 
 @pytest.mark.parametrize("name", ["thing.ply", "thing.png"])

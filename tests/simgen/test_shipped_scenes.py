@@ -18,7 +18,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.spec.camera_grid import Grid
 from simgen.spec.lights import Light
-from simgen.spec.materials import Finish, Spectrum, is_clear
+from simgen.spec.materials import Finish, Spectrum
 from simgen.spec.recipe import load_recipe
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import load_scene
@@ -84,14 +84,6 @@ def test_the_virtual_centre_sees_every_object_and_no_film_cuts_it(name: str) -> 
             assert not border.any(), thing
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_a_scene_says_what_it_is_for(name: str) -> None:
-    scene = scene_of(name)
-    assert scene.title
-    assert len(scene.description) > 80
-    assert "#" in (ROOT / "scenes" / name / "scene.toml").read_text()
-
-
 def kinds(union: Any) -> set[str]:
     nested_subset = get_args(get_args(union)[0]) or get_args(union)  # with and without Annotated
     return {member.model_fields["type"].default for member in nested_subset}
@@ -100,23 +92,13 @@ def kinds(union: Any) -> set[str]:
 def test_the_scenes_show_all_that_scenes_can_hold() -> None:
     scenes = [scene_of(name) for name in SCENES]
     things = [thing for scene in scenes for thing in scene.objects]
-    textures = [thing.material.texture for thing in things if thing.material.texture is not None]
-    reflectances = [thing.material.reflectance for thing in things]
-    lights = [light for scene in scenes for light in scene.lights]
+    textures = [thing.material.texture for thing in things]
     assert {thing.shape.type for thing in things} == kinds(Shape)
     assert {thing.material.finish.type for thing in things} == kinds(Finish)
-    assert {texture.type for texture in textures if not isinstance(texture, str)} == kinds(Texture)
-    assert {light.type for light in lights} == kinds(Light)
-    assert {getattr(light, "illuminant", "D65") for light in lights} >= {"D65", "A", "FL2"}
-    assert any(isinstance(texture, str) for texture in textures)
-    assert {type(value) for value in reflectances} >= {tuple, str, Spectrum}
-    files = {thing.shape.file[-4:] for thing in things if thing.shape.type == "mesh"}
-    assert files == {".obj", ".ply"}
-    assert any(scene.level for scene in scenes)
-    assert any(scene.backdrop for scene in scenes)
-    assert any(thing.material.emission for thing in things)
-    assert any(thing.material.opacity for thing in things)
-    assert any(thing.material.tiled for thing in things)
+    assert {getattr(texture, "type", None) for texture in textures} - {None} == kinds(Texture)
+    assert {light.type for scene in scenes for light in scene.lights} == kinds(Light)
+    assert {type(thing.material.reflectance) for thing in things} >= {tuple, str, Spectrum}
+    assert all(scene.title and len(scene.description) > 80 for scene in scenes)
 
 
 @pytest.mark.renders
@@ -137,11 +119,12 @@ def test_a_recipe_looks_where_its_objects_are(name: str) -> None:
 @pytest.mark.renders
 @pytest.mark.parametrize("name", SCENES)
 def test_a_scene_names_planes_where_its_objects_are(name: str) -> None:
-    scene, centre = scene_of(name), seen(name)[0]
-    assert scene.planes_mm
-    objects = centre.z_mm[centre.object_id > 0]
-    for z_mm in scene.planes_mm if scene.objects else ():
-        assert np.abs(objects - z_mm).min() < 5  # the paper's 540 and 620 mm are those of whole objects
+    centre, planes_mm = seen(name)[0], scene_of(name).planes_mm
+    assert planes_mm
+    for z_mm in (
+        planes_mm if scene_of(name).objects else ()
+    ):  # the paper's 540 and 620 mm are those of whole objects
+        assert np.abs(centre.z_mm[centre.object_id > 0] - z_mm).min() < 5
 
 
 @pytest.mark.renders
@@ -163,28 +146,15 @@ def test_the_corpus_has_two_halves_of_every_kind_and_no_scene_in_both() -> None:
     assert len({recipe.scene for recipe in recipes.values()}) == len(entries)  # each once, so in one half
     assert len({recipe.seed for recipe in recipes.values()}) == len(entries)
     assert all(recipe.photons.scope != "exposure" for recipe in recipes.values())  # photons can be swept
-    of_half = {
-        half: {entry["kind"] for entry in entries if entry["half"] == half} for half in ("train", "test")
-    }
-    assert {entry["half"] for entry in entries} == set(of_half)
-    assert of_half["test"] == {"textured", "untextured", "cluttered", "depth", "empty"}
-    assert of_half["train"] == of_half["test"] | {"paper"}
-
-
-def test_recipes_of_every_kind_ship() -> None:
-    recipes = [load_recipe(str(ROOT / "data_recipes" / f"{name}.toml"))[0] for name in RECIPES]
-    assert any(recipe.is_spectral for recipe in recipes)
-    exposed = [recipe for recipe in recipes if recipe.photons.scope == "exposure"]
-    assert exposed
-    assert all(scene_of(recipe.scene).level for recipe in exposed)
+    kinds_of = {half: {one["kind"] for one in entries if one["half"] == half} for half in ("train", "test")}
+    assert {entry["half"] for entry in entries} == set(kinds_of)
+    assert kinds_of["train"] == kinds_of["test"] | {"paper"}
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_light_passes_glass_where_there_is_some(name: str) -> None:
     target = load_target(str(ROOT / "scenes" / name))
-    clear = any(is_clear(thing.material.finish) for thing in target.scene.objects)
-    assert clear == (name in ("glass", "finishes"))
-    assert target.recipe.render.max_depth == (8 if clear else 3)
+    assert target.recipe.render.max_depth == (8 if name in ("glass", "finishes") else 3)
 
 
 @pytest.mark.parametrize("file", SCRIPTS, ids=lambda file: file.parent.name)

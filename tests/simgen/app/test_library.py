@@ -1,9 +1,11 @@
-"""The functions of `import simgen`: what the commands do."""
+"""The functions of `import simgen`: what the commands do, with or without files."""
 
-import pydoc
+import ast
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,41 +13,101 @@ from tiny import GRID_2_X_3, TINY_RECIPE
 
 import pcii
 import simgen
+from pcii.core.photon_events import Readout
 from simgen.photons import counting_plan
 from simgen.spec.recipe import Recipe
 
-pytestmark = pytest.mark.renders
-RECIPE = simgen.RecipeFile(
-    Recipe.model_validate(TINY_RECIPE | {"seed": 3, "photons": {"budget": 200}}), Path()
+GRID = Recipe.model_validate(TINY_RECIPE).grid.camera_grid()
+SCENE = simgen.Scene(
+    title="A glass ball before a card",
+    objects=(
+        simgen.SceneObject(
+            name="ball",
+            position_mm=(0, 0, 500),
+            shape=simgen.Sphere(radius_mm=60),
+            material=simgen.Material(finish=simgen.Glass()),
+        ),
+        simgen.SceneObject(
+            name="card",
+            position_mm=(0, 0, 620),
+            shape=simgen.Card(width_mm=400, height_mm=300),
+            material=simgen.Material(texture=simgen.Checks(rows=6, columns=8)),
+        ),
+    ),
+    lights=(simgen.UniformLight(luminance_cd_m2=100),),
 )
-GRID = RECIPE.recipe.grid.camera_grid()
+LENS = simgen.Lens(aperture_mm=6, focus_mm=560)
+ERRORS = {"position_sd_mm": [0.5, 0.5, 0.1], "rotation_sd_deg": [0.1, 0.1, 0.2], "pitch_error": 0.01}
+SENSOR = {"cfa": "RGGB", "dark_counts": 0.01, "dead_pixel_share": 0.1, "frames": 3, "bits": 1}
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory: pytest.TempPathFactory) -> pcii.Dataset:
-    out = tmp_path_factory.mktemp("library") / "made"
-    manifest = simgen.generate(RECIPE, out)
-    assert manifest["photons"]["method"] == "thinning"
-    return pcii.open_dataset(out)
+def dataset_of(out: Path, scene: simgen.Scene, **tables: Any) -> pcii.Dataset:
+    """The dataset of a scene on disk, seen by `GRID`."""
+    folder = scene.save(out / "scene").parent
+    grid = TINY_RECIPE["grid"] | tables.pop("grid", {})
+    recipe = Recipe.model_validate({"scene": str(folder), "grid": grid, **tables})
+    simgen.generate(simgen.RecipeFile(recipe, out), out / "made")
+    return pcii.open_dataset(out / "made")
 
 
-def test_photons_without_a_file_are_those_of_the_dataset(dataset: pcii.Dataset) -> None:
-    scene = simgen.load_scene(RECIPE.recipe.scene)
-    counts, truth = simgen.draw_photons(scene, GRID, budget=200, cfa="GRBG", seed=3)
-    assert (counts.grid, counts.cfa) == (dataset.grid, dataset.cfa)
+def assert_same(counts: pcii.PhotonCounts, truth: pcii.Truth, dataset: pcii.Dataset) -> None:
+    """Photons, their frames and origins, and the truth, are those of the dataset."""
+    assert (counts.grid, counts.cfa, counts.readout) == (
+        dataset.grid,
+        dataset.cfa,
+        dataset.counts.readout,
+    )
     for name in "klijn":
         np.testing.assert_array_equal(getattr(counts.events, name), getattr(dataset.counts.events, name))
-    known = dataset.truth
-    assert known is not None
-    assert truth.names == known.names
+    if dataset.counts.frame is not None:
+        np.testing.assert_array_equal(counts.frame, dataset.counts.frame)
+    assert dataset.truth is not None
+    assert truth.names == dataset.truth.names
     for name in ("z_mm", "object_id", "normal", "coverage"):
-        np.testing.assert_array_equal(getattr(truth, name), getattr(known, name))
-    assert truth.photons is not None
-    assert known.photons is not None
+        np.testing.assert_array_equal(getattr(truth, name), getattr(dataset.truth, name))
     for name in ("k", "l", "i", "j", "object_id", "z_mm"):
-        np.testing.assert_array_equal(getattr(truth.photons, name), getattr(known.photons, name))
+        known = getattr(dataset.truth.photons, name)
+        np.testing.assert_array_equal(getattr(truth.photons, name), known)
 
 
+@pytest.mark.renders
+def test_photons_without_a_file_are_those_of_the_dataset(tmp_path: Path) -> None:
+    scene = simgen.load_scene("two_objects")
+    dataset = dataset_of(tmp_path, scene, seed=3, photons={"budget": 200})
+    assert_same(*simgen.draw_photons(scene, GRID, budget=200, cfa="GRBG", seed=3), dataset)
+
+
+@pytest.mark.renders
+def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Path) -> None:
+    dataset = dataset_of(
+        tmp_path,
+        SCENE,
+        seed=3,
+        grid={"lens": LENS, "errors": ERRORS},
+        sensor=SENSOR,
+        photons={"budget": 300},
+        render={"max_depth": 6},
+        products={"frames": True},
+    )
+    assert dataset.counts.readout == Readout(3, 1)
+    assert dataset.counts.frame is not None
+    options: dict[str, Any] = {"budget": 300, "seed": 3, "lens": LENS.model_dump(), "max_depth": 6}
+    models: dict[str, Any] = {
+        "errors": simgen.CalibrationErrors.model_validate(ERRORS),
+        "sensor": simgen.Sensor.model_validate(SENSOR),
+    }
+    for tables in ({"errors": ERRORS, "sensor": SENSOR}, models):
+        counts, truth = simgen.draw_photons(SCENE, GRID, **tables, **options)
+        assert_same(counts, truth, dataset)
+    others, _ = simgen.draw_photons(SCENE, GRID, errors=ERRORS, sensor=SENSOR | {"dark_counts": 0}, **options)
+    assert others.total < counts.total
+    without = {name: value for name, value in SENSOR.items() if name not in ("frames", "bits")}
+    photons, _ = simgen.draw_photons(SCENE, GRID, errors=ERRORS, sensor=without, **options)
+    assert (counts.dense <= photons.dense).all()  # the same photons, read out in another way
+    assert counts.total < photons.total
+
+
+@pytest.mark.renders
 def test_photons_too_many_to_be_kept_one_by_one_can_be_scored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(counting_plan, "MOST_SINGLE_PHOTONS", 1 << 15)
     counts, truth = simgen.draw_photons(simgen.load_scene("two_objects"), GRID, budget=6000, seed=1)
@@ -55,38 +117,119 @@ def test_photons_too_many_to_be_kept_one_by_one_can_be_scored(monkeypatch: pytes
     assert pcii.score(focus, None, truth).planes
 
 
-def test_a_recipe_may_be_named_or_be_a_path(dataset: pcii.Dataset, tmp_path: Path) -> None:
+@pytest.mark.renders
+def test_views_are_those_of_the_dataset(tmp_path: Path) -> None:
+    dataset = dataset_of(
+        tmp_path,
+        SCENE,
+        seed=3,
+        grid={"lens": LENS},
+        products={"radiance": "rgb", "counts": False, "truth": False},
+        render={"samples_per_pixel": 3, "max_depth": 6},
+    )
+    reports: list[tuple[str, int, int]] = []
+    options: dict[str, Any] = {"samples_per_pixel": 3, "lens": LENS, "max_depth": 6}
+    views = simgen.render(SCENE, GRID, seed=3, report=lambda *stage: reports.append(stage), **options)
+    assert dataset.views is not None
+    for k, l in np.ndindex(GRID.rows, GRID.cols):
+        np.testing.assert_array_equal(views.view(k, l), dataset.views.view(k, l))
+    assert reports[-1] == ("views", 6, 6)
+    other = simgen.render(SCENE, GRID, seed=4, **options)
+    assert (np.asarray(other.radiance) != np.asarray(views.radiance)).any()
+
+
+@pytest.mark.renders
+def test_a_preview_is_shown_by_notebooks_and_written(tmp_path: Path) -> None:
+    out = tmp_path / "look.png"
+    picture = simgen.preview(SCENE, out, samples_per_pixel=1)
+    assert repr(picture) == "Preview(title='A glass ball before a card')"
+    assert picture._repr_png_() == out.read_bytes()
+    by_name = simgen.preview(SCENE.save(tmp_path / "scene"), samples_per_pixel=1)
+    assert by_name._repr_png_() == picture._repr_png_()
+    assert simgen.preview(SCENE.remove("ball"), samples_per_pixel=1)._repr_png_() != picture._repr_png_()
+
+
+def test_a_recipe_may_be_named_or_be_a_path(tmp_path: Path) -> None:
     path = tmp_path / "tiny.toml"
-    path.write_text(f'scene = "two_objects"\nseed = 3\n{GRID_2_X_3}[photons]\nbudget = 200\n')
-    named = simgen.generate(str(path), dataset.path)  # finished, and the same
-    assert named["identity"] == dataset.manifest["identity"]
-    with pytest.raises(pcii.InputError, match=r"recipe: there is no 'smal'; did you mean 'small'\?"):
-        simgen.generate("smal", tmp_path / "out")
-    with pytest.raises(pcii.InputError, match=r"^recipe: expected the name .*, got a Scene$"):
-        simgen.generate(simgen.load_scene("two_objects"), tmp_path / "out")  # type: ignore[arg-type]
-    path.write_text('scene = "two_objects"\nseed = [1, 2]')
-    with pytest.raises(pcii.InputError, match=r"tiny.toml: several values of seed .*generate_collection$"):
-        simgen.generate(path, tmp_path / "out")
+    path.write_text(f'scene = "two_objects"\nseed = [1, 2]\n{GRID_2_X_3}')
+    for recipe, message in (
+        ("smal", r"recipe: there is no 'smal'; did you mean 'small'\?"),
+        (path, r"tiny.toml: seed: several values; use simgen.generate_collection$"),
+    ):
+        with pytest.raises(pcii.InputError, match=message):
+            simgen.generate(recipe, tmp_path / "out")
+    with pytest.raises(pcii.InputError, match=r"no field has several values; use simgen.generate "):
+        simgen.generate_collection("small", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_what_is_wrong_is_told_in_one_sentence() -> None:
-    scene = simgen.load_scene("two_objects")
-    for wrong in ({"budget": -1}, {"cfa": "GRGB"}, {"seed": -1}):
-        with pytest.raises(pcii.InputError, match=rf"^draw_photons: .*{next(iter(wrong))}"):
-            simgen.draw_photons(scene, GRID, **wrong)  # type: ignore[arg-type]
-    with pytest.raises(pcii.InputError, match=r"^scene: "):
-        simgen.draw_photons("two_objects", GRID)  # type: ignore[arg-type]
-    with pytest.raises(pcii.InputError, match=r"^grid: "):
-        simgen.draw_photons(scene, None)  # type: ignore[arg-type]
+def test_a_scene_of_values_is_that_of_the_file(tmp_path: Path) -> None:
+    values: dict[str, Any] = {
+        "title": "A picture",
+        "lights": [{"type": "uniform", "luminance_cd_m2": 10}],
+        "objects": [
+            {
+                "name": "card",
+                "position_mm": [0, 0, 500],
+                "shape": {"type": "card", "width_mm": 20, "height_mm": 20},
+                "material": {"texture": "a.png"},
+            }
+        ],
+    }
+    (tmp_path / "a.png").write_bytes(b"")
+    scene = simgen.load_scene(values, folder=tmp_path)
+    assert scene == simgen.load_scene(scene.save(tmp_path))
+    with pytest.raises(pcii.InputError, match=r"object 'card', .*: 'a.png' is looked for in .*folder="):
+        simgen.load_scene(values)
+    with pytest.raises(pcii.InputError, match=r"scene: object 'card', .*: there is no file 'a.png' in"):
+        simgen.load_scene(values, folder=tmp_path / "none")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"scene": "two_objects"}, r"^scene: expected a Scene, got str$"),
+        ({"grid": {}}, r"^grid: expected a CameraGrid, got dict$"),
+        ({"seed": -1}, r"^(draw_photons|render): 'seed': "),
+        ({"lens": {"aperture_mm": 3}}, r"'grid.lens.focus_mm' is missing$"),
+        ({"errors": {"pitch": 3}}, r"unknown key 'grid.errors.pitch'; did you mean 'pitch_error'\?$"),
+        ({"max_depth": 0}, r"'render.max_depth': input should be greater than or equal to 1, got 0$"),
+    ],
+)
+def test_a_wrong_argument_is_named(arguments: dict[str, Any], message: str) -> None:
+    for call in (simgen.draw_photons, simgen.render):
+        with pytest.raises(pcii.InputError, match=message):
+            call(**{"scene": SCENE, "grid": GRID, **arguments})
+
+
+def test_a_wrong_sensor_or_too_large_a_grid_is_named() -> None:
+    for wrong, message in (
+        ({"cfa": "GRGB"}, r"^draw_photons: 'sensor.cfa'"),
+        ({"budget": -1}, "photons.budget"),
+    ):
+        with pytest.raises(pcii.InputError, match=message):
+            simgen.draw_photons(SCENE, GRID, **wrong)  # type: ignore[arg-type]
+    large = pcii.CameraGrid(
+        rows=1000, cols=1000, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=1000, width=1000
+    )
+    with pytest.raises(pcii.InputError, match=r"^grid: radiance of all views takes 12 TB of memory"):
+        simgen.render(SCENE, large, samples_per_pixel=1)
+
+
+def test_every_name_is_where_type_checkers_look_for_it() -> None:
+    names: dict[str, Any] = {}
+    for node in ast.walk(ast.parse(Path(simgen.__file__).read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("simgen."):
+            module = import_module(node.module or "")
+            names |= {alias.name: getattr(module, alias.name) for alias in node.names}
+    assert sorted(names) == sorted(simgen.__all__)
+    for name, thing in names.items():
+        assert getattr(simgen, name) is thing, name
     with pytest.raises(AttributeError, match="nothing_of_that_name"):
         simgen.nothing_of_that_name  # noqa: B018
 
 
-def test_help_shows_the_functions_and_importing_loads_no_renderer() -> None:
-    text = pydoc.plain(pydoc.render_doc(simgen))
-    for name in ("draw_photons", "generate", "load_recipe", "load_scene", "preview"):
-        assert f"    {name}(" in text
+def test_importing_simgen_loads_no_renderer() -> None:
     script = "import sys, simgen; print(*[m for m in ('mitsuba', 'drjit', 'pydantic') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []

@@ -169,20 +169,6 @@ def test_other_software_neither_extends_a_collection_nor_works_on_it(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_radiance_of_many_datasets_is_told_of(
-    recipe_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    command = ["generate", str(recipe_file), "--seeds", "1", "--set", "grid.rows=1", "--set", "grid.cols=1"]
-    for radiance, budget, told in (
-        ("mosaic", "[100,200]", True),
-        ("mosaic", "[100]", False),
-        ("none", "[100,200]", False),
-    ):
-        values = ["--set", f"products.radiance={radiance}", "--set", f"photons.budget={budget}"]
-        assert command_line.run(cli.app, [*command, *values, "-o", str(tmp_path / radiance / budget)]) == 0
-        assert ("radiance is rendered for each of 2 datasets" in capsys.readouterr().out) is told
-
-
 def test_verification_says_what_is_unfinished_and_what_belongs_to_nothing(
     collection: Path, tmp_path: Path
 ) -> None:

@@ -12,8 +12,7 @@ from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.store import software
-from simgen.base.asset_names import AssetName
-from simgen.base.locations import recipe_roots
+from simgen.base.file_lookup import AssetName, recipe_roots
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import Recipe, load_recipe
 from simgen.spec.scene import Scene

@@ -13,8 +13,7 @@ from two_things import NAMED, SCENE, SKY
 
 from pcii.base.errors import InputError
 from simgen import Material, Scene, SceneObject, Sphere, load_scene
-from simgen.base.strict_models import LARGEST_TOML_BYTES
-from simgen.base.toml_layout import toml_text
+from simgen.base.strict_models import LARGEST_TOML_BYTES, toml_text
 from simgen.spec.scene_lookup import scene_names
 
 TEXT = """# by hand

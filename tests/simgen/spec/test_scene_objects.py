@@ -60,7 +60,7 @@ def fault_of(make: Callable[[], Any]) -> str:
         ),
         (
             lambda: setattr(BALL, "name", "b"),
-            "SceneObject: 'name': this is frozen, and change() gives a copy",
+            "SceneObject: 'name': instance is frozen",
         ),
     ],
 )

@@ -21,7 +21,7 @@ from simgen.dataset.prepared import Prepared, capture_of, needs_of, prepare_scen
 from simgen.dataset.rendered_views import exact_view, halved_view
 from simgen.dataset.resources import available_bytes, check_resources, fits, in_bytes
 from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import plan
+from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -55,44 +55,51 @@ def draw_photons(
 
     `budget` photons are expected in each view, behind the Bayer pattern `cfa` (None: monochrome). `lens`,
     `errors` of the cameras and `sensor` are tables of a recipe, as models or dicts, and `max_depth` its
-    longest light path in segments. A `sensor` may name the pattern instead of `cfa`; a file that it names is
+    longest light path in segments. If the `sensor` names a pattern, that one counts; a file that it names is
     looked for in the working directory. The counts are those of a dataset with the same scene, cameras,
     sensor, budget and seed. The truth has depth in mm and object of every pixel of the virtual centre (H, W),
     and where each photon came from if there are few enough to be drawn one by one; then the counts know their
-    frames too. Raises `pcii.InputError`
-    for a value that is out of its range.
+    frames too. Raises `pcii.InputError` for a value that is out of its range.
 
     >>> grid = pcii.CameraGrid(rows=10, cols=10, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.0352,
     ...                        height=1024, width=1024)                             # doctest: +SKIP
     >>> counts, truth = draw_photons(load_scene("two_objects"), grid, seed=1,
     ...                              sensor={"dark_counts": 1e-4})                  # doctest: +SKIP
     """
+    own = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
     values = {
-        "sensor": _sensor_values(sensor, cfa),
+        "sensor": {"cfa": "none" if cfa is None else cfa} | own,
         "photons": {"budget": budget},
         "render": {"max_depth": max_depth},
     }
-    prepared = _prepared("draw_photons", scene, _grid_values(grid, lens, errors), seed, values)
+    prepared = _prepare("draw_photons", scene, grid, lens, errors, {"seed": seed, **values})
     recipe, render_scene = prepared.recipe, prepared.render_scene()
     capture, needs, kind = capture_of(recipe, prepared.seed), needs_of(recipe), backend.choose().kind
     setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-    made = plan(capture, setup, kind, may_explore=fits(needs))
-    check_resources(needs, made, Path())
-    drawn = thin(capture, setup, made, report) if made.thins else None
-
-    @cache
-    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
-        view = halved_view(render_scene, capture.rig, k, l, made.samples, capture.seed, recipe.cfa)
-        return sense(view.image, recipe.cfa), view.variance
-
-    arrivals, _ = drawn or draw_from_views(
-        capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], made, report
-    )
+    counting = plan(capture, setup, kind, may_explore=fits(needs))
+    check_resources(needs, counting, Path())
+    drawn = thin(capture, setup, counting, report) if counting.thins else None
+    arrivals, _ = drawn or _draw_from_rendered(capture, render_scene, counting, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
     counts = counts_of(counted, grid, recipe.cfa, recipe.sensor, keeps_frames=is_single)
     return counts, _truth(render_scene, grid, counted)
+
+
+def _draw_from_rendered(
+    capture: Capture, render_scene: RenderScene, counting: Plan, report: Report
+) -> tuple[PhotonTable, dict[str, Any]]:
+    """Photons where they are too many to be drawn one by one: of views that are rendered in memory."""
+
+    @cache
+    def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
+        view = halved_view(render_scene, capture.rig, k, l, counting.samples, capture.seed, capture.cfa)
+        return sense(view.image, capture.cfa), view.variance
+
+    return draw_from_views(
+        capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], counting, report
+    )
 
 
 def render(
@@ -119,7 +126,7 @@ def render(
         "render": {"samples_per_pixel": samples_per_pixel, "max_depth": max_depth},
         "products": {"counts": False, "truth": False},
     }
-    prepared = _prepared("render", scene, _grid_values(grid, lens, errors), seed, values)
+    prepared = _prepare("render", scene, grid, lens, errors, {"seed": seed, **values})
     needed, room = 4.0 * 3 * np.prod(grid.shape_KLHW, dtype=float), available_bytes()
     if needed > room:
         raise InputError(
@@ -135,33 +142,20 @@ def render(
     return Views(radiance, grid)
 
 
-def _prepared(what: str, scene: Scene, grid: Values, seed: int, values: Values) -> Prepared:
+def _prepare(
+    what: str,
+    scene: Scene,
+    grid: CameraGrid,
+    lens: Lens | Values | None,
+    errors: CalibrationErrors | Values | None,
+    values: Values,
+) -> Prepared:
     """A scene with the recipe that the arguments of the function `what` make."""
-    if not isinstance(scene, Scene):
-        raise InputError(
-            f"scene: expected a simgen.Scene, such as simgen.load_scene gives, got {type(scene).__name__}"
-        )
-    recipe = validate(Recipe, {"scene": "as given", "seed": seed, "grid": grid, **values}, what)
-    return prepare_scene(recipe, scene)
-
-
-def _grid_values(
-    grid: CameraGrid, lens: Lens | Values | None, errors: CalibrationErrors | Values | None
-) -> dict[str, Any]:
-    if not isinstance(grid, CameraGrid):
-        raise InputError(f"grid: expected a pcii.CameraGrid, got {type(grid).__name__}")
-    return asdict(grid) | {"lens": lens, "errors": errors}
-
-
-def _sensor_values(sensor: Sensor | Values | None, cfa: str | None) -> dict[str, Any]:
-    """The sensor, which may name its Bayer pattern, or else has that of `cfa`."""
-    if sensor is not None and not isinstance(sensor, Sensor | Mapping):
-        raise InputError(f"sensor: expected a simgen.Sensor or a dict, got {type(sensor).__name__}")
-    given = sensor.model_dump(exclude_unset=True) if isinstance(sensor, Sensor) else dict(sensor or {})
-    pattern = "none" if cfa is None else cfa
-    if pattern not in (Sensor().cfa, given.get("cfa", pattern)):
-        raise InputError(f"cfa: it is {pattern!r}, and the sensor's {given['cfa']!r}; give one of them")
-    return {"cfa": pattern} | given
+    for name, value, kind in (("scene", scene, Scene), ("grid", grid, CameraGrid)):
+        if not isinstance(value, kind):
+            raise InputError(f"{name}: expected a {kind.__name__}, got {type(value).__name__}")
+    cameras = asdict(grid) | {"lens": lens, "errors": errors}
+    return prepare_scene(validate(Recipe, {"scene": "as given", "grid": cameras, **values}, what), scene)
 
 
 def _truth(render_scene: RenderScene, grid: CameraGrid, counted: PhotonTable) -> Truth:

@@ -1,0 +1,195 @@
+"""Pictures of a scene and of a dataset: what the virtual centre camera sees, and a contact sheet.
+
+Maps and images are drawn by the types of `pcii`; here is where they stand on a page.
+"""
+
+import io
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.core.view_figures import colours_and_samples
+from pcii.figures.exposure import block_px, exposed
+from pcii.figures.object_maps import named_width
+from pcii.figures.panels import hide_frame, new_figure
+from pcii.figures.pictures import to_srgb8, white_level
+from pcii.imaging.blocks import evenly_chosen
+from pcii.io.dataset import Dataset, open_dataset
+from pcii.io.dataset_layout import COUNTS
+from pcii.store.safe_files import write_bytes_safely
+from simgen.check.scene_probe import coarser
+from simgen.dataset.prepared import Prepared
+from simgen.renderer import backend
+from simgen.renderer.mitsuba_scene import build
+from simgen.renderer.radiance import render_view
+from simgen.truth.first_hits import first_hits_at_centre
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = {".png": "png", ".jpg": "jpeg", ".jpeg": "jpeg"}
+PREVIEW_PX = 512
+"""Longer side of the picture of a preview."""
+MARGIN = 0.03
+"""Around the objects, as a share of the picture's longer side."""
+PANEL_IN = 4.8
+"""Height of a panel."""
+ASPECTS = 0.5, 1.6
+"""Width over height of the room for a picture; others leave some of it empty."""
+MAX_TILES = 12
+"""Largest number of views in a row or column of a contact sheet; of more, some are left out."""
+GAP_PX = 2
+BLOCKS_PER_PHOTON = 2.0
+"""More blocks show smaller things, and leave more of them dark."""
+BLOCKS = 24, 128
+"""Blocks along the longer side of a view's photons, at least and at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What a scene looks like, in one figure; notebooks show it."""
+
+    title: str
+    figure: "Figure" = field(repr=False)
+
+    def write(self, out: str | Path, dots_per_inch: float | None = None) -> None:
+        """Write it as PNG or JPEG; `InputError` for another name and for a folder that is not there."""
+        check_picture_path(Path(out))
+        _save(self.figure, Path(out), dots_per_inch)
+
+    def _repr_png_(self) -> bytes:
+        return _encode(self.figure, "png")
+
+
+def check_picture_path(out: Path) -> None:
+    """Raise `InputError` unless a picture can be written there: before anything takes time."""
+    if out.suffix.lower() not in FORMATS:
+        raise InputError(f"{out}: name a .png or .jpg file")
+    if not out.parent.is_dir():
+        raise InputError(f"{out}: there is no folder {out.parent}; make it first")
+
+
+def _encode(figure: "Figure", kind: str, dots_per_inch: float | None = None) -> bytes:
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=dots_per_inch or "figure", bbox_inches="tight", pad_inches=0.15)
+    return buffer.getvalue()
+
+
+def _save(figure: "Figure", out: Path, dots_per_inch: float | None = None) -> None:
+    write_bytes_safely(out, _encode(figure, FORMATS[out.suffix.lower()], dots_per_inch))
+
+
+def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
+    """The preview of a recipe's scene. Raises `InputError` for samples below 1, and for a bad scene."""
+    if samples_per_pixel < 1:
+        raise InputError(f"samples_per_pixel: expected at least 1, got {samples_per_pixel}")
+    recipe = target.recipe
+    # The recipe's field of view, and one camera: the virtual centre.
+    grid = replace(coarser(recipe.grid.camera_grid(), PREVIEW_PX), rows=1, cols=1)
+    render_scene = build(backend.load(), target.scene, target.folder, recipe.render.max_depth)
+    picture = render_view(render_scene, grid, 0, 0, samples_per_pixel=samples_per_pixel, seed=0)
+    hits = first_hits_at_centre(render_scene, grid)
+    objects = hits.object_id > 0
+    aspect = float(np.clip(grid.width / grid.height, *ASPECTS))
+    named = named_width(aspect)
+    figure = new_figure(PANEL_IN * (aspect * (2 + named) + 0.2) + 0.5, PANEL_IN + 0.7, "compressed")
+    whole, depth, named_objects = figure.subplots(1, 3, width_ratios=(1, 1, named))
+    whole.imshow(to_srgb8(picture, white_level(picture[objects] if objects.any() else picture)))
+    whole.set_title("virtual centre")
+    hide_frame(whole)
+    rows, cols = part_of_interest(objects)
+    if rows.stop - rows.start < grid.height:
+        left, right, top, bottom = cols.start - 0.5, cols.stop - 0.5, rows.start - 0.5, rows.stop - 0.5
+        corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
+        whole.plot(*corners, color="0.6", linewidth=0.8)
+    _draw_truth(depth, named_objects, Truth(hits.z_mm, hits.object_id, render_scene.names))
+    title = recipe.title or target.scene.title
+    figure.suptitle(title, parse_math=False)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # which would move the panels each time that the picture is written
+    return Preview(title, figure)
+
+
+def part_of_interest(mask: np.ndarray) -> tuple[slice, slice]:
+    """Rows and columns around what is True in `mask` (H, W), with a margin and in the film's aspect; all if
+    nothing is."""
+    if not mask.any():
+        return slice(0, mask.shape[0]), slice(0, mask.shape[1])
+    margin_px = MARGIN * max(mask.shape)
+    lines = [np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0)]
+    spans = [(line[0] - margin_px, line[-1] + 1 + margin_px) for line in lines]
+    scale = min(1.0, max((b - a) / size for (a, b), size in zip(spans, mask.shape, strict=True)))
+    box = []
+    for (a, b), size in zip(spans, mask.shape, strict=True):
+        length = max(1, round(scale * size))
+        start = int(np.clip(round((a + b - length) / 2), 0, size - length))
+        box.append(slice(start, start + length))
+    return box[0], box[1]
+
+
+def _draw_truth(depth: "Axes", objects: "Axes", truth: Truth) -> None:
+    """Depth of the objects, and the objects by name, in the part of the film where they are."""
+    box = part_of_interest(truth.object_id > 0)
+    Truth(truth.z_mm[box], truth.object_id[box], truth.names).plot([depth, objects])
+    hide_frame(depth)
+
+
+def write_sheet(path: Path, out: Path) -> None:
+    """Write the contact sheet of a dataset as PNG or JPEG: truth, photons, full light; nothing is rendered.
+
+    Raises `InputError` for a folder that is no finished dataset, or a picture that cannot be written.
+    """
+    check_picture_path(out)
+    _save(draw_sheet(open_dataset(path)), out)
+
+
+def draw_sheet(dataset: Dataset) -> "Figure":
+    """The contact sheet of a dataset as a figure; the place of what it does not have stays empty."""
+    grid, truth, views = dataset.grid, dataset.truth, dataset.views
+    aspect = float(np.clip(grid.width / grid.height, *ASPECTS))
+    second = float(np.clip(aspect * grid.cols / grid.rows, aspect * named_width(aspect), 4.0))
+    widths = aspect + 0.2, second
+    figure = new_figure(PANEL_IN * sum(widths), 2 * PANEL_IN + 1.5, "constrained")
+    panels = figure.subplot_mosaic([["view", "photons"], ["depth", "objects"]], width_ratios=widths)
+    lines = [
+        str(dataset.manifest.get("title") or dataset.name),
+        f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels, "
+        f"{dataset.cfa or 'monochrome'}, pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm",
+    ]
+    if views is not None:
+        views.plot(panels["view"])
+    if dataset.has(COUNTS):
+        counts = dataset.counts
+        lines.append(f"{counts.total:,} photons counted, {counts.total / grid.view_count:,.4g} per view")
+        panels["photons"].set_title(f"photons of up to {MAX_TILES} x {MAX_TILES} views")
+        panels["photons"].imshow(photon_tiles(counts), interpolation="nearest")
+    if truth is not None:
+        _draw_truth(panels["depth"], panels["objects"], truth)
+    for axes in panels.values():
+        hide_frame(axes)
+    figure.suptitle("\n".join(lines), fontsize=12, parse_math=False)
+    return figure
+
+
+def photon_tiles(counts: PhotonCounts) -> np.ndarray:
+    """Photons of at most `MAX_TILES` views in a row and column as one 8-bit picture (h, w, 3).
+
+    They are shown in blocks that hold about as many photons whatever the amount of light, in their colours,
+    with gaps of white between views.
+    """
+    grid = counts.grid
+    blocks = np.sqrt(BLOCKS_PER_PHOTON * counts.total / grid.view_count)
+    side_px = block_px(grid.shape_HW, int(np.clip(blocks, *BLOCKS)))
+    rows, cols = (evenly_chosen(number, MAX_TILES) for number in (grid.rows, grid.cols))
+    views = (colours_and_samples(counts.view(k, l)[..., None], counts.cfa) for k in rows for l in cols)
+    gaps = (0, 0), (0, GAP_PX), (0, GAP_PX), (0, 0)
+    tiles = np.pad(np.stack(exposed(views, side_px)), gaps, constant_values=255)
+    _, h, w, _ = tiles.shape
+    sheet = tiles.reshape(-1, len(cols), h, w, 3).transpose(0, 2, 1, 3, 4)
+    return sheet.reshape(-1, len(cols) * w, 3)[:-GAP_PX, :-GAP_PX]

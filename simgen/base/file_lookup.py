@@ -1,0 +1,126 @@
+"""Where files are: scenes and recipes by name, what a scene brings along in its folder, and values that are
+cached between processes."""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from pcii.base.errors import InputError
+from pcii.store.safe_files import write_json_safely
+
+LONGEST_NAME = 200
+LARGEST_FILE_BYTES = 1 << 28
+_PACKAGE = Path(__file__).resolve().parents[1]
+Value = TypeVar("Value")
+
+
+def scene_roots() -> list[Path]:
+    """Folders that hold scene folders."""
+    return _roots("scenes")
+
+
+def recipe_roots() -> list[Path]:
+    """Folders that hold recipe files."""
+    return _roots("data_recipes")
+
+
+def _roots(name: str) -> list[Path]:
+    """Folders of this name in the working directory, the source tree and the installed package."""
+    candidates = (Path.cwd() / name, _PACKAGE.parent / name, _PACKAGE / "_shipped" / name)
+    return list(dict.fromkeys(root.resolve() for root in candidates if root.is_dir()))
+
+
+def find(roots: Callable[[], list[Path]], name: str) -> Path | None:
+    """The first file of that name under any of the roots."""
+    return next((root / name for root in roots() if (root / name).is_file()), None)
+
+
+class AssetName(str):
+    """Name of a file inside the scene's folder; a subclass says what the file holds.
+
+    A field is `Annotated[str, ImageName]`, so that type checkers allow any string; it holds an `ImageName`.
+    """
+
+    __slots__ = ()
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        text = core_schema.str_schema(strict=True, min_length=1, max_length=LONGEST_NAME)
+        return core_schema.no_info_after_validator_function(cls, text)
+
+
+class ImageName(AssetName):
+    """A texture: PNG, JPEG or TIFF."""
+
+    __slots__ = ()
+
+
+class EnvironmentName(AssetName):
+    """Light from all around: OpenEXR."""
+
+    __slots__ = ()
+
+
+class MeshName(AssetName):
+    """A mesh: PLY or OBJ."""
+
+    __slots__ = ()
+
+
+def named_files(value: Any, where: str = "") -> Iterator[tuple[str, AssetName]]:
+    """Every file that a model names, as (dotted field, name)."""
+    if isinstance(value, AssetName):
+        yield where, value
+    elif isinstance(value, BaseModel):
+        for field in type(value).model_fields:
+            yield from named_files(getattr(value, field), f"{where}.{field}" if where else field)
+    elif isinstance(value, tuple):
+        for number, item in enumerate(value):
+            yield from named_files(item, f"{where}[{number}]")
+
+
+def asset(folder: Path, name: str, where: str) -> Path:
+    """The path of a scene's file; `InputError`, beginning with `where`, unless it is a plain file inside
+    the scene's folder, links followed, of a size that can be read."""
+    root = folder.resolve()
+    try:
+        path = (root / name).resolve()
+        is_plain = path.is_file()  # no folder, nor a pipe or device that would never end
+    except (OSError, RuntimeError, ValueError):  # links in a circle, a name too long, a NUL byte
+        path, is_plain = root, False
+    if not path.is_relative_to(root):
+        raise InputError(f"{where}: {name!r} lies outside the scene's folder")
+    if not is_plain:
+        raise InputError(f"{where}: there is no file {name!r} in {folder}")
+    size = path.stat().st_size
+    if size > LARGEST_FILE_BYTES:
+        raise InputError(
+            f"{where}: {name!r} has {size} bytes, more than a scene's file may have ({LARGEST_FILE_BYTES})"
+        )
+    return path
+
+
+def cached(
+    name: str, depends_on: Sequence[str], make: Callable[[], Any], read: Callable[[Any], Value]
+) -> Value:
+    """What `read` makes of the plain values (JSON) that `make` returned, here or in an earlier process.
+
+    They are made anew where a text of `depends_on` has changed, and where `read` raises KeyError, TypeError
+    or ValueError of what is cached; without a cache that can be written, in each process.
+    """
+    key = hashlib.sha256("\n".join(depends_on).encode()).hexdigest()[:32]
+    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    path = root / "simgen" / f"{name}-{key}.json"
+    with contextlib.suppress(OSError, KeyError, TypeError, ValueError):
+        return read(json.loads(path.read_text()))
+    values = make()
+    with contextlib.suppress(OSError):
+        write_json_safely(path, values)
+    return read(values)
