@@ -92,15 +92,6 @@ def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[floa
     return None
 
 
-def mending_depth_mm(grid: CameraGrid, z_mm: float) -> float | None:
-    """The nearest depth, in whole mm, whose shifts have both parities often; None if none is near."""
-    for step in range(1, max(2, round(MOST_PITCH_CHANGE * z_mm))):
-        for z in (round(z_mm) + step, round(z_mm) - step):
-            if z > 0 and all(_is_mixed(shift) for shift in shifts_px(grid, z)):
-                return float(z)
-    return None
-
-
 def _is_mixed(shifts: np.ndarray) -> bool:
     odd = int((shifts % 2).sum())
     return min(odd, shifts.size - odd) >= max(1, int(EVEN_ENOUGH * shifts.size))
