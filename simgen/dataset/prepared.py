@@ -13,7 +13,7 @@ from pcii.store.hashes import hash_file, hash_json
 from simgen.assets.asset_files import read_assets
 from simgen.base import random_streams as seeds
 from simgen.base.asset_names import asset
-from simgen.cameras.calibration import rig_of
+from simgen.cameras.rig import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Capture

@@ -16,8 +16,7 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities
-from simgen.cameras.calibration import turn
-from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
+from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, turn, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.thinning import WAVEFRONT, candidates_needed, places
 from simgen.sensor.detector import detect, full_light_image, nested_subset
