@@ -25,8 +25,7 @@ from simgen.photons.counting_plan import plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.detector import detect
-from simgen.sensor.frame_readout import counts_of, read_out
+from simgen.sensor.detector import counts_of, detect, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import CalibrationErrors, Lens
 from simgen.spec.recipe import Recipe, Sensor

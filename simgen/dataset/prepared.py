@@ -19,7 +19,7 @@ from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.mosaic import photons_per_radiance, sensitivities
+from simgen.sensor.detector import photons_per_radiance, sensitivities
 from simgen.spec.recipe import Analysis, Recipe
 from simgen.spec.scene import Scene, checked_folder, scene_files
 from simgen.spec.scene_lookup import load_scene
