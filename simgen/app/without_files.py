@@ -30,8 +30,7 @@ from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import CalibrationErrors, Lens
 from simgen.spec.recipe import Recipe, Sensor
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_at_centre
-from simgen.truth.pixel_coverage import coverage
+from simgen.truth.first_hits import coverage, first_hits_at_centre
 
 Values = Mapping[str, Any]
 """A table of a recipe as a dict."""

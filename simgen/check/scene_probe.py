@@ -5,7 +5,7 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import AreaLight, SpotLight
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
@@ -236,15 +236,11 @@ def _is_cut(mask: np.ndarray) -> bool:
 
 def _boxes_mm(render_scene: RenderScene) -> dict[int, np.ndarray]:
     """Bounding boxes (2, 3) of the objects by number, smallest and largest X, Y, Z in mm."""
-    points_mm: dict[int, list[np.ndarray]] = {}
-    shapes = zip(backend.shape_numbers(render_scene.scene), render_scene.scene.shapes(), strict=True)
-    for shape_number, shape in shapes:
-        bounds: Any = shape.bbox()
-        corners_of_box = np.array([np.ravel(bounds.corner(number)) for number in range(8)], dtype=np.float64)
-        number = int(render_scene.object_of_shape[shape_number])
-        points_mm.setdefault(number, []).append(render_scene.frame.points_mm(corners_of_box))
-    stacked = {number: np.concatenate(parts) for number, parts in points_mm.items() if number > 0}
-    return {number: np.array([part.min(axis=0), part.max(axis=0)]) for number, part in stacked.items()}
+    boxes_mm = shape_boxes_mm(render_scene)
+    object_of_box = render_scene.object_of_shape[backend.shape_numbers(render_scene.scene)]
+    numbers = np.unique(object_of_box[object_of_box > 0])
+    own = {int(number): boxes_mm[object_of_box == number] for number in numbers}
+    return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in own.items()}
 
 
 def _lamps_away(scene: Scene, boxes_mm: list[np.ndarray]) -> tuple[int, ...]:
