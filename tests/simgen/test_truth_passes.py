@@ -219,8 +219,10 @@ def test_visibility_is_what_a_loop_over_cameras_and_shapes_counts(tmp_path: Path
 
 REFERENCE = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="40"/>
 <transform name="to_world"><lookat origin="0,0,-1" target="0,0,-2" up="0,1,0"/></transform></sensor>
-<shape type="sphere"><point name="center" x="-.03" y="-.02" z="-1.4"/><float name="radius" value=".03"/></shape>
-<shape type="rectangle"><transform name="to_world"><scale value=".3"/><translate z="-1.6"/></transform></shape>
+<shape type="sphere"><point name="center" x="-.03" y="-.02" z="-1.4"/>
+<float name="radius" value=".03"/></shape>
+<shape type="rectangle"><transform name="to_world"><scale value=".3"/>
+<translate z="-1.6"/></transform></shape>
 <emitter type="constant"/></scene>"""
 
 
