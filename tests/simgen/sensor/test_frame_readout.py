@@ -103,19 +103,6 @@ def test_every_pixel_and_frame_stops_by_itself(rate: float, bits: int, known: bo
     np.testing.assert_array_equal(sums(only_sums), expected.sum(axis=1))
 
 
-@pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("sensor", [Sensor(bits=32), Sensor(frames=1 << 24, bits=1), Sensor(frames=7)])
-def test_without_saturation_counts_are_as_before(sensor: Sensor, known: bool) -> None:
-    arrivals = poisson(2e-2, known=known)
-    plain, read = (read_out(arrivals, FILM, each, seed=1) for each in (Sensor(), sensor))
-    for name in ("k", "l", "i", "j", "n"):
-        one, other = (
-            getattr(counts_of(x, FILM, None, Sensor(), keeps_frames=False).events, name)
-            for x in (plain, read)
-        )
-        np.testing.assert_array_equal(one, other)
-
-
 def test_parts_of_the_work_are_one_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     arrivals, sensor = poisson(2.0, known=False), Sensor(frames=16, bits=1)
     monkeypatch.setattr(detector, "MAX_CELLS_AT_ONCE", 1000)
