@@ -10,7 +10,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view
 from simgen.spec.scene import Scene
-from simgen.spectral.camera_curves import sensitivity
+from simgen.spectral.filters import sensitivity
 from simgen.spectral.spectra import CHART, colour_science, patch_names
 
 ACROSS, DOWN, SIDE_PX, BORDER_PX = 6, 4, 16, 2

@@ -5,7 +5,7 @@ from pathlib import Path
 from simgen.photons.candidates import Setup
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
-from simgen.sensor.mosaic import sensitivities
+from simgen.sensor.detector import sensitivities
 from simgen.spec.recipe import Recipe
 from simgen.spec.scene_lookup import load_scene
 

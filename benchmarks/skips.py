@@ -31,8 +31,8 @@ from simgen.photons.exploration import Exploration, explore
 from simgen.photons.thinning import thin_photons
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spec.recipe import Recipe
-from simgen.truth import visibility
-from simgen.truth.first_hits import first_hits_at_centre
+from simgen.truth import first_hits
+from simgen.truth.first_hits import first_hits_at_centre, visible_views
 
 Arrays = Mapping[str, np.ndarray]
 DEPTH = f"{TRUTH}/z_mm"
@@ -149,9 +149,9 @@ def _of_dense(world: World, images: np.ndarray, share: float) -> Arrays:
 def _visible(world: World, *, tests_all: bool) -> Arrays:
     hits = first_hits_at_centre(world.scene, world.setup.grid)
     if not tests_all:
-        return {"views": visibility.visible_views(world.scene, world.setup.grid, hits)[0]}
-    with patch.object(visibility, "_can_be_blocked", lambda _, __, start: np.ones(len(start), bool)):
-        return {"views": visibility.visible_views(world.scene, world.setup.grid, hits)[0]}
+        return {"views": visible_views(world.scene, world.setup.grid, hits)[0]}
+    with patch.object(first_hits, "_can_be_blocked", lambda _, __, start: np.ones(len(start), bool)):
+        return {"views": visible_views(world.scene, world.setup.grid, hits)[0]}
 
 
 def _drawn(world: World, explored: Exploration | None) -> Arrays:

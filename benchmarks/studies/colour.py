@@ -19,7 +19,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
-from simgen.spectral.camera_curves import sensitivity
+from simgen.spectral.filters import sensitivity
 from simgen.spectral.spectra import illuminant, integral, patch, patch_names
 
 if TYPE_CHECKING:

@@ -25,14 +25,12 @@ from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
-from simgen.sensor.detector import detect
-from simgen.sensor.frame_readout import counts_of, read_out
+from simgen.sensor.detector import counts_of, detect, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import CalibrationErrors, Lens
 from simgen.spec.recipe import Recipe, Sensor
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import first_hits_at_centre
-from simgen.truth.pixel_coverage import coverage
+from simgen.truth.first_hits import coverage, first_hits_at_centre
 
 Values = Mapping[str, Any]
 """A table of a recipe as a dict."""

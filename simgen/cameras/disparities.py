@@ -14,18 +14,17 @@ import numpy as np
 from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 
-MOST_PITCH_CHANGE = 0.25
-"""A remedy changes the cameras' distance by at most this share."""
+MAX_PITCH_CHANGE = 0.25
+"""Another pitch differs from the present one by at most this share."""
 PITCH_STEPS = 500
-EVEN_ENOUGH = 0.25
-"""A remedy gives each parity to at least this share of the camera rows, and of the columns."""
+MIN_PARITY_SHARE = 0.25
+"""Another pitch gives each parity of shifts to at least this share of the camera rows, and of the columns."""
 
 
 def disparities_px(grid: CameraGrid, z_mm: float) -> tuple[float, float]:
     """Disparity (x, y) of a point at depth z, in px per camera step."""
     per_mm = grid.focal_mm / (z_mm * grid.pixel_mm)
-    across, down = (pitch * per_mm for pitch in grid.pitch_mm)
-    return across - grid.shear_px[0], down - grid.shear_px[1]
+    return grid.pitch_mm[0] * per_mm - grid.shear_px[0], grid.pitch_mm[1] * per_mm - grid.shear_px[1]
 
 
 def spread_px_mm(grid: CameraGrid) -> float:
@@ -41,13 +40,13 @@ def apart_px(grid: CameraGrid, one_mm: float | np.ndarray, other_mm: float | np.
 
 def shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Whole pixels (rows (K,), columns (L,)), int64, by which a section at z shifts each camera's image."""
-    across, down = disparities_px(grid, z_mm)
-    return _shifts(grid.rows, down), _shifts(grid.cols, across)
+    across_px, down_px = disparities_px(grid, z_mm)
+    rows, cols = (np.arange(cameras) - (cameras - 1) / 2 for cameras in (grid.rows, grid.cols))
+    return _rounded(rows * down_px), _rounded(cols * across_px)
 
 
-def _shifts(cameras: int, disparity_px: float) -> np.ndarray:
-    centred = np.arange(cameras) - (cameras - 1) / 2
-    return np.floor(centred * disparity_px + 0.5).astype(np.int64)
+def _rounded(px: np.ndarray) -> np.ndarray:
+    return np.floor(px + 0.5).astype(np.int64)
 
 
 def share_seen_by_all(grid: CameraGrid, z_mm: float) -> float:
@@ -65,11 +64,11 @@ def colour_samples(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray
     By the parity of the voxel's row and column, away from the section's border, where every camera
     reaches. A camera adds the colour of the pixel that it was shifted from.
     """
-    cells, found = colour_cells(cfa), np.zeros((2, 2, channel_count(cfa)), dtype=np.int64)
-    odd = [np.bincount(shift % 2, minlength=2) for shift in shifts_px(grid, z_mm)]
+    cells, samples = colour_cells(cfa), np.zeros((2, 2, channel_count(cfa)), dtype=np.int64)
+    parities = [np.bincount(shift % 2, minlength=2) for shift in shifts_px(grid, z_mm)]
     for row, col, up, left in np.ndindex(2, 2, 2, 2):
-        found[row, col, cells[(row - up) % 2, (col - left) % 2]] += odd[0][up] * odd[1][left]
-    return found
+        samples[row, col, cells[(row - up) % 2, (col - left) % 2]] += parities[0][up] * parities[1][left]
+    return samples
 
 
 def shares_without(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray:
@@ -78,29 +77,20 @@ def shares_without(grid: CameraGrid, cfa: str | None, z_mm: float) -> np.ndarray
 
 
 def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[float, float] | None:
-    """The nearest distance of cameras (x, y) whose shifts have both parities often at all these depths.
+    """The nearest pitch (x, y) at which even and odd shifts both occur often at all these depths.
 
     None if there is none within a quarter of the present one, as for a single row of cameras.
     """
-    steps = np.linspace(0, MOST_PITCH_CHANGE, PITCH_STEPS + 1)
+    steps = np.linspace(0, MAX_PITCH_CHANGE, PITCH_STEPS + 1)
     for factor in (1 + sign * step for step in steps for sign in (1, -1)):
         # To what one would type: a hundredth of a millimetre, or finer where that is coarse.
         pitch = tuple(round(factor * old, 2) if old >= 1 else factor * old for old in grid.pitch_mm)
         changed = replace(grid, pitch_mm=pitch)
-        if all(_is_mixed(shift) for z in depths_mm for shift in shifts_px(changed, z)):
+        if all(_has_both_parities(shift) for z in depths_mm for shift in shifts_px(changed, z)):
             return changed.pitch_mm
     return None
 
 
-def mending_depth_mm(grid: CameraGrid, z_mm: float) -> float | None:
-    """The nearest depth, in whole mm, whose shifts have both parities often; None if none is near."""
-    for step in range(1, max(2, round(MOST_PITCH_CHANGE * z_mm))):
-        for z in (round(z_mm) + step, round(z_mm) - step):
-            if z > 0 and all(_is_mixed(shift) for shift in shifts_px(grid, z)):
-                return float(z)
-    return None
-
-
-def _is_mixed(shifts: np.ndarray) -> bool:
+def _has_both_parities(shifts: np.ndarray) -> bool:
     odd = int((shifts % 2).sum())
-    return min(odd, shifts.size - odd) >= max(1, int(EVEN_ENOUGH * shifts.size))
+    return min(odd, shifts.size - odd) >= max(1, int(MIN_PARITY_SHARE * shifts.size))

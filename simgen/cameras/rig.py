@@ -1,16 +1,18 @@
-"""Where the cameras stand and which way pixels look, from first principles.
+"""Where cameras really stand and which way their pixels look, from first principles.
 
 This is written without `pcii.core.geometry` on purpose: simulation and reconstruction must not be able to
 share a sign mistake. A test renders a dot and finds it where `pcii.core.geometry` says.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.spec.camera_grid import Lens
+from simgen.base import random_streams as seeds
+from simgen.spec.camera_grid import CalibrationErrors, Grid, Lens
 
 
 def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -52,17 +54,17 @@ class Camera:
         axis_px = (grid.width - 1) / 2 + right, (grid.height - 1) / 2 + down
         row_px, col_px = (np.asarray(px, dtype=np.float64) for px in (row_px, col_px))
         x, y = film_slopes(grid, row_px, col_px, axis_px)
-        return self._turned(np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1), self.rotation.T)
+        return _turned(np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1), self.rotation.T)
 
     def on_film(self, point_mm: np.ndarray) -> np.ndarray:
         """Whether the chief rays of points (N, 3) fall on the film, (N,) bool."""
         grid = self.grid
-        x, y, z = self._turned(point_mm - self.position_mm, self.rotation).T
+        x, y, z = _turned(point_mm - self.position_mm, self.rotation).T
         scale_px = grid.focal_mm / grid.pixel_mm
-        fits = z > 0
+        is_on_film = z > 0
         for offset, shift, size in ((x, self.shift_px[0], grid.width), (y, self.shift_px[1], grid.height)):
-            fits &= np.abs(offset * scale_px + shift * z) < z * (size / 2)
-        return fits
+            is_on_film &= np.abs(offset * scale_px + shift * z) < z * (size / 2)
+        return is_on_film
 
     def film_px(self, point_mm: np.ndarray) -> np.ndarray:
         """Columns and rows (N, 2), in px from the film's middle, of points (N, 3) before the camera."""
@@ -78,8 +80,9 @@ class Camera:
         window = replace(grid, height=rows.stop - rows.start, width=cols.stop - cols.start)
         return replace(self, grid=window, shift_px=(right, down))
 
-    def _turned(self, rows: np.ndarray, by: np.ndarray) -> np.ndarray:
-        return rows if np.array_equal(by, np.eye(3)) else rows @ by
+
+def _turned(rows: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    return rows if np.array_equal(rotation, np.eye(3)) else rows @ rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,3 +182,40 @@ def _evenly(pitch_mm: float, count: int) -> np.ndarray:
     """Places evenly spaced, symmetric about 0, growing to the right or downwards."""
     span = pitch_mm * (count - 1)
     return np.linspace(-span / 2, span / 2, count)
+
+
+def rig_of(grid: Grid, seed: int) -> Rig:
+    """The cameras of a recipe's grid, with their lens and errors of calibration; one seed, one rig."""
+    perfect = as_rig(grid.camera_grid())
+    position_mm, rotation = perfect.position_mm, perfect.rotation
+    if grid.errors is not None:
+        position_mm, rotation = _with_errors(position_mm, grid.errors, seed)
+    return Rig(perfect.grid, position_mm, rotation, grid.lens)
+
+
+def turn(angles_deg: np.ndarray) -> np.ndarray:
+    """Rotation (3, 3) about the fixed axes X, then Y, then Z by these angles, right-handed.
+
+    Turned about X by a positive angle a camera looks further up, about Y further right, and about Z its
+    right side goes down.
+    """
+    total = np.eye(3)
+    for axis, angle in enumerate(np.radians(angles_deg)):
+        first, second = (axis + 1) % 3, (axis + 2) % 3
+        about_axis = np.eye(3)
+        about_axis[first, first] = about_axis[second, second] = math.cos(angle)
+        about_axis[second, first], about_axis[first, second] = math.sin(angle), -math.sin(angle)
+        total = about_axis @ total
+    return total
+
+
+def _with_errors(
+    position_mm: np.ndarray, errors: CalibrationErrors, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where cameras of these places really are and how they are turned; each has its own random stream."""
+    rows, cols, _ = position_mm.shape
+    streams = (seeds.generator(seed, view=view, stage="camera errors") for view in range(rows * cols))
+    normal = np.stack([stream.standard_normal(6) for stream in streams]).reshape(rows, cols, 6)
+    off_mm, angles_deg = normal[..., :3] * errors.position_sd_mm, normal[..., 3:] * errors.rotation_sd_deg
+    rotation = np.stack([[turn(angles) for angles in row] for row in angles_deg])
+    return position_mm * (1 + errors.pitch_error) + off_mm, rotation

@@ -1,12 +1,11 @@
-"""The coarse probe of `simgen check`: what few, large pixels of the centre and of the corner cameras see."""
+"""The coarse look at a scene that all findings rest on: few, large pixels of the centre and the corners."""
 
 import itertools
-import shutil
+import math
 import time
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from pcii.core.bayer import channel_count, colour_cells
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
-from simgen.cameras.rig import Camera, as_rig, centre_camera, corners, with_larger_pixels
-from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts, OnFilm
+from simgen.cameras.disparities import apart_px
+from simgen.cameras.rig import corners, with_larger_pixels
 from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
 from simgen.dataset.resources import available_bytes, fits
 from simgen.photons.candidates import Setup
@@ -24,73 +23,149 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import AreaLight, SpotLight
-from simgen.spec.materials import is_clear
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
+from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
-SAME_DEPTH = 1e-3
-"""This near to the backdrop's depth, as a share of it, a hit is taken to be on it."""
 SAMPLES = 4
+MAX_PLANE_BLUR_PX = 2.0
+"""Where a recipe names no planes, objects within this blur share one."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was looked at, in one sentence: a verdict, the subject, the text, and what to change."""
+
+    verdict: Literal["ok", "warn", "bad"]
+    subject: str
+    text: str
+    remedy: str = ""
+
+    def line(self) -> str:
+        """The finding on one line, with its remedy after an arrow."""
+        remedy = f" -> {self.remedy}" if self.remedy else ""
+        return f"{self.verdict:<4}  {self.subject:<10}  {self.text}{remedy}"
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """A scene on a coarse film: its picture in the sensor's colours, and what is hit first.
+class ObjectFacts:
+    """What the probe shows of one object."""
 
-    `boxes` are the objects' bounding boxes by number.
-    """
+    name: str
+    z_mm: np.ndarray
+    """Depths (P,) of the probe's pixels that see it from the virtual centre."""
+    film_share: float
+    """Share of the virtual centre's pixels that see it."""
+    light_share: np.ndarray
+    """Share (C,) of the light in each colour of the virtual centre's image that comes from it."""
+    body_z_mm: tuple[float, float]
+    """Nearest and farthest depth of its bounding box, of what is hidden too."""
+    corners_seeing: int = 4
+    """Corner cameras that see any of it."""
+    corners_seeing_all: int = 4
+    """Corner cameras that see it and at whose film's border it does not end."""
+    is_cut_at_centre: bool = False
+    """Whether it ends at the border of the virtual centre's film."""
+    shines: bool = False
+
+    @cached_property
+    def middle_mm(self) -> float:
+        """Median of the depths that are seen."""
+        return float(np.median(self.z_mm))
+
+
+@dataclass(frozen=True, eq=False)
+class Facts:
+    """What the findings rest on: a recipe with its scene, a coarse look at it, and a plan of the counts."""
 
     target: Prepared
-    render_scene: RenderScene
-    grid: CameraGrid
-    image: np.ndarray
-    centre: FirstHits
-    corners: dict[tuple[int, int], FirstHits]
-    boxes: dict[int, np.ndarray]
+    objects: tuple[ObjectFacts, ...]
+    corners: int
+    """Number of corner cameras: 4, or fewer of a single row or column."""
+    luminance: float
+    """Mean luminance of the virtual centre's image in cd/m^2; in spectral mode what its pixels see."""
+    colour_share: np.ndarray
+    """Share (C,) of that image's light that the pixels of each colour get; sums to 1."""
+    other_share: np.ndarray
+    """Share (C,) of the light in each colour that comes from none of the objects."""
+    lamps_away: tuple[int, ...]
+    """Lamps, from 1, that shine away from all objects."""
+    plan: Plan | None
+    """How the counts will be made; None if the recipe wants none."""
+    path_s: float
+    """Seconds that the probe took for a light path."""
+    hit_s: float
+    """Seconds that the probe took for a first hit."""
+    is_compiled: bool
+    """Whether a compiled backend renders."""
+    memory_bytes: float
+    """Memory of this machine that is available."""
+    pixel_px: float
+    """Side of the probe's pixels, in pixels of the recipe."""
+
+    @cached_property
+    def grid(self) -> CameraGrid:
+        """The recipe's cameras."""
+        return self.target.recipe.grid.camera_grid()
+
+    @property
+    def backdrop_mm(self) -> float | None:
+        """Depth of the scene's backdrop, None if there is none."""
+        return None if self.target.scene.backdrop is None else self.target.scene.backdrop.z_mm
+
+    @property
+    def seen(self) -> tuple[ObjectFacts, ...]:
+        """The objects that the virtual centre sees."""
+        return tuple(thing for thing in self.objects if thing.z_mm.size)
+
+    @cached_property
+    def planes_mm(self) -> tuple[float, ...]:
+        """Depths to look at: those of the recipe, else the objects', each in focus at one of them."""
+        planes: list[float] = []
+        for middle_mm in sorted(thing.middle_mm for thing in self.seen):
+            if not planes or apart_px(self.grid, planes[-1], middle_mm) > MAX_PLANE_BLUR_PX:
+                planes.append(float(round(middle_mm)) or middle_mm)
+        return self.target.recipe.analysis.z_mm or tuple(planes)
+
+
+def listed(names: list[str], most: int = 6) -> str:
+    """`a, b and 3 more`."""
+    text = ", ".join(names[:most])
+    return text if len(names) <= most else f"{text} and {len(names) - most} more"
 
 
 def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
-    recipe, scene, compiled = target.recipe, target.scene, backend.choose().kind != "scalar"
+    recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
-    made = _plan_of(target, render_scene) if recipe.products.counts else None
-    small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
-    image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
-    centre = first_hits_at_centre(render_scene, small)
-    begun = time.perf_counter()
-    ends = {(k, l): first_hits_of_view(render_scene, small, k, l) for k, l in corners(grid)}
-    hit_s = (time.perf_counter() - begun) / (len(ends) * centre.z_mm.size)
-    boxes = _boxes(render_scene)
-    look = _Look(target, render_scene, small, image, centre, ends, boxes)
-    light = image.sum(axis=(0, 1))
+    counting_plan = _plan_of(target, render_scene) if recipe.products.counts else None
+    coarse = coarser(grid, SIDE_PX if is_compiled else SCALAR_SIDE_PX)
+    image, path_s = _picture(render_scene, coarse, recipe.cfa, recipe.seed)
+    centre = first_hits_at_centre(render_scene, coarse)
+    start_s = time.perf_counter()
+    corner_hits = [first_hits_of_view(render_scene, coarse, k, l) for k, l in corners(grid)]
+    hit_s = (time.perf_counter() - start_s) / (len(corner_hits) * centre.z_mm.size)
+    boxes, light = _boxes_mm(render_scene), image.sum(axis=(0, 1))
+    shining = {surface.number for surface in render_scene.shining}
+    objects = tuple(
+        _object_facts(name, number, boxes.get(number), image, centre, corner_hits, number in shining)
+        for number, name in render_scene.names.items()
+    )
     return Facts(
-        grid=grid,
-        sensor=recipe.sensor,
-        photons=recipe.photons,
-        render=recipe.render,
-        analysis=recipe.analysis,
-        needs=needs_of(recipe),
-        objects=tuple(_object_facts(look, number, name) for number, name in render_scene.names.items()),
+        target=target,
+        objects=objects,
+        corners=len(corner_hits),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
-        elsewhere={
-            place: _share(image[mask].sum(axis=0), light) for place, mask in _elsewhere(scene, centre).items()
-        },
-        plan=made,
+        other_share=_share(image[centre.object_id == 0].sum(axis=0), light),
+        lamps_away=_lamps_away(target.scene, list(boxes.values())),
+        plan=counting_plan,
         path_s=path_s,
         hit_s=hit_s,
-        compiled=compiled,
+        is_compiled=is_compiled,
         memory_bytes=available_bytes(),
-        disk_bytes=shutil.disk_usage(Path()).free,
-        corners=len(ends),
-        lamps_away=_lamps_away(scene, list(boxes.values())),
-        level=scene.level,
-        gain=render_scene.gain,
-        glass=tuple(thing.name for thing in scene.objects if is_clear(thing.material.finish)),
-        backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
-        probe_px=(small.height, small.width),
+        pixel_px=grid.width / coarse.width,
     )
 
 
@@ -112,35 +187,35 @@ def _picture(
 ) -> tuple[np.ndarray, float]:
     """Radiance in the sensor's colours (H, W, C) from the virtual centre, and seconds for a path."""
     single = replace(grid, rows=1, cols=1)
-    total, spent = np.zeros((grid.height, grid.width, 1)), 0.0
+    image, path_s = np.zeros((grid.height, grid.width, 1)), 0.0
     for part in range(2):  # the first compiles, the second is timed
         path_seed = seeds.integer(seed, stage="check probe", part=part)
-        begun = time.perf_counter()
-        total = total + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
-        spent = time.perf_counter() - begun
-    image = total if cfa is not None else sense(total, None)[..., None]
-    return image, spent / (SAMPLES * grid.height * grid.width)
+        start_s = time.perf_counter()
+        image = image + render_view(render_scene, single, 0, 0, samples_per_pixel=SAMPLES, seed=path_seed) / 2
+        path_s = (time.perf_counter() - start_s) / (SAMPLES * grid.height * grid.width)
+    return (image if cfa is not None else sense(image, None)[..., None]), path_s
 
 
-def _object_facts(look: _Look, number: int, name: str) -> ObjectFacts:
-    target, box, here = look.target, look.boxes.get(number), look.centre.object_id == number
-    masks = {camera: hits.object_id == number for camera, hits in look.corners.items()}
-    full = [camera for camera, mask in masks.items() if mask.all()]
-    own_objects = target.scene.objects
-    stands_at_mm = own_objects[number - 1].position_mm[2] if number <= len(own_objects) else np.inf
+def _object_facts(
+    name: str,
+    number: int,
+    box_mm: np.ndarray | None,
+    image: np.ndarray,
+    centre: FirstHits,
+    corner_hits: list[FirstHits],
+    shines: bool,
+) -> ObjectFacts:
+    mask, corner_masks = centre.object_id == number, [hits.object_id == number for hits in corner_hits]
     return ObjectFacts(
         name=name,
-        z_mm=look.centre.z_mm[here].astype(np.float64),
-        film_share=float(here.mean()),
-        light_share=_share(look.image[here].sum(axis=0), look.image.sum(axis=(0, 1))),
-        corners_seen=sum(bool(mask.any()) for mask in masks.values()),
-        corners_cut=sum(_at_border(mask) for mask in masks.values()),
-        centre_cut=_at_border(here),
-        body_z_mm=(0.0, 0.0) if box is None else (float(box[0, 2]), float(box[1, 2])),
-        stands_at_mm=stands_at_mm,
-        on_film=None if box is None else on_film(box, target.recipe.grid.camera_grid()),
-        shines=any(number == one.number for one in look.render_scene.shining),
-        encloses_camera=box is not None and any(_holds(box, look.grid, *camera) for camera in full),
+        z_mm=centre.z_mm[mask].astype(np.float64),
+        film_share=float(mask.mean()),
+        light_share=_share(image[mask].sum(axis=0), image.sum(axis=(0, 1))),
+        body_z_mm=(math.inf, math.inf) if box_mm is None else (float(box_mm[0, 2]), float(box_mm[1, 2])),
+        corners_seeing=sum(bool(one.any()) for one in corner_masks),
+        corners_seeing_all=sum(bool(one.any()) and not _is_cut(one) for one in corner_masks),
+        is_cut_at_centre=_is_cut(mask),
+        shines=shines,
     )
 
 
@@ -154,73 +229,28 @@ def _colour_share(light: np.ndarray, cfa: str | None) -> np.ndarray:
     return weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum()
 
 
-def _elsewhere(scene: Scene, hits: FirstHits) -> dict[Elsewhere, np.ndarray]:
-    """Masks (H, W) of what the centre sees that is no object."""
-    other, hit, on_wall = hits.object_id == 0, np.isfinite(hits.z_mm), on_backdrop(scene, hits.z_mm)
-    return {"backdrop": other & on_wall, "a lamp in view": other & hit & ~on_wall, "nothing": other & ~hit}
+def _is_cut(mask: np.ndarray) -> bool:
+    """Whether an object of this mask (H, W) ends at the film's border."""
+    return bool(mask[[0, -1]].any() or mask[:, [0, -1]].any())
 
 
-def _at_border(mask: np.ndarray) -> bool:
-    return bool(mask[0].any() or mask[-1].any() or mask[:, 0].any() or mask[:, -1].any())
+def _boxes_mm(render_scene: RenderScene) -> dict[int, np.ndarray]:
+    """Bounding boxes (2, 3) of the objects by number, smallest and largest X, Y, Z in mm."""
+    boxes_mm = shape_boxes_mm(render_scene)
+    object_of_box = render_scene.object_of_shape[backend.shape_numbers(render_scene.scene)]
+    numbers = np.unique(object_of_box[object_of_box > 0])
+    own = {int(number): boxes_mm[object_of_box == number] for number in numbers}
+    return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in own.items()}
 
 
-def _boxes(render_scene: RenderScene) -> dict[int, np.ndarray]:
-    """Bounding boxes (2, 3) of the objects, smallest and largest X, Y, Z in mm."""
-    parts: dict[int, list[np.ndarray]] = {}
-    for number, shape in zip(
-        backend.shape_numbers(render_scene.scene), render_scene.scene.shapes(), strict=True
-    ):
-        bounds: Any = shape.bbox()
-        corners = np.array([np.ravel(bounds.corner(number)) for number in range(8)], dtype=np.float64)
-        corners_mm = render_scene.frame.points_mm(corners)
-        box = np.array([corners_mm.min(axis=0), corners_mm.max(axis=0)])
-        parts.setdefault(int(render_scene.object_of_shape[number]), []).append(box)
-    return {
-        number: np.array([np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)])
-        for number, boxes in parts.items()
-        if number > 0
-    }
-
-
-def _holds(box: np.ndarray, grid: CameraGrid, k: int, l: int) -> bool:
-    place = as_rig(grid).camera(k, l).position_mm
-    return bool(np.all((box[0] <= place) & (place <= box[1])))
-
-
-def _lamps_away(scene: Scene, boxes: Iterable[np.ndarray]) -> tuple[int, ...]:
+def _lamps_away(scene: Scene, boxes_mm: list[np.ndarray]) -> tuple[int, ...]:
     """Lamps, from 1, behind whose face all objects stand."""
-    choices = itertools.product((0, 1), repeat=3)
-    corners = [[[box[c, a] for a, c in enumerate(choice)] for box in boxes] for choice in choices]
-    points = np.array(corners, dtype=np.float64).reshape(-1, 3)
-    away = []
+    if not boxes_mm:
+        return ()
+    points_mm, away = np.concatenate([list(itertools.product(*box.T)) for box in boxes_mm]), []
     for number, lamp in enumerate(scene.lights, start=1):
-        if isinstance(lamp, AreaLight | SpotLight) and points.size:
+        if isinstance(lamp, AreaLight | SpotLight):
             facing = np.subtract(lamp.target_mm, lamp.position_mm)
-            if np.all((points - lamp.position_mm) @ facing <= 0):
+            if np.all((points_mm - lamp.position_mm) @ facing <= 0):
                 away.append(number)
     return tuple(away)
-
-
-def on_backdrop(scene: Scene, z_mm: np.ndarray) -> np.ndarray:
-    """Which first hits at these depths, +inf for none, are so near the backdrop that they are on it; bool."""
-    if scene.backdrop is None:
-        return np.zeros(z_mm.shape, dtype=bool)
-    wall_mm = scene.backdrop.z_mm
-    return np.abs(z_mm - wall_mm) <= SAME_DEPTH * wall_mm
-
-
-def on_film(box: np.ndarray, grid: CameraGrid) -> OnFilm:
-    """Where a bounding box (2, 3), smallest and largest X, Y, Z in mm, falls on the films."""
-    if box[0, 2] <= 0:
-        return OnFilm((np.inf, np.inf), in_view=True)
-    rig, centre = as_rig(grid), centre_camera(grid)
-    ends = [rig.camera(k, l) for k, l in corners(grid)]
-    points = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
-    across, down = np.ptp(centre.film_px(points), axis=0).tolist()
-    return OnFilm((across, down), any(_meets(points, one) for one in (centre, *ends)))
-
-
-def _meets(points: np.ndarray, camera: Camera) -> bool:
-    """Whether the outline of points reaches onto the film."""
-    px, half = camera.film_px(points), np.array([camera.grid.width, camera.grid.height]) / 2
-    return bool(np.all(px.min(axis=0) < half) and np.all(px.max(axis=0) > -half))

@@ -8,15 +8,13 @@ from pathlib import Path
 from pcii.base.errors import InputError
 from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import suggestion
-from simgen.check.costs import cost_findings, hopeless
 from simgen.check.depths import depth_findings
-from simgen.check.expected_photons import photon_findings
-from simgen.check.scene_facts import Facts, Finding
-from simgen.check.scene_probe import probe_scene
+from simgen.check.light import cost_findings, photon_findings, shortage_findings
+from simgen.check.scene_probe import Facts, Finding, probe_scene
 from simgen.check.sight import sight_findings
 from simgen.dataset.prepared import Prepared, needs_of, prepare, prepare_scene
 from simgen.spec.materials import is_clear
-from simgen.spec.recipe import Recipe, Render
+from simgen.spec.recipe import Recipe, Render, recipe_file
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, scene_names
 from simgen.spec.sweeps import Sweep, load_sweep
@@ -32,39 +30,27 @@ def lint(
     *,
     trust_python: bool = False,
 ) -> tuple[str, list[Finding]]:
-    """A line that says what was checked, and all findings. Raises `InputError` for invalid files.
+    """A line that says what was checked, and all findings; see `load_target` for the parameters.
 
-    `scene_number` says which drawn scene is looked at, the first unless it says so. Of other fields with
-    several values the first is taken. `trust_python` runs a Python function that a recipe names.
+    Raises `InputError` for files that are not valid.
     """
-    sweep, recipe_folder = target_sweep(name_or_path, overrides, trust_python=trust_python)
-    recipe = sweep.recipe(0)
-    views = (
-        f"{recipe.grid.rows} x {recipe.grid.cols} views of {recipe.grid.height} x {recipe.grid.width} pixels"
-    )
-    pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
-    target = target_of(sweep, recipe_folder, scene_number)
-    line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    all_findings = hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
-    return f"{line}{_first_values(sweep)}", all_findings
-
-
-def _first_values(sweep: Sweep) -> str:
-    """Says which values of fields with several are looked at."""
-    return "".join(
+    sweep, recipe_folder = _sweep_of(name_or_path, overrides, trust_python)
+    target = _target_of(sweep, recipe_folder, scene_number)
+    grid, sensor = target.recipe.grid, target.recipe.sensor
+    views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
+    pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
+    first_values = (
         f"; of {axis.field} the first of {len(axis.values)} values, {json.dumps(axis.values[0])}"
         for axis in sweep.axes
     )
+    title = target.recipe.title or target.scene.title
+    line = f"{title}: {views}, {pitch}, {sensor.cfa}{''.join(first_values)}"
+    return line, shortage_findings(needs_of(target.recipe)) or findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:
     """All findings, in the order in which one would mend them."""
-    return [
-        *sight_findings(facts),
-        *depth_findings(facts),
-        *photon_findings(facts),
-        *cost_findings(facts),
-    ]
+    return [*sight_findings(facts), *depth_findings(facts), *photon_findings(facts), *cost_findings(facts)]
 
 
 def load_target(
@@ -74,18 +60,24 @@ def load_target(
     *,
     trust_python: bool = False,
 ) -> Prepared:
-    """A recipe with its scene, from the name or path of either; `scene_number` says which drawn scene.
+    """A recipe with its scene, from the name or path of either.
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
     longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
-    .toml at its end, the recipe. Of fields with several values the first is taken. Raises `InputError` for
-    what is missing or not valid.
+    .toml at its end, the recipe. `scene_number` says which drawn scene is meant, the first unless it says so;
+    of other fields with several values the first is taken. `trust_python` runs a Python function that a
+    recipe file names. Raises `InputError` for what is missing or not valid.
     """
-    return target_of(*target_sweep(name_or_path, overrides, trust_python=trust_python), scene_number)
+    return _target_of(*_sweep_of(name_or_path, overrides, trust_python), scene_number)
 
 
-def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None = None) -> Prepared:
-    """The recipe of a sweep's first values with its scene; see `load_target`."""
+def target_of_scene(scene: Scene) -> Prepared:
+    """A scene, looked at as `load_target` says; raises `InputError` for a file that it names and lacks."""
+    return _with_long_paths(prepare_scene(Recipe(scene="as given"), scene))
+
+
+def _target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None) -> Prepared:
+    """The recipe of a sweep's first values with its scene; of a bare scene the folder is None."""
     recipe = sweep.recipe(0)
     if scene_number is None and recipe.scene_number is None and is_drawn(recipe.scene, recipe_folder):
         scene_number = 0
@@ -95,38 +87,22 @@ def target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None
     return _with_long_paths(target) if recipe_folder is None else target
 
 
-def target_of_scene(scene: Scene) -> Prepared:
-    """A scene, looked at as `load_target` says; raises `InputError` for a file that it names and lacks."""
-    return _with_long_paths(prepare_scene(Recipe(scene="as given"), scene))
-
-
 def _with_long_paths(target: Prepared) -> Prepared:
     """The same, with longer light paths if there is glass in the scene."""
     if not any(is_clear(thing.material.finish) for thing in target.scene.objects):
         return target
-    longer = target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)})
-    return replace(target, recipe=longer)
+    return replace(target, recipe=target.recipe.model_copy(update={"render": Render(max_depth=GLASS_DEPTH)}))
 
 
-def target_sweep(
-    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
-) -> tuple[Sweep, Path | None]:
-    """The recipe that a name or path means, and its folder; of a scene one that says nothing else, and None.
-
-    Raises `InputError` for what is missing or not valid.
-    """
-    if not is_scene(name_or_path):
-        _check_name(name_or_path)
-        sweep = load_sweep(name_or_path, overrides, trust_python=trust_python)
-        return sweep, sweep.recipe_folder
-    if overrides:
-        raise InputError(f"--set: {name_or_path!r} is a scene, seen by the paper's cameras; name a recipe")
-    return Sweep({"scene": name_or_path}, (), name_or_path, Path()), None
-
-
-def _check_name(name_or_path: str) -> None:
-    path = Path(name_or_path)
-    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-    if not path.is_file() and not (path.parent == Path() and path.name.removesuffix(".toml") in names):
-        hint = suggestion(path.stem, {*names, *scene_names(), *drawn_scenes()})
+def _sweep_of(name_or_path: str, overrides: Sequence[str], trust_python: bool) -> tuple[Sweep, Path | None]:
+    """The recipe that a name or path means, and its folder; of a scene one without other fields, and None."""
+    if is_scene(name_or_path):
+        if overrides:
+            raise InputError(f"--set: {name_or_path!r} is a scene, without cameras of its own; name a recipe")
+        return Sweep({"scene": name_or_path}, (), name_or_path, Path()), None
+    if recipe_file(name_or_path) is None:
+        recipes = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
+        hint = suggestion(Path(name_or_path).stem, {*recipes, *scene_names(), *drawn_scenes()})
         raise InputError(f"there is no scene or recipe {name_or_path!r}{hint}")
+    sweep = load_sweep(name_or_path, overrides, trust_python=trust_python)
+    return sweep, sweep.recipe_folder

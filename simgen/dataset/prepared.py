@@ -13,13 +13,13 @@ from pcii.store.hashes import hash_file, hash_json
 from simgen.assets.asset_files import read_assets
 from simgen.base import random_streams as seeds
 from simgen.base.file_lookup import asset
-from simgen.cameras.calibration import rig_of
+from simgen.cameras.rig import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
 from simgen.dataset.resources import Needs
 from simgen.photons.counting_plan import Capture
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.sensor.mosaic import photons_per_radiance, sensitivities
+from simgen.sensor.detector import photons_per_radiance, sensitivities
 from simgen.spec.recipe import Analysis, Recipe
 from simgen.spec.scene import Scene, checked_folder, scene_files
 from simgen.spec.scene_lookup import load_scene

@@ -19,8 +19,7 @@ from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view, windows_of_objects
-from simgen.sensor.detector import full_light_image
-from simgen.sensor.mosaic import photons_per_radiance
+from simgen.sensor.detector import full_light_image, photons_per_radiance
 from simgen.spec.recipe import Exposure, Render, Sensor
 
 RENDERED = ".rendered"

@@ -15,7 +15,7 @@ Table = dict[str, Any]
 REFERENCE_MM = 560.0
 """Sizes and places are drawn for this depth and scaled, so that things are as large in the picture."""
 PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
-LEAST_APART_MM = 80
+MIN_GAP_MM = 80
 DARK_BACKDROP = {"z_mm": 3000.0, "reflectance": "black 2"}
 
 
@@ -30,7 +30,7 @@ def plain(random: Random) -> Table:
 
 
 def noise(random: Random, mean_colour: list[float]) -> Table:
-    """Noise like that of natural scenes about a colour."""
+    """Noise like that of natural scenes, of this mean colour."""
     exponent, contrast = random.uniform(0.8, 1.3), random.uniform(0.15, 0.3)
     return {
         "texture": {
@@ -52,7 +52,7 @@ def pattern(random: Random) -> Table:
 
 
 def chessboard(random: Random, fewest: int = 4, most: int = 8) -> Table:
-    """Checks of two colours, so many to a side."""
+    """Checks of two colours, from `fewest` to `most` to a side."""
     colours = [colour(random, 0.15, 0.85), colour(random, 0.15, 0.85)]
     rows, columns = random.randint(fewest, most), random.randint(fewest, most)
     return {"texture": {"type": "checks", "rows": rows, "columns": columns, "colours": colours}}
@@ -83,7 +83,7 @@ def planes_apart(random: Random, count: int) -> list[int]:
     """`count` depths, in mm, well apart."""
     while True:
         planes: list[int] = sorted(random.sample(PLANES_MM, count))
-        if all(far - near >= LEAST_APART_MM for near, far in pairwise(planes)):
+        if all(far - near >= MIN_GAP_MM for near, far in pairwise(planes)):
             return planes
 
 
@@ -97,24 +97,24 @@ def solid(
     random: Random, name: str, place_mm: tuple[float, float, float], radius_mm: float, material: Table
 ) -> Table:
     """A turned sphere, cylinder or box, about as large as a sphere of this radius."""
-    turned = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
+    rotation_deg = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
     r = radius_mm
     shapes = [sphere(r), cylinder_of(0.7 * r, 2.1 * r), box_of(1.5 * r, 1.7 * r, 1.3 * r)]
-    return placed(name, place_mm, turned, random.choice(shapes), material)
+    return placed(name, place_mm, rotation_deg, random.choice(shapes), material)
 
 
 def placed(
     name: str,
     place_mm: tuple[float, float, float],
-    turned_deg: tuple[float, float, float],
+    rotation_deg: tuple[float, float, float],
     shape: Table,
     material: Table,
 ) -> Table:
-    """An object."""
+    """An object of a scene."""
     return {
         "name": name,
         "position_mm": [round(value, 1) for value in place_mm],
-        "rotation_deg": [round(value, 1) for value in turned_deg],
+        "rotation_deg": [round(value, 1) for value in rotation_deg],
         "shape": shape,
         "material": material,
     }
@@ -122,38 +122,33 @@ def placed(
 
 def sphere(radius_mm: float) -> Table:
     """A sphere."""
-    return {"type": "sphere", "radius_mm": round(radius_mm, 1)}
+    return _shape("sphere", radius_mm=radius_mm)
 
 
 def cylinder_of(radius_mm: float, length_mm: float) -> Table:
-    """A cylinder."""
-    return {"type": "cylinder", "radius_mm": round(radius_mm, 1), "length_mm": round(length_mm, 1)}
+    """A cylinder, whose axis is upright."""
+    return _shape("cylinder", radius_mm=radius_mm, length_mm=length_mm)
 
 
 def box_of(width_mm: float, height_mm: float, depth_mm: float) -> Table:
     """A box."""
-    return {
-        "type": "box",
-        "width_mm": round(width_mm, 1),
-        "height_mm": round(height_mm, 1),
-        "depth_mm": round(depth_mm, 1),
-    }
+    return _shape("box", width_mm=width_mm, height_mm=height_mm, depth_mm=depth_mm)
 
 
 def card(width_mm: float, height_mm: float) -> Table:
-    """A card."""
-    return {"type": "card", "width_mm": round(width_mm, 1), "height_mm": round(height_mm, 1)}
+    """A card, which faces the cameras."""
+    return _shape("card", width_mm=width_mm, height_mm=height_mm)
+
+
+def _shape(kind: str, **sizes_mm: float) -> Table:
+    return {"type": kind} | {name: round(size_mm, 1) for name, size_mm in sizes_mm.items()}
 
 
 def _lamps(random: Random) -> list[Table]:
     return [
         {
             "type": "area",
-            "position_mm": [
-                round(random.uniform(-300, 300), 0),
-                -430.0,
-                round(random.uniform(150, 400), 0),
-            ],
+            "position_mm": [round(random.uniform(-300, 300), 0), -430.0, round(random.uniform(150, 400), 0)],
             "target_mm": [0.0, 0.0, 600.0],
             "width_mm": 400.0,
             "height_mm": 300.0,

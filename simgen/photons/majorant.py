@@ -21,7 +21,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.photons.disparity_layers import DisparityLayers, Samples
-from simgen.truth.pixel_coverage import over_squares
+from simgen.truth.first_hits import over_squares
 
 COARSE_TILES = 8
 """Coarse tiles are 8 x 8 tiles."""

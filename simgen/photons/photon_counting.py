@@ -18,9 +18,15 @@ from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan
 from simgen.photons.scopes import Scopes, places
 from simgen.photons.thinning import thin_photons
-from simgen.sensor.detector import detect, nested_subset
-from simgen.sensor.frame_readout import counts_of, in_frames, read_out
-from simgen.sensor.mosaic import draw_counts, fixed_totals
+from simgen.sensor.detector import (
+    counts_of,
+    detect,
+    draw_counts,
+    fixed_totals,
+    in_frames,
+    nested_subset,
+    read_out,
+)
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
 

@@ -1,21 +1,98 @@
-"""What a real sensor makes of the photons that arrive: losses, false counts. All off by default.
+"""From light to counts: photons of a unit of radiance, counts of a pixel, frames of an exposure.
 
 Photon by photon: each is detected with the quantum efficiency of its pixel's colour, dark counts and hot
-pixels add counts of their own, dead pixels count nothing. In which frames they are counted, and where a
-counter stops, is the matter of `frame_readout`.
+pixels add counts of their own, dead pixels count nothing. All faults are off by default.
+
+The exposure is T equal frames, and light is steady. So each count of an exposure falls into a frame evenly
+and independently of all others, and the counts of the frames are independent Poisson numbers of a T-th of the
+mean: the splitting of a Poisson process. What a pixel counts in a frame beyond 2^bits - 1 is lost. The work
+follows the counts: no array has all pixels in all frames.
 
 Full-light images: electrons up to the full well, the noise of reading them, and a converter's steps.
 """
 
+import math
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from pcii.core.bayer import mosaic
+from pcii.base.errors import InputError
+from pcii.core.bayer import colour_index, mosaic
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.photon_counts import PhotonCounts
 from simgen.base import random_streams as seeds
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
-from simgen.spec.recipe import Photons, Sensor
+from simgen.spec.recipe import Exposure, Photons, Sensor
+from simgen.spectral.filters import sensitivity
+
+PHOTONS_PER_LUMEN_SECOND = 555e-9 / (683 * 6.62607015e-34 * 299792458)
+"""Photons of 555 nm; CODATA values of h and c, SI value of the luminous efficacy."""
+MAX_CELLS_AT_ONCE = 1 << 22
+"""Pixels times frames that are in memory at once, 32 bytes each."""
+
+
+def photons_per_radiance(exposure: Exposure, pixel_mm: float) -> float:
+    """Photons that arrive at a pixel during the exposure for each cd/m^2 that it looks at."""
+    illuminance_per_luminance = math.pi / (4 * exposure.f_number**2)
+    pixel_m2 = (pixel_mm * 1e-3) ** 2
+    return PHOTONS_PER_LUMEN_SECOND * illuminance_per_luminance * pixel_m2 * exposure.time_s
+
+
+def sensitivities(sensor: Sensor, recipe_folder: Path) -> np.ndarray | None:
+    """Relative sensitivities (C, N) of the sensor's camera by wavelength, None in RGB mode.
+
+    A file of sensitivities is looked up in `recipe_folder`. A monochrome sensor takes G, or the one curve
+    that there is. Raises `InputError` for a camera that is not known or has too few curves.
+    """
+    if sensor.camera is None:
+        return None
+    curves = sensitivity(sensor.camera, recipe_folder)
+    if sensor.bayer is None:
+        return curves[len(curves) // 2 :][:1]
+    if len(curves) == 1:
+        raise InputError(
+            f"sensor.camera: {sensor.camera!r} has one curve, and a Bayer sensor needs three; "
+            "set sensor.cfa to 'none'"
+        )
+    return curves
+
+
+def fixed_totals(photons: Photons, energies: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
+    """Photons of each view (V, C or 1) for multinomial statistics, None for Poisson.
+
+    `energies` (V, C or 1) are those of `scope_energies`. With scope "scene" the budget is shared
+    among the views at random in proportion to their light; else each scope gets it exactly. A scope
+    without light gets none.
+    """
+    if photons.statistics == "poisson":
+        return None
+    budget = round(photons.budget)
+    if photons.scope == "scene":
+        total = energies.sum()
+        share = rng.multinomial(budget, energies[:, 0] / total) if total > 0 else energies[:, 0] * 0
+        return share[:, None].astype(np.int64)
+    return np.where(energies > 0, budget, 0)
+
+
+def draw_counts(
+    rates: np.ndarray, cfa: str | None, rng: np.random.Generator, totals: np.ndarray | None
+) -> np.ndarray:
+    """Photon counts (H, W), int64: Poisson with mean `rates`, or multinomial with fixed `totals`.
+
+    `totals` holds one number for the view, or one for each colour.
+    """
+    if totals is None:
+        return rng.poisson(rates)
+    counts, colours = np.zeros(rates.shape, dtype=np.int64), np.zeros(rates.shape, np.uint8)
+    if totals.size > 1:
+        colours = colour_index(rates.shape[0], rates.shape[1], cfa)
+    for colour, total in enumerate(totals):
+        mask = colours == colour
+        if total > 0:
+            counts[mask] = rng.multinomial(total, rates[mask] / rates[mask].sum())
+    return counts
 
 
 def nested_subset(
@@ -41,8 +118,8 @@ def nested_subset(
             if smaller == budget:
                 break
     belongs = np.ones(counts.k.size, dtype=bool)
-    known = counts.rank >= 0
-    belongs[known] = counts.rank[known] < first[counts.scope[known]]
+    has_rank = counts.rank >= 0
+    belongs[has_rank] = counts.rank[has_rank] < first[counts.scope[has_rank]]
     return belongs
 
 
@@ -58,9 +135,8 @@ def detect(
     views, pixels = grid.view_count, grid.height * grid.width
     if sensor.dark_counts > 0:
         number = rng.poisson(sensor.dark_counts * views * pixels)
-        parts.append(
-            _without_photon(grid, rng.integers(0, views * pixels, number), np.ones(number, np.int64))
-        )
+        dark = rng.integers(0, views * pixels, number)
+        parts.append(_without_photon(grid, dark, np.ones(number, np.int64)))
     # One camera takes all views, so its faulty pixels are the same in each.
     faulty = seeds.generator(seed, stage="faulty pixels")
     shuffled = faulty.permutation(pixels) if sensor.hot_pixel_share or sensor.dead_pixel_share else None
@@ -76,10 +152,112 @@ def detect(
     return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
+def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:
+    """Counts at flat (view, row, column) indices that no photon made."""
+    k, l, i, j = np.unravel_index(flat, grid.shape_KLHW)
+    nowhere, no_object = np.full(flat.size, -1), np.full(flat.size, NO_OBJECT)
+    return PhotonTable(k, l, i, j, n, nowhere, nowhere, no_object, np.full(flat.size, np.inf))
+
+
+def in_frames(counts: PhotonTable, sensor: Sensor, seed: int) -> PhotonTable:
+    """Counts one by one, each in a frame: as many rows as counts. Of one frame they stay as they are."""
+    if sensor.frames == 1:
+        return counts
+    counts = counts.one_by_one()
+    rng = seeds.generator(seed, stage="frames")
+    return replace(counts, frame=rng.integers(sensor.frames, size=counts.k.size, dtype=np.int32))
+
+
+def read_out(
+    counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: int, *, keeps_frames: bool = False
+) -> PhotonTable:
+    """What is read of counts, ordered by view and pixel: in each frame no more than the counter holds.
+
+    Counts whose origin or frame is known are read one by one, and which of them come first in a frame is left
+    to chance; of others only the sums are read. With `keeps_frames` rows are single counts in the order of
+    their frames, which are known then, unless there is only one.
+    """
+    keeps_frames &= sensor.frames > 1
+    if (sensor.bits is None and not keeps_frames) or not counts.k.size:
+        return counts.by_pixel(grid)
+    if counts.object_id is not None or counts.frame is not None:
+        single = counts if counts.frame is not None else in_frames(counts, sensor, seed)
+        return _first_counts(single.one_by_one(), grid, sensor, seed)
+    return joined([*_summed(counts, grid, sensor, seed, keeps_frames)])
+
+
+def counts_of(
+    read: PhotonTable, grid: CameraGrid, cfa: str | None, sensor: Sensor, *, keeps_frames: bool
+) -> PhotonCounts:
+    """Photon counts of what was read, with the frames if they are to be kept and there are several."""
+    columns = read.k, read.l, read.i, read.j, read.n
+    frame, frames, bits = read.frame if keeps_frames else None, sensor.frames, sensor.bits
+    return PhotonCounts.from_events(*columns, grid, cfa=cfa, frames=frames, bits=bits, frame=frame)
+
+
+def _first_counts(counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: int) -> PhotonTable:
+    """The first counts of every pixel and frame, as many as the counter holds."""
+    cell = counts.flat_pixels(grid)
+    if counts.frame is not None:
+        cell = cell * sensor.frames + counts.frame
+    chance = seeds.generator(seed, stage="saturation").random(cell.size)
+    order = np.lexsort((chance, cell))
+    if sensor.readout.most_per_frame is None:
+        return counts.take(order)
+    cell = cell[order]
+    first = np.flatnonzero(np.diff(cell, prepend=-1))
+    place = np.arange(cell.size) - first.repeat(np.diff(first, append=cell.size))
+    return counts.take(order[place < sensor.readout.most_per_frame])
+
+
+def _summed(
+    counts: PhotonTable, grid: CameraGrid, sensor: Sensor, seed: int, keeps_frames: bool
+) -> Iterator[PhotonTable]:
+    """What is read of counts of which only the sum of each pixel matters, some pixels at a time."""
+    pixel, inverse = np.unique(counts.flat_pixels(grid), return_inverse=True)
+    total = np.zeros(pixel.size, np.int64)
+    np.add.at(total, inverse, counts.n)
+    rng = seeds.generator(seed, stage="frames")
+    work = np.cumsum(np.minimum(total, sensor.frames))
+    limits = np.arange(MAX_CELLS_AT_ONCE, work[-1] + MAX_CELLS_AT_ONCE, MAX_CELLS_AT_ONCE)
+    for part in np.split(np.arange(pixel.size), np.unique(np.searchsorted(work, limits, "right"))):
+        if not part.size:
+            continue
+        owner, frame, n = _cells(total[part], sensor.frames, rng)
+        if sensor.readout.most_per_frame is not None:
+            n = np.minimum(n, sensor.readout.most_per_frame)
+        if not keeps_frames:
+            n, owner, frame = np.bincount(owner, n, part.size).astype(np.int64), np.arange(part.size), None
+        k, l, i, j = np.unravel_index(pixel[part][owner], grid.shape_KLHW)
+        table = PhotonTable(k, l, i, j, n, frame=frame)
+        yield table.one_by_one() if keeps_frames else table
+
+
+def _cells(
+    total: np.ndarray, frames: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Pixels and frames that have counts, in their order, and how many, if each pixel has `total` in all.
+
+    Each array is (N,), and no longer than the smaller of counts and frames of all pixels.
+    """
+    is_few = total <= frames
+    owner = np.flatnonzero(is_few).repeat(total[is_few])
+    cell, n = np.unique(owner * frames + rng.integers(frames, size=owner.size), return_counts=True)
+    if not is_few.all():
+        many = np.flatnonzero(~is_few)
+        split = rng.multinomial(total[many], np.full(frames, 1 / frames))
+        row, frame = np.nonzero(split)
+        cell = np.concatenate([cell, many[row] * frames + frame])
+        n = np.concatenate([n, split[row, frame]])
+        order = np.argsort(cell)
+        cell, n = cell[order], n[order]
+    return cell // frames, cell % frames, n
+
+
 def full_light_image(
     radiance: np.ndarray,
     cfa: str | None,
-    photons_per_radiance: float,
+    photons_per_unit: float,
     sensor: Sensor,
     rng: np.random.Generator,
 ) -> np.ndarray:
@@ -87,28 +265,19 @@ def full_light_image(
 
     Photons arrive at random and are detected with the quantum efficiency; a pixel holds no more than
     its full well, reading adds noise, the converter has steps. What it reads is divided by the
-    efficiency and by the photons that a unit of radiance gives. `C` is 1 behind a filter, or 3.
+    efficiency and by `photons_per_unit`, the photons that a unit of radiance gives. `C` is 1 behind a
+    filter, or 3.
     """
     light = sensor.full_light
     assert light is not None
     efficiency = np.array(sensor.quantum_efficiency)
     if radiance.shape[2] == 1:
-        height, width = radiance.shape[:2]
-        flat = np.broadcast_to(efficiency, (height, width, 3))
-        per_unit = (mosaic(flat, cfa) if cfa else flat[..., 1])[..., None] * photons_per_radiance
-    else:
-        per_unit = efficiency * photons_per_radiance
+        flat = np.broadcast_to(efficiency, (*radiance.shape[:2], 3))
+        efficiency = (mosaic(flat, cfa) if cfa else flat[..., 1])[..., None]
+    per_unit = efficiency * photons_per_unit
     electrons = rng.poisson(radiance * per_unit + sensor.dark_counts).astype(np.float64)
     electrons = np.minimum(electrons, light.full_well_e)
     electrons += rng.normal(0, light.read_noise_e, electrons.shape)
     steps = (1 << light.adc_bits) - 1
-    read = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
-    return (read * (light.full_well_e / steps) / per_unit).astype(np.float32)
-
-
-def _without_photon(grid: CameraGrid, flat: np.ndarray, n: np.ndarray) -> PhotonTable:
-    """Counts at flat (view, row, column) indices that no photon made."""
-    k, l, i, j = np.unravel_index(flat, grid.shape_KLHW)
-    nowhere = np.full(flat.size, -1)
-    nothing = np.full(flat.size, NO_OBJECT)
-    return PhotonTable(k, l, i, j, n, nowhere, nowhere, nothing, np.full(flat.size, np.inf))
+    digits = np.clip(np.rint(electrons * (steps / light.full_well_e)), 0, steps)
+    return (digits * (light.full_well_e / steps) / per_unit).astype(np.float32)

@@ -29,7 +29,7 @@ from simgen.base.strict_models import (
     validate,
 )
 from simgen.spec.camera_grid import Grid
-from simgen.spectral.camera_curves import camera_names
+from simgen.spectral.filters import camera_names
 
 Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
 ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]

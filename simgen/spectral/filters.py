@@ -6,18 +6,32 @@ wavelengths, Wilkie et al. 2014), drawn with a density that follows s_c times th
 no path is wasted on light that the pixel's filter stops.
 """
 
+import csv
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
-from simgen.spectral.spectra import PEAK_NM, WAVELENGTH_NM, integral, observer
+from pcii.base.errors import InputError
+from simgen.base.strict_models import suggestion
+from simgen.spectral.spectra import (
+    PEAK_NM,
+    WAVELENGTH_NM,
+    colour_science,
+    integral,
+    measured,
+    observer,
+    resampled,
+)
 
 HEROES = 4
 """Wavelengths that the renderer's spectral variants follow along one path."""
 CELLS = 512
-FLOOR = 0.01
+EVEN_SHARE = 0.01
 """Share of the wavelengths that are drawn evenly, for light that no lamp is known to have."""
+MAX_CSV_BYTES = 1 << 20
+CSV_HEAD = ["wavelength_nm", "R", "G", "B"]
 
 
 @dataclass(frozen=True)
@@ -43,17 +57,16 @@ class Filters:
         bounds = []
         for curve in self.sensitivity:
             sensitive, light = (np.interp(fine_nm, WAVELENGTH_NM, one) for one in (curve, self.light))
-            often = sensitive * light
-            if not often.any():  # no lamp shines where this pixel sees, but wavelengths must be drawn
-                often = sensitive
-            often = (often + FLOOR * often.mean()) * (sensitive > 0)
-            steps = (often[1:] + often[:-1]) * np.diff(fine_nm)
-            running = np.append(0, np.cumsum(steps))
-            rising = np.append(True, np.diff(running) > 0)
-            shares = np.linspace(0, 1, CELLS + 1) * running[-1]
-            start = fine_nm[np.flatnonzero(often)[0] - 1] if often[0] == 0 else fine_nm[0]
-            bound_nm = np.interp(shares, running[rising], fine_nm[rising])
-            bound_nm[0] = start
+            density = sensitive * light
+            if not density.any():  # no lamp shines where this pixel sees, but wavelengths must be drawn
+                density = sensitive
+            density = (density + EVEN_SHARE * density.mean()) * (sensitive > 0)
+            steps = (density[1:] + density[:-1]) * np.diff(fine_nm)
+            cumulative = np.append(0, np.cumsum(steps))
+            is_rising = np.append(True, np.diff(cumulative) > 0)
+            shares = np.linspace(0, 1, CELLS + 1) * cumulative[-1]
+            bound_nm = np.interp(shares, cumulative[is_rising], fine_nm[is_rising])
+            bound_nm[0] = fine_nm[max(np.flatnonzero(density)[0] - 1, 0)]
             bounds.append(bound_nm)
         return np.array(bounds, dtype=np.float32)
 
@@ -67,12 +80,12 @@ class Filters:
         cell = np.minimum(place.astype(np.int64), CELLS - 1)
         low = self.wavelength_nm[colour[:, None], cell].astype(np.float64)
         width = self.wavelength_nm[colour[:, None], cell + 1] - low
-        chosen_nm = low + width * (place - cell)
-        weight = np.empty(chosen_nm.shape)
+        drawn_nm = low + width * (place - cell)
+        weight = np.empty(drawn_nm.shape)
         for number, curve in enumerate(self.sensitivity):
-            here = colour == number
-            weight[here] = np.interp(chosen_nm[here], WAVELENGTH_NM, curve)
-        return chosen_nm, weight * width * (CELLS / HEROES)
+            mask = colour == number
+            weight[mask] = np.interp(drawn_nm[mask], WAVELENGTH_NM, curve)
+        return drawn_nm, weight * width * (CELLS / HEROES)
 
 
 def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:
@@ -84,3 +97,48 @@ def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:
     to_photons = curves / WAVELENGTH_NM
     detected = to_photons / to_photons.max()
     return Filters(detected * (WAVELENGTH_NM / PEAK_NM) / integral(observer()[1]), light)
+
+
+def camera_names() -> list[str]:
+    """Names of the cameras that colour-science has."""
+    return list(colour_science().MSDS_CAMERA_SENSITIVITIES)
+
+
+def sensitivity(camera: str, recipe_folder: Path) -> np.ndarray:
+    """Relative sensitivities (3, N) of R, G and B to light's power, or (1, N); the highest value is 1.
+
+    `camera` is one that colour-science ships, or a CSV file (in `recipe_folder`): the head
+    wavelength_nm,R,G,B, or wavelength_nm and a name of one curve, then rows of numbers. Raises `InputError`.
+    """
+    if camera.lower().endswith(".csv"):
+        wavelength_nm, curves = _read_csv(recipe_folder / camera)
+        rows = np.array([resampled(wavelength_nm, row, outside=0.0) for row in curves.T])
+    else:
+        table = colour_science().MSDS_CAMERA_SENSITIVITIES
+        if camera not in table:
+            raise InputError(f"sensor.camera: there is no camera {camera!r}{suggestion(camera, list(table))}")
+        rows = measured(table[camera], outside=0.0)
+    if (rows.max(axis=1) <= 0).any():
+        raise InputError(f"sensor.camera: a colour of {camera!r} sees no light from 380 to 780 nm")
+    return rows / rows.max()
+
+
+def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Wavelengths (M,) in nm and sensitivities (M, 3) or (M, 1)."""
+    if not path.is_file() or path.stat().st_size > MAX_CSV_BYTES:
+        raise InputError(f"sensor.camera: there is no file {path} of at most {MAX_CSV_BYTES} bytes")
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            head, *rows = [[cell.strip() for cell in row] for row in csv.reader(file) if row]
+        table = np.array(rows, dtype=np.float64)
+    except (OSError, ValueError, csv.Error):
+        head, table = [], np.zeros((0, 0))
+    is_head = head == CSV_HEAD or (len(head) == 2 and head[0] == CSV_HEAD[0])
+    if not is_head or table.ndim != 2 or table.shape[1] != len(head):
+        raise InputError(
+            f"{path}: expected the head {','.join(CSV_HEAD)}, or {CSV_HEAD[0]} and a name of one curve, and "
+            "rows of as many numbers"
+        )
+    if not np.isfinite(table).all() or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
+        raise InputError(f"{path}: wavelengths must grow and sensitivities be finite and not negative")
+    return table[:, 0], table[:, 1:]

@@ -1,4 +1,4 @@
-"""Spectra of lights, surfaces and cameras, on one set of wavelengths; measured ones from colour-science.
+"""Spectra of lights and surfaces, on one set of wavelengths; measured ones from colour-science.
 
 Notation: N wavelengths, `WAVELENGTH_NM` (N,). A light's spectrum is its radiance in cd/m^2 of white
 light of equal energy at each wavelength (cd/m^2, the numbers that the renderer's white has), so that
@@ -68,33 +68,29 @@ def _standard() -> dict[str, dict[str, np.ndarray]]:
 
 def _from_colour_science() -> dict[str, dict[str, Any]]:
     colour = colour_science()
-    found = {
+    tables = {
         OBSERVERS: {OBSERVER: colour.MSDS_CMFS[OBSERVER]},
         ILLUMINANTS: {name: one for name, one in colour.SDS_ILLUMINANTS.items() if _covers_wavelengths(one)},
         # Without the densities that follow the names of the grey ones.
         PATCHES: {name.split(" (")[0]: one for name, one in colour.SDS_COLOURCHECKERS[CHART].items()},
     }
     return {
-        kind: {name: measured(one).tolist() for name, one in tables.items()} for kind, tables in found.items()
+        kind: {name: measured(table).tolist() for name, table in own.items()} for kind, own in tables.items()
     }
 
 
-def _as_arrays(found: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
-    """Raises KeyError or ValueError unless all of them are there."""
-    read = {kind: {name: np.array(one) for name, one in found[kind].items()} for kind in KINDS}
-    for tables in read.values():
-        if not tables or any(one.shape[-1] != WAVELENGTH_NM.size for one in tables.values()):
-            raise ValueError("spectra are damaged")
-    return read
+def _as_arrays(values: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
+    """The spectra as arrays; raises KeyError unless all kinds are there."""
+    return {kind: {name: np.array(values[kind][name]) for name in values[kind]} for kind in KINDS}
+
+
+def _covers_wavelengths(table: Any) -> bool:
+    return bool(table.wavelengths[0] <= WAVELENGTH_NM[0] and table.wavelengths[-1] >= WAVELENGTH_NM[-1])
 
 
 def illuminant_names() -> list[str]:
     """Names of the illuminants that are known at all wavelengths."""
     return list(_standard()[ILLUMINANTS])
-
-
-def _covers_wavelengths(table: Any) -> bool:
-    return bool(table.wavelengths[0] <= WAVELENGTH_NM[0] and table.wavelengths[-1] >= WAVELENGTH_NM[-1])
 
 
 def known_illuminant(name: str) -> str:
@@ -106,20 +102,11 @@ def known_illuminant(name: str) -> str:
 
 @cache
 def illuminant(name: str) -> np.ndarray:
-    """Spectrum (N,) of a CIE illuminant at luminance 1.
-
-    Raises `InputError` for one that is not known, or not at all of the wavelengths.
-    """
+    """Spectrum (N,) of a CIE illuminant at luminance 1; `InputError` unless all of it is known."""
     power = _standard()[ILLUMINANTS].get(name)
     if power is None:
-        table = colour_science().SDS_ILLUMINANTS
-        if name not in table:
-            raise InputError(f"there is no illuminant {name!r}{suggestion(name, illuminant_names())}")
-        known_nm = table[name].wavelengths
-        raise InputError(
-            f"illuminant {name!r} is only known from {known_nm[0]:g} to {known_nm[-1]:g} nm, and 380 to "
-            "780 nm are needed; use another, such as D55 or A"
-        )
+        hint = suggestion(name, illuminant_names())
+        raise InputError(f"there is no illuminant {name!r} from 380 to 780 nm{hint}")
     luminosity = observer()[1]
     return power * (integral(luminosity) / integral(power * luminosity))
 
@@ -145,10 +132,10 @@ def known_patch(name: str) -> str:
 
 def patch(name: str) -> np.ndarray:
     """Reflectance (N,) of a ColorChecker patch by its name, such as "dark skin" or "neutral 5"."""
-    known = _standard()[PATCHES]
-    if name not in known:
-        raise InputError(f"there is no patch {name!r}{suggestion(name, list(known))}")
-    return known[name]
+    patches = _standard()[PATCHES]
+    if name not in patches:
+        raise InputError(f"there is no patch {name!r}{suggestion(name, list(patches))}")
+    return patches[name]
 
 
 def patch_names() -> list[str]:

@@ -1,6 +1,5 @@
 """The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,13 @@ from pcii.io.zarr_groups import new_array, new_group_safely
 from simgen.cameras.rig import Rig, centre_camera
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spec.recipe import Products, ViewPass
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
-from simgen.truth.pixel_coverage import coverage
-from simgen.truth.visibility import visible_views
+from simgen.truth.first_hits import (
+    coverage,
+    first_hits_at_centre,
+    first_hits_of_view,
+    in_focus,
+    visible_views,
+)
 
 RAYS = "visibility_rays"
 
@@ -72,24 +75,17 @@ def _write_views(
 ) -> None:
     grid, arrays = rig.grid, dict[str, Any]()
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        for name, image in _view(render_scene, rig, k, l, passes):
+        hits = first_hits_of_view(render_scene, rig, k, l)
+        for name in passes:
+            if name == "coverage":
+                image = coverage(render_scene, rig.pinhole(k, l), hits.object_id)
+            else:
+                image = getattr(hits, name)
             if name not in arrays:
-                shape = (grid.rows, grid.cols, *image.shape)
-                label = TRUTH_LABELS[f"view_{name}"]
+                shape, label = (grid.rows, grid.cols, *image.shape), TRUTH_LABELS[f"view_{name}"]
                 arrays[name] = new_array(group, f"view_{name}", shape, image.dtype, label)
             arrays[name][k, l] = image
         report("truth of views", done, grid.view_count)
-
-
-def _view(
-    render_scene: RenderScene, rig: Rig, k: int, l: int, passes: tuple[ViewPass, ...]
-) -> Iterator[tuple[ViewPass, np.ndarray]]:
-    hits: FirstHits = first_hits_of_view(render_scene, rig, k, l)
-    for name in passes:
-        if name == "coverage":
-            yield name, coverage(render_scene, rig.pinhole(k, l), hits.object_id)
-        else:
-            yield name, getattr(hits, name)
 
 
 def _store(group: Any, name: str, array: np.ndarray) -> None:

@@ -14,7 +14,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import sensitivities
+from simgen.sensor.detector import sensitivities
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spec.scene import Scene

@@ -16,7 +16,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
-from simgen.sensor.mosaic import PHOTONS_PER_LUMEN_SECOND, sensitivities
+from simgen.sensor.detector import PHOTONS_PER_LUMEN_SECOND, sensitivities
 from simgen.spec.recipe import Photons, Recipe
 from simgen.spec.scene import Scene
 from simgen.spectral.spectra import colour_science, patch_names

@@ -7,16 +7,24 @@ import numpy as np
 import pytest
 from plain_scenes import built, card, grid, sphere
 
+import simgen
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
 from pcii.metrics.true_masks import TrueFocus
 from simgen.cameras.rig import as_rig, centre_camera
-from simgen.renderer import mitsuba_camera
-from simgen.truth import visibility
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, in_focus
-from simgen.truth.pixel_coverage import SAMPLES, coverage
-from simgen.truth.visibility import visible_views
+from simgen.renderer import backend, mitsuba_camera
+from simgen.renderer.mitsuba_scene import build
+from simgen.truth import first_hits
+from simgen.truth.first_hits import (
+    COVERAGE_SAMPLES,
+    FirstHits,
+    coverage,
+    first_hits_at_centre,
+    first_hits_of_view,
+    in_focus,
+    visible_views,
+)
 
 pytestmark = pytest.mark.renders
 WHITE = {"reflectance": [1, 1, 1]}
@@ -38,24 +46,27 @@ def on_sphere(rays: np.ndarray, centre: np.ndarray = CENTRE, radius: float = RAD
     return np.where(root > 0, (b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
 
 
-def at_rim(rays: np.ndarray) -> np.ndarray:
+def at_rim(rays: np.ndarray, centre: np.ndarray = CENTRE) -> np.ndarray:
     """Rays that float32 may or may not take past the sphere; there depth has an infinite slope."""
-    a, b, c = (rays**2).sum(-1), rays @ CENTRE, CENTRE @ CENTRE - RADIUS**2
+    a, b, c = (rays**2).sum(-1), rays @ centre, centre @ centre - RADIUS**2
     return np.abs(b * b - a * c) <= 1e-4 * b * b
 
 
 @pytest.mark.parametrize("near_clip_mm", [0.01, 10.0])
-def test_depth_is_planar_whatever_the_near_clip(
+def test_depth_is_planar_in_every_view_whatever_the_near_clip(
     near_clip_mm: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The renderer's own depth counts from the near clip plane: 10 mm would be an error of 1.5 %.
     monkeypatch.setattr(mitsuba_camera, "NEAR_CLIP_MM", near_clip_mm)
     of = grid(2, 2, 96, 120)
     rays = directions(of)
-    ball = first_hits_at_centre(built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)]), of)
-    expected, sure = on_sphere(rays), ~at_rim(rays)
-    expected = np.where(np.isfinite(expected), expected, 3000.0)
-    np.testing.assert_allclose(ball.z_mm[sure], expected[sure], rtol=1e-5)
+    scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)], backdrop_mm=None)
+    for k, l in np.ndindex(2, 2):
+        hits = first_hits_of_view(scene, of, k, l)
+        centre = CENTRE - [(l - 0.5) * 6.0, (k - 0.5) * 4.0, 0.0]
+        expected, sure = on_sphere(rays, centre), ~at_rim(rays, centre)
+        np.testing.assert_allclose(hits.z_mm[sure], expected[sure], rtol=1e-5)
+        assert (hits.object_id[sure] == np.isfinite(expected)[sure]).all()
     # Turned by 25 degrees about X (down- to forward axis) the normal (0, 0, -1) becomes (0, sin, -cos).
     turn = np.radians(25)
     normal = np.array([0, np.sin(turn), -np.cos(turn)])
@@ -107,10 +118,10 @@ def test_coverage_is_the_area_that_the_object_has_of_the_pixel(tmp_path: Path) -
     assert found.dtype == np.float32
     # Half of the points of one line of the lattice, some 15, may be on the wrong side of an edge,
     # and half a cell of the 32 x 32 that are counted here.
-    np.testing.assert_allclose(found, np.where(ids == 1, ball, 1 - ball), atol=8 / SAMPLES + 1 / 64)
+    np.testing.assert_allclose(found, np.where(ids == 1, ball, 1 - ball), atol=8 / COVERAGE_SAMPLES + 1 / 64)
     own = np.where(ids == 1, found, 1 - found)
     rim = np.count_nonzero((ball > 0) & (ball < 1))
-    assert abs(own.sum() - ball.sum()) < 3 * np.sqrt(rim) * 3 / SAMPLES  # such errors have either sign
+    assert abs(own.sum() - ball.sum()) < 3 * np.sqrt(rim) * 3 / COVERAGE_SAMPLES  # of either sign
 
 
 def test_coverage_of_a_card_from_a_camera_off_the_centre(tmp_path: Path) -> None:
@@ -124,7 +135,7 @@ def test_coverage_of_a_card_from_a_camera_off_the_centre(tmp_path: Path) -> None
         at = np.arange(size)
         spans.append(np.clip(np.minimum(high, at + 0.5) - np.maximum(low, at - 0.5), 0, 1))
     expected = np.outer(*spans)
-    np.testing.assert_allclose(found, np.where(ids == 1, expected, 1 - expected), atol=8 / SAMPLES)
+    np.testing.assert_allclose(found, np.where(ids == 1, expected, 1 - expected), atol=8 / COVERAGE_SAMPLES)
 
 
 def test_focus_is_what_the_score_takes_it_for() -> None:
@@ -206,18 +217,36 @@ def test_visibility_is_what_a_loop_over_cameras_and_shapes_counts(tmp_path: Path
     assert (found[np.isinf(hits.z_mm)] == 0).all()
 
 
-def test_no_ray_is_skipped_that_could_be_blocked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+REFERENCE = """<scene version="3.0.0"><sensor type="perspective"><float name="fov" value="40"/>
+<transform name="to_world"><lookat origin="0,0,-1" target="0,0,-2" up="0,1,0"/></transform></sensor>
+<shape type="sphere"><point name="center" x="-.03" y="-.02" z="-1.4"/>
+<float name="radius" value=".03"/></shape>
+<shape type="rectangle"><transform name="to_world"><scale value=".3"/>
+<translate z="-1.6"/></transform></shape>
+<emitter type="constant"/></scene>"""
+
+
+@pytest.mark.parametrize("is_reference", [False, True])
+def test_no_ray_is_skipped_that_could_be_blocked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_reference: bool
+) -> None:
     # Before a flat wall, whose own box stands in no way, and with cameras so wide apart that the edges of
-    # the pyramids matter: a thin slanted card deep in Z, and a ball at the frame.
+    # the pyramids matter: a thin slanted card deep in Z, and a ball at the frame. Or a file of Mitsuba's,
+    # whose axes and unit are not those of the world.
     of = replace(grid(3, 4, 44, 56, pixel_mm=0.18), pitch_mm=(15.0, 40.0))
     card_in_depth = card("c", 450.0, 60.0, WHITE, (75, 0, 0), (-25.0, 20.0))
     ball = sphere("ball", (40.0, -20.0, 500.0), 8.0)
     scene = built(tmp_path, [card_in_depth, ball], backdrop_mm=700.0)
+    if is_reference:
+        (tmp_path / "scene.xml").write_text(REFERENCE)
+        world = simgen.load_scene({"title": "by reference", "mitsuba": "scene.xml"}, folder=tmp_path)
+        scene = build(backend.load(), world, tmp_path, 2)
     hits = first_hits_at_centre(scene, of)
-    found, traced = visible_views(scene, of, hits)
-    monkeypatch.setattr(visibility, "_can_be_blocked", lambda *given: np.ones(len(given[2]), dtype=bool))
+    views, traced = visible_views(scene, of, hits)
+    monkeypatch.setattr(first_hits, "_can_be_blocked", lambda *given: np.ones(len(given[2]), dtype=bool))
     exhaustive, all_rays = visible_views(scene, of, hits)
-    np.testing.assert_array_equal(found, exhaustive)
+    np.testing.assert_array_equal(views, exhaustive)
+    assert exhaustive[np.isfinite(hits.z_mm)].min() < 12
     assert traced < 0.8 * all_rays
 
 

@@ -16,14 +16,19 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities
-from simgen.cameras.calibration import turn
-from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, with_larger_pixels
+from simgen.cameras.rig import as_rig, film_slopes, slopes_behind_lens, turn, with_larger_pixels
 from simgen.photons.candidates import even_film_points
 from simgen.photons.scopes import places
 from simgen.photons.thinning import WAVEFRONT, candidates_needed
-from simgen.sensor.detector import detect, full_light_image, nested_subset
-from simgen.sensor.frame_readout import read_out
-from simgen.sensor.mosaic import draw_counts, fixed_totals, photons_per_radiance
+from simgen.sensor.detector import (
+    detect,
+    draw_counts,
+    fixed_totals,
+    full_light_image,
+    nested_subset,
+    photons_per_radiance,
+    read_out,
+)
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.camera_grid import Grid, Lens
 from simgen.spec.recipe import Exposure, FullLight, Photons, Recipe, Sensor

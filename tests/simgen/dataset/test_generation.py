@@ -16,8 +16,7 @@ from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
 from pcii.io.verification import verify
 from pcii.store import software
-from simgen.cameras.calibration import rig_of
-from simgen.cameras.rig import as_rig
+from simgen.cameras.rig import as_rig, rig_of
 from simgen.dataset import rendered_views
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import Prepared

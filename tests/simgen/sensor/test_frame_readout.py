@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.sensor import frame_readout as module
-from simgen.sensor.frame_readout import counts_of, in_frames, read_out
+from simgen.sensor import detector
+from simgen.sensor.detector import counts_of, in_frames, read_out
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Sensor
 
@@ -50,7 +50,7 @@ def is_binomial(counts: np.ndarray, frames: int, chance: float) -> bool:
 
 @pytest.mark.parametrize("known", [True, False])
 @pytest.mark.parametrize("frames", [1, 16, 1000])
-@pytest.mark.parametrize("rate", [1e-4, 1e-2, 0.3, 2.0, 10.0])
+@pytest.mark.parametrize("rate", [1e-3, 0.3, 10.0])
 def test_sums_of_one_bit_frames_are_binomial(frames: int, rate: float, known: bool) -> None:
     arrivals = poisson(rate, known=known)
     read = read_out(arrivals, FILM, Sensor(frames=frames, bits=1), seed=2)
@@ -90,7 +90,7 @@ def test_frames_are_independent_of_each_other_and_of_neighbours(known: bool) -> 
 
 
 @pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("bits", [1, 2, 3])
+@pytest.mark.parametrize("bits", [1, 3])
 @pytest.mark.parametrize("rate", [0.5, 6.0])
 def test_every_pixel_and_frame_stops_by_itself(rate: float, bits: int, known: bool) -> None:
     arrivals = poisson(rate, known=known)
@@ -103,22 +103,9 @@ def test_every_pixel_and_frame_stops_by_itself(rate: float, bits: int, known: bo
     np.testing.assert_array_equal(sums(only_sums), expected.sum(axis=1))
 
 
-@pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("sensor", [Sensor(bits=32), Sensor(frames=1 << 24, bits=1), Sensor(frames=7)])
-def test_without_saturation_counts_are_as_before(sensor: Sensor, known: bool) -> None:
-    arrivals = poisson(2e-2, known=known)
-    plain, read = (read_out(arrivals, FILM, each, seed=1) for each in (Sensor(), sensor))
-    for name in ("k", "l", "i", "j", "n"):
-        one, other = (
-            getattr(counts_of(x, FILM, None, Sensor(), keeps_frames=False).events, name)
-            for x in (plain, read)
-        )
-        np.testing.assert_array_equal(one, other)
-
-
 def test_parts_of_the_work_are_one_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     arrivals, sensor = poisson(2.0, known=False), Sensor(frames=16, bits=1)
-    monkeypatch.setattr(module, "CELLS_AT_ONCE", 1000)
+    monkeypatch.setattr(detector, "MAX_CELLS_AT_ONCE", 1000)
     read = read_out(arrivals, FILM, sensor, seed=2)
     assert read.flat_pixels(FILM).tolist() == np.flatnonzero(sums(arrivals)).tolist()
     assert is_binomial(sums(read), 16, -np.expm1(-2.0 / 16))
@@ -126,8 +113,7 @@ def test_parts_of_the_work_are_one_draw(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_far_more_photons_than_frames_take_no_longer_than_frames() -> None:
     arrivals = arriving(np.full(PIXELS, 1 << 40) * (np.arange(PIXELS) < 3), known=False)
-    read = read_out(arrivals, FILM, Sensor(frames=100, bits=2), seed=1)
-    assert read.n.tolist() == [300, 300, 300]
+    assert read_out(arrivals, FILM, Sensor(frames=100, bits=2), seed=1).n.tolist() == [300, 300, 300]
 
 
 def test_counts_know_their_frames_in_the_order_of_their_events() -> None:

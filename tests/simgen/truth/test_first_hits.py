@@ -11,7 +11,7 @@ from pcii.core.geometry import project_px
 from pcii.core.images import Views
 from pcii.sections.reconstruction import reconstruct
 from simgen.renderer.radiance import render_view
-from simgen.truth.first_hits import first_hits_at_centre, first_hits_of_view
+from simgen.truth.first_hits import first_hits_at_centre
 
 pytestmark = pytest.mark.renders
 
@@ -50,28 +50,6 @@ def test_a_plane_is_sharpest_at_its_depth(tmp_path: Path) -> None:
     sections = reconstruct(Views(views, cameras), depths)
     middle = sections.estimate[:, 40:90, 50:110]
     assert depths[int(np.argmax(middle.var(axis=(1, 2)).sum(axis=1)))] == 600.0
-
-
-def test_z_is_exact_on_a_sphere_from_every_view(tmp_path: Path) -> None:
-    centre, radius = np.array([20.0, -15.0, 650.0]), 60.0
-    scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), radius)], backdrop_mm=None)
-    cameras = grid(2, 2, 100, 120)
-    for k, l in np.ndindex(2, 2):
-        hits = first_hits_of_view(scene, cameras, k, l)
-        origin = np.array([(l - 0.5) * 6.0, (k - 0.5) * 4.0, 0.0])
-        v, u = np.meshgrid(
-            (np.arange(100) - 99 / 2) * 0.0704 / 50, (np.arange(120) - 119 / 2) * 0.0704 / 50, indexing="ij"
-        )
-        ray = np.stack([u, v, np.ones_like(u)], axis=-1)
-        a, b = (ray**2).sum(-1), ray @ (centre - origin)
-        c = ((centre - origin) ** 2).sum() - radius**2
-        inside = b * b - a * c
-        expected = np.where(inside > 0, (b - np.sqrt(np.maximum(inside, 0))) / a, np.inf)
-        # At the very rim float32 rays hit or miss by rounding, and depth has an infinite slope.
-        sure = np.abs(inside) > 1e-4 * b * b
-        np.testing.assert_allclose(hits.z_mm[sure], expected[sure], rtol=1e-5)
-        assert (hits.object_id[sure] == (inside > 0)[sure]).all()
-        assert np.isinf(hits.z_mm[(inside < 0) & sure]).all()
 
 
 def test_each_object_keeps_its_own_id_and_the_backdrop_is_none(tmp_path: Path) -> None:

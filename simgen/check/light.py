@@ -1,0 +1,185 @@
+"""Findings on photons of each object and voxel, and on size, memory and time."""
+
+import math
+
+import numpy as np
+
+from pcii.core.bayer import channel_count
+from pcii.core.photon_events import NEGLIGIBLE_LOSS, clipped_mean
+from simgen.check.scene_probe import Facts, Finding, ObjectFacts
+from simgen.dataset.prepared import needs_of
+from simgen.dataset.resources import (
+    Needs,
+    available_bytes,
+    in_bytes,
+    peak_bytes,
+    product_bytes,
+    rounded,
+    shortage,
+)
+from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+
+MIN_PHOTONS = 100
+"""Below so many, over all views, there is hardly an object to be seen."""
+MIN_VOXEL_COUNTS = 0.1
+MAX_OTHER_SHARE = 0.5
+"""Share of the photons that may come from no object, and of the counts that no photon made."""
+USUAL_SHARE = 0.25
+"""Share of the candidates that is kept where a photon costs `PHOTON_COST`; where fewer are, it costs more."""
+
+
+def photon_findings(facts: Facts) -> list[Finding]:
+    """Photons of each object, of what is none, saturation, dark counts; none without counts or light."""
+    if facts.plan is None or facts.luminance <= 0 or not facts.plan.photons_per_view > 0:
+        return []
+    total = photons_per_view(facts, np.ones(facts.colour_share.size))
+    findings = [_object_finding(facts, thing, total) for thing in facts.seen]
+    findings += _other_findings(facts, total) + _saturation_findings(facts)
+    return findings + _dark_findings(facts, total)
+
+
+def photons_per_view(facts: Facts, light_share: np.ndarray) -> float:
+    """Counts that a view is expected to have of what sends these shares (C,) of the light in each colour.
+
+    A budget per view is shared by all colours in proportion to their light, one per channel is each
+    colour's own. What the sensor does not detect is left out.
+    """
+    assert facts.plan is not None
+    sensor, photons = facts.target.recipe.sensor, facts.target.recipe.photons
+    channels = channel_count(sensor.bayer)
+    weights = np.full(channels, 1 / channels) if photons.scope == "channel" else facts.colour_share
+    efficiency = np.array(sensor.quantum_efficiency)
+    if sensor.bayer is None:
+        efficiency = efficiency[1:2]
+    return float(facts.plan.photons_per_view * (weights * efficiency * light_share).sum())
+
+
+def _object_finding(facts: Facts, thing: ObjectFacts, total: float) -> Finding:
+    views = facts.grid.view_count
+    per_view = photons_per_view(facts, thing.light_share)
+    per_voxel = _per_pixel(facts, thing) * views
+    text = (
+        f"{thing.name}: {_number(per_view)} per view ({per_view / total:.1%}), {_number(per_view * views)} "
+        f"in all, {per_voxel:.2g} per voxel"
+    )
+    factor = max(MIN_PHOTONS / max(per_view * views, 1e-9), MIN_VOXEL_COUNTS / max(per_voxel, 1e-9))
+    if factor <= 1:
+        return Finding("ok", "photons", text)
+    return Finding("warn", "photons", text, f"{_more_light(facts, factor)}, or larger pixels")
+
+
+def _per_pixel(facts: Facts, thing: ObjectFacts) -> float:
+    """Counts of one view's pixel, over the whole exposure, where it sees the object."""
+    pixels = facts.grid.height * facts.grid.width
+    return photons_per_view(facts, thing.light_share) / max(thing.film_share * pixels, 1e-9)
+
+
+def _more_light(facts: Facts, factor: float) -> str:
+    if facts.target.recipe.photons.scope == "exposure":
+        return f"expose {factor:.2g} times as long"
+    budget = facts.target.recipe.photons.budget * factor
+    step = 10 ** max(0, math.floor(math.log10(budget)) - 1)
+    return f"photons.budget = {math.ceil(budget / step) * step}"
+
+
+def _other_findings(facts: Facts, total: float) -> list[Finding]:
+    share = photons_per_view(facts, facts.other_share) / total
+    if share <= MAX_OTHER_SHARE or not facts.seen:
+        return []
+    text = f"{share:.1%} of the photons come from no object"
+    return [Finding("warn", "photons", text, "darken backdrop and lamps in view, or take more light")]
+
+
+def _saturation_findings(facts: Facts) -> list[Finding]:
+    """What frames of few bits lose of the object that is brightest on the film."""
+    sensor = facts.target.recipe.sensor
+    limit = sensor.readout.most_per_frame
+    if limit is None or not facts.seen:
+        return []
+    brightest = max(facts.seen, key=lambda thing: _per_pixel(facts, thing))
+    per_frame = _per_pixel(facts, brightest) / sensor.frames
+    lost = 1 - float(clipped_mean(np.array(per_frame), limit)) / per_frame if per_frame > 0 else 0.0
+    text = f"{brightest.name}: {per_frame:.2g} photons per pixel and frame, of which {lost:.1%} saturate"
+    if lost <= NEGLIGIBLE_LOSS:
+        return [Finding("ok", "photons", text)]
+    return [Finding("warn", "photons", text, "raise sensor.frames, or take less light")]
+
+
+def _dark_findings(facts: Facts, total: float) -> list[Finding]:
+    """Whether most counts are made by no photon."""
+    sensor, grid = facts.target.recipe.sensor, facts.grid
+    dark = (sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts) * grid.height * grid.width
+    share = dark / (dark + total)
+    if share <= MAX_OTHER_SHARE:
+        return []
+    text = f"{_number(dark)} dark counts per view, {share:.0%} of all counts"
+    return [Finding("warn", "photons", text, "lower sensor.dark_counts")]
+
+
+def _number(value: float) -> str:
+    """A whole number where it is large, three digits where it is small."""
+    return f"{value:,.0f}" if 10 <= value < 1e7 else f"{value:.3g}"
+
+
+def shortage_findings(needs: Needs) -> list[Finding]:
+    """What of a recipe memory cannot hold whatever the scene, so that it cannot even be looked at."""
+    text = shortage(needs, None, available_bytes())
+    return [] if text is None else [Finding("bad", "memory", text)]
+
+
+def cost_findings(facts: Facts) -> list[Finding]:
+    """What will be written and what it takes, before compression and to an order of magnitude."""
+    needs, plan = needs_of(facts.target.recipe), facts.plan
+    sizes = product_bytes(needs, plan)
+    size = ", ".join(f"{name} {in_bytes(of_name)}" for name, of_name in sizes.items()) or "only a manifest"
+    lack = shortage(needs, plan, facts.memory_bytes)
+    peak = f"{in_bytes(peak_bytes(needs, plan))} at the peak, of {in_bytes(facts.memory_bytes)} available"
+    return [
+        Finding("ok", "size", f"{size}, before compression"),
+        Finding("ok", "memory", peak) if lack is None else Finding("bad", "memory", lack),
+        Finding("ok", "time", f"{_way(facts)}in the order of {in_time(seconds(facts))} on this machine"),
+    ]
+
+
+def _way(facts: Facts) -> str:
+    """How photons and images are made, as the beginning of a sentence."""
+    plan, ways = facts.plan, []
+    if plan is not None and plan.thins:
+        ways.append("photons one by one (thinning)")
+        if not plan.keeps_origins:
+            ways.append("too many to keep their origins")
+    elif plan is not None:
+        ways.append(f"counts drawn from views of {plan.samples} samples per pixel")
+        if plan.why_rendered:
+            ways.append(f"since {plan.why_rendered}")
+    if facts.target.recipe.products.radiance != "none":
+        ways.append("full-light images")
+    return f"{', '.join(ways)}; " if ways else ""
+
+
+def seconds(facts: Facts) -> float:
+    """Time of rendering and of photons, from the probe's speed; nothing else is counted."""
+    grid, products, plan = facts.grid, facts.target.recipe.products, facts.plan
+    pixels = grid.height * grid.width
+    spent_s = facts.hit_s * pixels * (products.truth + grid.view_count * bool(products.view_truth))
+    if plan is not None and not plan.thins:
+        spent_s += facts.path_s * plan.samples * pixels * grid.view_count
+    elif products.radiance != "none":
+        samples = facts.target.recipe.render.samples_per_pixel
+        spent_s += facts.path_s * samples * pixels * grid.view_count
+    if plan is not None and plan.thins:
+        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
+        if facts.is_compiled:
+            photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
+        share = USUAL_SHARE if plan.explored is None else plan.explored.share
+        paths_per_photon = photon_cost / sample_cost * max(USUAL_SHARE / share, 1.0)
+        spent_s += facts.path_s * paths_per_photon * plan.photons_per_view * grid.view_count
+    return spent_s
+
+
+def in_time(spent_s: float) -> str:
+    """A time in the unit that suits it, with one digit; no less than a second."""
+    for size_s, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
+        if spent_s >= 2 * size_s:
+            return f"{rounded(spent_s / size_s, 1)} {unit}"
+    return f"{rounded(max(spent_s, 1), 1)} s"

@@ -1,0 +1,71 @@
+"""What a grid of cameras does to depth, by hand and beside the reconstruction."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
+from pcii.core.photon_counts import PhotonCounts
+from pcii.sections.reconstruction import reconstruct
+from simgen.cameras.disparities import (
+    apart_px,
+    colour_samples,
+    mending_pitch_mm,
+    share_seen_by_all,
+    shares_without,
+    shifts_px,
+)
+
+
+def at_disparity(pixels: float, **more: Any) -> tuple[CameraGrid, float]:
+    """A grid and a depth with so many px of disparity per camera in both axes."""
+    grid = CameraGrid(rows=4, cols=4, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=32, width=32)
+    return replace(grid, **more), 5000 / pixels
+
+
+def test_objects_of_the_paper_are_15_px_of_blur_apart() -> None:
+    grid = CameraGrid(
+        rows=10, cols=10, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.0352, height=1024, width=1024
+    )
+    by_hand = 9 * (50 * 5 / 0.0352) * (1 / 540 - 1 / 620)
+    assert apart_px(grid, 540, 620) == pytest.approx(by_hand)
+    # The longer axis decides, be it of columns or of rows.
+    assert apart_px(replace(grid, rows=2), 540, 620) == pytest.approx(by_hand)
+    assert apart_px(replace(grid, rows=2, pitch_mm=(5.0, 90.0)), 540, 620) == pytest.approx(2 * by_hand)
+
+
+def test_views_overlap_by_hand() -> None:
+    grid, z = at_disparity(4.0, cols=3)
+    assert [shift.tolist() for shift in shifts_px(grid, z)] == [[-6, -2, 2, 6], [-4, 0, 4]]
+    assert share_seen_by_all(grid, z) == (32 - 12) / 32 * (32 - 8) / 32
+
+
+@pytest.mark.parametrize("pixels", [0.5, 1.0, 2.5, 3.2, 7.77])  # a half pixel is the hard case
+def test_shifts_agree_with_the_reconstruction(pixels: float) -> None:
+    grid, z = at_disparity(pixels, rows=5, shear_px=(0.3, -1.0))
+    for own, other in zip(shifts_px(grid, z), FocalPlanes.at_depths(grid, z).whole_shifts_px, strict=True):
+        np.testing.assert_array_equal(own, other[0])
+
+
+@pytest.mark.parametrize("cfa", ["GRBG", "RGGB", "BGGR", "GBRG"])
+@pytest.mark.parametrize("pixels", [1.0, 2.3, 4.0])
+def test_samples_of_each_colour_are_the_coverage_of_the_reconstruction(cfa: str, pixels: float) -> None:
+    grid, z = at_disparity(pixels, rows=3, cols=5)
+    empty = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, int), grid, cfa=cfa)
+    middle = reconstruct(empty, z_mm=z).coverage[0, 16:18, 16:18]  # rows and columns 0 and 1 modulo 2
+    np.testing.assert_array_equal(colour_samples(grid, cfa, z), middle)
+
+
+def test_even_shifts_leave_colours_out_and_another_pitch_mends_it() -> None:
+    grid, z = at_disparity(4.0)
+    np.testing.assert_array_equal(shares_without(grid, "GRBG", z), [0.75, 0.5, 0.75])
+    row, z_row = at_disparity(3.0, rows=1)  # columns mix, rows do not: two colours a row
+    np.testing.assert_array_equal(shares_without(row, "GRBG", z_row), [0.5, 0, 0.5])
+    pitch = mending_pitch_mm(grid, [z])
+    assert pitch is not None
+    assert not shares_without(replace(grid, pitch_mm=pitch), "GRBG", z).any()
+    assert abs(pitch[0] - 5) < 1  # 4 px +- 1/3 mix four cameras: shifts of 6.5 px, say, round to 7
+    assert mending_pitch_mm(replace(grid, rows=1), [z]) is None
