@@ -18,7 +18,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -110,14 +110,8 @@ def advice() -> str | None:
 def describe(*, spectral: bool = False) -> dict[str, Any]:
     """The choice as plain values for a manifest, with the versions of the libraries."""
     choice = choose()
-    return {
-        "kind": choice.kind,
-        "variant": choice.variant_for(spectral),
-        "library": choice.library,
-        "reason": choice.detail,
-        "mitsuba": version("mitsuba"),
-        "drjit": version("drjit"),
-    }
+    versions = {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
+    return asdict(choice) | {"variant": choice.variant_for(spectral)} | versions
 
 
 def load(*, spectral: bool = False) -> Any:

@@ -78,12 +78,6 @@ def thinned(
     return thin_photons(setup, photons, seed=seed, photons_per_radiance=gain)
 
 
-def counted(photons: PhotonTable, grid: CameraGrid) -> np.ndarray:
-    counts = np.zeros((grid.height, grid.width))
-    np.add.at(counts, (photons.i, photons.j), 1)
-    return counts
-
-
 def surprise(
     photons: PhotonTable, radiance: np.ndarray, grid: CameraGrid, gain: float, block_px: int = 4
 ) -> float:
@@ -91,7 +85,8 @@ def surprise(
 
     Blocks of each colour, but those where less than five photons are expected, are compared.
     """
-    counts, rates = counted(photons, grid), gain * mosaic(radiance, "GRBG")
+    counts, rates = np.zeros((grid.height, grid.width)), gain * mosaic(radiance, "GRBG")
+    np.add.at(counts, (photons.i, photons.j), 1)
     colours = colour_index(grid.height, grid.width, "GRBG")
     found, expected = (
         np.concatenate([on_blocks(values * (colours == colour), block_px).ravel() for colour in range(3)])
