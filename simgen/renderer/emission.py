@@ -287,8 +287,8 @@ def _lux_from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
     # The area on the sphere has one factor sin(polar), the cosine sin(polar) cos(longitude) another.
     row_weight = np.sin(down * np.pi) ** 2 * (np.pi / down.size)
     col_weight = np.maximum(-np.cos(longitude), 0) * (2 * np.pi / right.size)
-    of_rows = _divided(down * (height - 1), row_weight, height)
-    of_columns = _divided(right * width - 0.5, col_weight, width)
+    of_rows = _divide_weights(down * (height - 1), row_weight, height)
+    of_columns = _divide_weights(right * width - 0.5, col_weight, width)
     return float(of_rows @ (pixels @ LUMINANCE) @ of_columns)
 
 
@@ -298,7 +298,7 @@ def _midpoints(pixels: int) -> np.ndarray:
     return (np.arange(number) + 0.5) / number
 
 
-def _divided(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:
+def _divide_weights(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:
     """Weights at these places, each divided among the two pixels beside it; the first follows the last."""
     before = np.floor(position_px).astype(np.int64)
     after = position_px - before

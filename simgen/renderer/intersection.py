@@ -59,8 +59,8 @@ def _objects_hit(
     if is_scalar(render_scene.mi):
         ids = objects_by_shape(render_scene)
         hits = (scene.ray_intersect(render_scene.mi.RayDifferential3f(ray)) for ray in rays)
-        found = [ids[(hit.instance or hit.shape).id()] if hit.is_valid() else -1 for hit in hits]
-        return np.array(found, dtype=np.int16)
+        objects = [ids[(hit.instance or hit.shape).id()] if hit.is_valid() else -1 for hit in hits]
+        return np.array(objects, dtype=np.int16)
     hit = scene.ray_intersect_preliminary(rays)
     shape = np.array(load_drjit().select(hit.is_valid(), shape_number(render_scene, hit), 0))
     return np.where(shape > 0, render_scene.object_of_shape[shape], np.int16(-1))

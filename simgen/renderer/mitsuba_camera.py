@@ -66,7 +66,7 @@ def film_rays(
             return float(values.flat[0])  # what all cameras share needs no look-up
         return dr.gather(mi.Float, floats(mi, values), camera)
 
-    def turned(*vector: Any, factor: float = 1.0) -> list[Any]:
+    def rotate(*vector: Any, factor: float = 1.0) -> list[Any]:
         rows = factor * np.moveaxis(rotation, (-2, -1), (0, 1))
         return [_dot([of_camera(row[col]) for col in range(len(vector))], vector) for row in rows]
 
@@ -75,8 +75,8 @@ def film_rays(
     origin = mi.Point3f(*(of_camera(position[..., axis]) for axis in range(3)))
     if rig.lens is not None:
         x, y = slopes_behind_lens((x, y), rig.lens, (lens_point.x, lens_point.y))
-        origin += mi.Vector3f(*turned(lens_point.x, lens_point.y, factor=frame.unit))
-    direction = dr.normalize(mi.Vector3f(*turned(x, y, mi.Float(1))))
+        origin += mi.Vector3f(*rotate(lens_point.x, lens_point.y, factor=frame.unit))
+    direction = dr.normalize(mi.Vector3f(*rotate(x, y, mi.Float(1))))
     return mi.RayDifferential3f(mi.Ray3f(origin, direction))
 
 

@@ -21,10 +21,10 @@ from simgen.renderer.emission import (
     shining_surfaces,
 )
 from simgen.renderer.mitsuba_reference import reference_to
-from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, placed_shape
+from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, shape_plugin
 from simgen.renderer.mitsuba_surfaces import (
     matt_plugin,
-    painted_patterns,
+    paint_patterns,
     reflectance_plugin,
     surface_key,
     surface_plugin,
@@ -141,14 +141,14 @@ def _check_names(names: Mapping[int, str], folder: Path) -> None:
 def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:
     """Shapes of all objects by id; objects that look alike share a surface."""
     plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
-    patterns = painted_patterns(scene.objects)
+    patterns = paint_patterns(scene.objects)
     for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
         try:
             key = surface_key(thing.material, thing.shape, assets)
             if key not in surfaces:
                 surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
             emitter = emission_plugin(mi, thing, assets, gain)
-            shape = placed_shape(mi, thing, assets, surfaces[key], emitter, reach_mm, frame)
+            shape = shape_plugin(mi, thing, assets, surfaces[key], emitter, reach_mm, frame)
         except InputError as fault:
             raise InputError(f"object '{thing.name}', {fault}") from None
         plugins[f"{OBJECT}{number}"] = shape

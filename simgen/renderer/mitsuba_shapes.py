@@ -75,9 +75,9 @@ class WorldFrame:
 
     def rigid_pose(self, pose: np.ndarray) -> np.ndarray:
         """The pose (4, 4) of what has no size, from the world to the renderer's axes."""
-        placed = np.eye(4)
-        placed[:3, :3], placed[:3, 3] = self.rotation @ pose[:3, :3], self.points(pose[:3, 3])
-        return placed
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = self.rotation @ pose[:3, :3], self.points(pose[:3, 3])
+        return result
 
     def pose(self, mi: Any, pose: Any) -> Any:
         """A pose of Mitsuba's from the world to the renderer's axes and unit."""
@@ -97,7 +97,7 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose
 
 
-def placed_shape(
+def shape_plugin(
     mi: Any,
     thing: SceneObject,
     assets: Assets,

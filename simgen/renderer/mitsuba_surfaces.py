@@ -36,7 +36,7 @@ def matt_plugin(reflectance: dict[str, Any]) -> dict[str, Any]:
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
 
 
-def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
+def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
     """The pixels of each object's pattern (see `paint`), None if it carries none; several at a time."""
 
     def pixels(thing: SceneObject) -> np.ndarray | None:

@@ -31,13 +31,12 @@ def film(height: int = 32, width: int = 32, focal_mm: float = 50.0) -> CameraGri
     )
 
 
+def thing(name: str, x_mm: float, y_mm: float, z_mm: float, material: dict, **shape: Any) -> dict[str, Any]:
+    return {"name": name, "position_mm": (x_mm, y_mm, z_mm), "shape": shape, "material": material}
+
+
 def card(z_mm: float, size_mm: float, material: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "name": "card",
-        "position_mm": (0.0, 0.0, z_mm),
-        "shape": {"type": "card", "width_mm": size_mm, "height_mm": size_mm},
-        "material": material,
-    }
+    return thing("card", 0.0, 0.0, z_mm, material, type="card", width_mm=size_mm, height_mm=size_mm)
 
 
 def made(

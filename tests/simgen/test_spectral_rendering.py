@@ -10,13 +10,11 @@ from lit_scenes import LAMP, ball
 
 from pcii.core.bayer import colour_index, mosaic
 from simgen.dataset.prepared import capture_of
-from simgen.photons.candidates import Setup
-from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
 from simgen.sensor.mosaic import PHOTONS_PER_LUMEN_SECOND, sensitivities
-from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.recipe import Recipe
 from simgen.spec.scene import Scene
 from simgen.spectral.spectra import colour_science, patch_names
 
@@ -182,23 +180,3 @@ def test_thinned_photons_of_round_shiny_things_are_those_of_rendered_views() -> 
     photons, log = lit_views.thinned(built, grid, 3, gain, seed=3)
     assert abs(lit_views.surprise(photons, view, grid, gain, block_px=6)) < 5
     assert log["paths_above_bound"] <= max(1e-3 * photons.k.size, 3)
-
-
-def test_photons_come_only_to_pixels_that_a_lamp_shines_for(tmp_path: Path) -> None:
-    """An LED has no light from 380 to 390 nm, where the blue pixels of this camera see all they see."""
-    rows = ["380,0,0,1", "386,0,0,1", "387,0,0,0", "500,1,1,0", "700,1,1,0"]
-    (tmp_path / "violet.csv").write_text("\n".join(["wavelength_nm,R,G,B", *rows]))
-    made = recipe("violet.csv")
-    led = {"type": "uniform", "luminance_cd_m2": 100.0, "illuminant": "LED-B4"}
-    scene = Scene.model_validate(
-        {"title": "test", "lights": [led], "objects": [ball("grey", 0, 600, (1, 1, 1))]}
-    )
-    built = build(backend.load(spectral=True), scene, tmp_path, 2, sensitivities(made.sensor, tmp_path))
-    setup = Setup(built, made.grid.camera_grid(), made.cfa, 2)
-    photons, _ = thin_photons(setup, Photons(budget=2000), seed=2)
-    colours = colour_index(FILM["height"], FILM["width"], made.cfa)[photons.i, photons.j]
-    found = np.bincount(colours, minlength=3)
-    # Red and green pixels are as sensitive, and there are twice as many green ones.
-    assert found[2] == 0
-    assert abs(found[0] - found.sum() / 3) < 5 * np.sqrt(2 / 9 * found.sum())
-    assert abs(found.sum() - 2000) < 5 * np.sqrt(2000)
