@@ -13,8 +13,7 @@ from pcii.core.bayer import colour_cells
 from simgen.photons.candidates import Accepted, FilmPoints, Setup, chances, nothing, require_finite
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
-from simgen.renderer.backend import load_drjit
-from simgen.renderer.device_arrays import doubles, floats, gathered, opaque, signed, unsigned
+from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned
 from simgen.renderer.mitsuba_camera import film_rays
 from simgen.renderer.path_tracing import FirstHits, hit_first, radiance_along
 from simgen.renderer.wavelengths import Light, light_of, of_colour

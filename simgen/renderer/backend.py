@@ -1,11 +1,9 @@
-"""The renderer behind everything: the one place that loads Mitsuba and Dr.Jit.
+"""The renderer behind everything: the one place that loads Mitsuba and Dr.Jit, and gives arrays to them.
 
-Dr.Jit compiles its kernels with the system's LLVM library, and takes whichever it finds: with LLVM
-14 the import fails, with 15 and 16 the first kernel aborts the process. So each candidate is tried
-in a subprocess, which may die, and only what was seen to work is loaded here. Order: CUDA, then
-LLVM 17 or newer, then Mitsuba's scalar mode, which needs neither.
-
-`SIMGEN_BACKEND` = cuda, llvm or scalar asks for one. Answers are cached under a key that changes
+Dr.Jit compiles its kernels with the system's LLVM library: with LLVM 14 the import fails, with 15 and 16 the
+first kernel aborts the process. So each library is tried in a subprocess, which may die, and only one that
+works is loaded here. Order: CUDA, the newest LLVM from 17 on, and Mitsuba's scalar mode, which needs neither.
+`SIMGEN_BACKEND` = cuda, llvm or scalar allows only one of them. Answers are cached under a key that changes
 with the libraries.
 """
 
@@ -26,15 +24,17 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from pcii.base.errors import InputError
 from simgen.base.file_lookup import cached
 
-NEEDED = ("mitsuba", "drjit")
 Kind = Literal["cuda", "llvm", "scalar"]
-KINDS: tuple[Kind, ...] = ("cuda", "llvm", "scalar")
 VARIANTS: dict[Kind, str] = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
-OLDEST_LLVM = 17
+LIBRARY_FOLDERS = ("usr/lib", "usr/lib64", "usr/local/lib", "usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib")
+"""Where LLVM is looked for, from the root, besides LD_LIBRARY_PATH."""
 PROBE_LIMIT_S = 120
+ALIGNMENT_BYTES = 64
 
 # A kernel with minimum, a gather and a ray: what LLVM 15 and 16 die of, and what rendering needs.
 _PROBE = """
@@ -50,38 +50,28 @@ scene = mi.load_dict({
 })
 import numpy
 assert numpy.isfinite(numpy.array(mi.render(scene, spp=1, seed=1))).all()
-print("rendered")
 """
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One way to run, and what trying it showed."""
-
-    kind: Kind
-    library: str | None
-    """Path of the shared library it rests on; None for scalar."""
-    version: str
-    works: bool
-    detail: str
-
-
-@dataclass(frozen=True)
 class Backend:
-    """The choice: how rendering runs on this machine, and why."""
+    """One way to render on this machine, and what a trial of it showed."""
 
     kind: Kind
     variant: str
+    """Mitsuba's name of it, for light of three colours."""
     library: str | None
-    reason: str
+    """Path of the shared library that it needs; None for scalar mode."""
+    works: bool
+    detail: str
 
     def variant_for(self, spectral: bool) -> str:
         """Mitsuba's name of this backend's variant for colours or for spectra."""
         return self.variant.replace("rgb", "spectral") if spectral else self.variant
 
     def line(self) -> str:
-        """One line for logs and manifests."""
-        return f"{self.variant}: {self.reason}"
+        """One line for logs."""
+        return f"{self.variant}: {self.detail}"
 
 
 def choose() -> Backend:
@@ -89,31 +79,26 @@ def choose() -> Backend:
 
     Raises `InputError` if Mitsuba is not installed, and if `SIMGEN_BACKEND` asks for what does not work.
     """
-    check_installed()
-    asked = os.environ.get("SIMGEN_BACKEND", "").strip().lower()
-    if asked and asked not in KINDS:
-        raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(KINDS)}, not {asked!r}")
-    tried: list[str] = []
-    for kind in KINDS:
-        if asked and kind != asked:
-            continue
-        for candidate in _candidates(kind):
+    request = os.environ.get("SIMGEN_BACKEND", "").strip().lower()
+    if request not in ("", *VARIANTS):
+        raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(VARIANTS)}, not {request!r}")
+    failures: list[str] = []
+    for kind in VARIANTS:
+        for candidate in _candidates(kind) if request in ("", kind) else ():
             if candidate.works:
-                why = "asked for by SIMGEN_BACKEND" if asked else "; ".join(tried)
-                reason = candidate.detail + (f" ({why})" if why else "")
-                return Backend(kind, VARIANTS[kind], candidate.library, reason)
-            tried.append(candidate.detail)
-    raise InputError(f"SIMGEN_BACKEND: {asked} does not work here: {'; '.join(tried) or 'no such library'}")
+                return candidate
+            failures.append(candidate.detail)
+    reasons = "; ".join(failures) or "there is no such library"
+    raise InputError(f"SIMGEN_BACKEND: {request} does not work here: {reasons}")
 
 
-def survey() -> list[Candidate]:
-    """Every candidate on this machine with its verdict, best first; for `simgen doctor`."""
-    check_installed()
-    return [candidate for kind in KINDS for candidate in _candidates(kind)]
+def survey() -> list[Backend]:
+    """Every backend of this machine with what its trial showed, best first; for `simgen doctor`."""
+    return [candidate for kind in VARIANTS for candidate in _candidates(kind)]
 
 
 def advice() -> str | None:
-    """What to install for a faster backend, or None if a compiled one works already."""
+    """What to install for a faster backend, or None if a compiled one works."""
     if any(candidate.works and candidate.kind != "scalar" for candidate in survey()):
         return None
     return (
@@ -122,10 +107,17 @@ def advice() -> str | None:
     )
 
 
-def load(*, spectral: bool = False) -> Any:
-    """The `mitsuba` module with the chosen variant set, that for spectra if asked for.
+def describe(*, spectral: bool = False) -> dict[str, Any]:
+    """The choice as plain values for a manifest, with the versions of the libraries."""
+    choice = choose()
+    versions = {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
+    return asdict(choice) | {"variant": choice.variant_for(spectral)} | versions
 
-    A scene lives as long as its variant is set: who changes the variant lets go of its scenes first.
+
+def load(*, spectral: bool = False) -> Any:
+    """The `mitsuba` module with the variant of `choose` set, that for spectra on request.
+
+    A scene lives as long as its variant is set: let go of scenes before another variant is loaded.
     """
     mi, variant = _mitsuba(), choose().variant_for(spectral)
     if mi.variant() != variant:
@@ -143,24 +135,12 @@ def load_drjit() -> Any:
     return dr
 
 
-def is_scalar(mi: Any) -> bool:
-    """Whether rays are traced one by one, for want of a compiled backend."""
-    return mi.variant().startswith("scalar")
-
-
-def use_threads(count: int) -> None:
-    """Let the compiled backend of this process run on so many threads."""
-    load_drjit().set_thread_count(count)
-
-
 @cache
 def _mitsuba() -> Any:
-    backend = choose()
-    if "mitsuba" in sys.modules:  # someone else's choice: the library cannot be changed any more
-        return sys.modules["mitsuba"]
-    if backend.kind == "llvm" and backend.library:
-        # Read once, when Dr.Jit first needs LLVM; a later setting does nothing.
-        os.environ["DRJIT_LIBLLVM_PATH"] = backend.library
+    choice = choose()
+    if choice.kind == "llvm" and choice.library:
+        # Dr.Jit reads it once, when it first needs LLVM.
+        os.environ["DRJIT_LIBLLVM_PATH"] = choice.library
     with _uninterrupted():
         import mitsuba as mi
 
@@ -169,18 +149,33 @@ def _mitsuba() -> Any:
 
 @contextlib.contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block: while the library is loading it would abort the process."""
-    if threading.current_thread() is not threading.main_thread():  # which alone hears of it
+    """Let Ctrl-C wait for the end of the block: while a library is loading it would abort the process."""
+    if threading.current_thread() is not threading.main_thread():  # only the main one receives signals
         yield
         return
-    arrived: list[tuple[Any, ...]] = []
-    before = signal.signal(signal.SIGINT, lambda *told: arrived.append(told))
+    arrivals: list[tuple[Any, ...]] = []
+    handler = signal.signal(signal.SIGINT, lambda *arguments: arrivals.append(arguments))
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if arrived and callable(before):
-        before(*arrived[0])
+        signal.signal(signal.SIGINT, handler)
+    if arrivals and callable(handler):
+        handler(*arrivals[0])
+
+
+def is_scalar(mi: Any) -> bool:
+    """Whether rays are traced one by one, for want of a compiled backend."""
+    return mi.variant().startswith("scalar")
+
+
+def is_spectral(mi: Any) -> bool:
+    """Whether rays carry wavelengths; else linear sRGB."""
+    return "spectral" in mi.variant()
+
+
+def use_threads(count: int) -> None:
+    """Set the number of threads of the compiled backend in this process."""
+    load_drjit().set_thread_count(count)
 
 
 def shape_numbers(scene: Any) -> list[int]:
@@ -196,105 +191,125 @@ def shape_numbers(scene: Any) -> list[int]:
     return [int(number) for number in numbers]
 
 
-def _candidates(kind: Kind) -> list[Candidate]:
-    """The candidates of one kind, each tried, best first."""
-    if kind == "scalar":
-        return [Candidate("scalar", None, "", True, "scalar mode needs no library")]
-    if kind == "cuda":
-        library = ctypes.util.find_library("cuda")
-        return [_try("cuda", library, "")] if library else []
-    return [_try_llvm(path) for path in _llvm_libraries()]
+def unsigned(mi: Any, values: np.ndarray) -> Any:
+    """Whole numbers from 0 as a flat array of 32 bits, of a compiled backend."""
+    return _upload(mi.UInt32, values, np.uint32)
 
 
-def _try_llvm(path: Path) -> Candidate:
-    major = _major_version(path)
-    if major is not None and major < OLDEST_LLVM:
-        detail = f"LLVM {major} is too old, {OLDEST_LLVM} or newer is needed"
-        return Candidate("llvm", str(path), str(major), False, detail)
-    return _try("llvm", str(path), "" if major is None else str(major))
+def signed(mi: Any, values: np.ndarray) -> Any:
+    """Whole numbers as a flat array of 32 bits, of a compiled backend."""
+    return _upload(mi.Int32, values, np.int32)
 
 
-def _try(kind: Kind, library: str, number: str) -> Candidate:
-    """Run the probe kernel in a subprocess, or read what it showed before."""
-    name = f"{kind.upper()} {number}".strip()
-    works, detail = cached(
-        "backend",
-        _deciding(kind, library),
-        lambda: dict(zip(("works", "detail"), _probe(kind, library), strict=True)),
-        lambda answer: (bool(answer["works"]), str(answer["detail"])),
-    )
-    return Candidate(kind, library, number, works, f"{name} {detail}")
+def floats(mi: Any, values: np.ndarray) -> Any:
+    """Numbers as a flat array in single precision, of a compiled backend."""
+    return _upload(mi.Float, values, np.float32)
 
 
-def _probe(kind: Kind, library: str) -> tuple[bool, str]:
-    environment = dict(os.environ)
-    if kind == "llvm":
-        environment["DRJIT_LIBLLVM_PATH"] = library
-    command = [sys.executable, "-c", _PROBE, VARIANTS[kind]]
-    try:
-        run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S)
-    except subprocess.TimeoutExpired:
-        return False, f"did not answer within {PROBE_LIMIT_S} s"
-    if run.returncode == 0 and "rendered" in run.stdout:
-        return True, "works"
-    if run.returncode < 0:
-        return False, f"ended the trial process with signal {-run.returncode}"
-    last = (run.stderr.strip().splitlines() or ["no message"])[-1]
-    return False, f"failed: {last[:200]}"
+def doubles(mi: Any, values: np.ndarray) -> Any:
+    """Numbers as a flat array in double precision, of a compiled backend."""
+    return _upload(mi.Float64, values, np.float64)
 
 
-def _llvm_libraries() -> list[Path]:
-    """LLVM libraries of this machine: the one asked for by DRJIT_LIBLLVM_PATH, then newest first."""
-    asked = os.environ.get("DRJIT_LIBLLVM_PATH")
-    if asked:
-        return [Path(asked)]
-    folders = [Path("/usr/lib"), Path("/usr/lib64"), Path("/usr/local/lib")]
-    folders += [Path("/usr/lib") / f"{platform.machine()}-linux-gnu"]
-    folders += sorted(Path("/usr/lib").glob("llvm-*/lib"))
-    folders += [Path(p) for p in os.environ.get("LD_LIBRARY_PATH", "").split(":") if p]
-    found: dict[Path, Path] = {}
-    for folder in folders:
-        for path in sorted(folder.glob("libLLVM*.so*")):
-            if re.fullmatch(r"libLLVM([-.][\d.]+)?\.so(\.[\d.]+)?", path.name) and path.is_file():
-                found.setdefault(path.resolve(), path)
-    return sorted(found.values(), key=lambda path: -(_major_version(path) or 0))
+def vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:
+    """Rows (N, 2 or 3) as points or vectors of this `kind`, of a compiled backend."""
+    return kind(*(floats(mi, column) for column in rows.T))
 
 
-def _major_version(path: Path) -> int | None:
-    """Major version from the library's file name, None if it does not say."""
-    for name in (path.name, path.resolve().name):
-        digits = re.search(r"LLVM[-.](\d+)|\.so\.(\d+)", name)
-        if digits:
-            return int(digits[1] or digits[2])
-    return None
+def opaque(kind: Any, value: float) -> Any:
+    """One number that is passed to kernels as data: as a constant it would be compiled into each."""
+    return load_drjit().opaque(kind, value)
 
 
-def _deciding(kind: Kind, library: str) -> list[str]:
-    """What decides on the probe's answer: the libraries and the interpreter."""
-    parts = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
-    path = Path(library)
-    if path.exists():
-        state = path.resolve().stat()
-        parts += [str(path.resolve()), str(state.st_size), str(state.st_mtime_ns)]
-    if kind == "cuda":
-        driver = Path("/proc/driver/nvidia/version")
-        devices = os.environ.get("CUDA_VISIBLE_DEVICES", "all"), *map(str, Path("/dev").glob("nvidia*"))
-        parts += [driver.read_text() if driver.exists() else "", *devices]
-    return parts
+def gathered(array: Any, index: Any, active: Any = True) -> Any:
+    """Elements of one of the backend's arrays; 0 where not active."""
+    return load_drjit().gather(type(array), array, index, active)
 
 
-def describe(*, spectral: bool = False) -> dict[str, Any]:
-    """The choice as plain values for a manifest, with the versions that it rests on."""
-    chosen = choose()
-    versions = {"mitsuba": version("mitsuba"), "drjit": version("drjit")}
-    return asdict(chosen) | {"variant": chosen.variant_for(spectral)} | versions
+def _upload(kind: Any, values: np.ndarray, dtype: Any) -> Any:
+    """The array from a copy that begins at a multiple of `ALIGNMENT_BYTES`.
+
+    Where the backend reads NumPy's memory in place its alignment is compiled into the kernel, and NumPy's own
+    is a matter of chance: each combination that a kernel's arrays have would wait for a compiler.
+    """
+    flat = np.ascontiguousarray(values, dtype=dtype).ravel()
+    if flat.size == 1:  # its address would be compiled into the kernel
+        return opaque(kind, flat[0].item())
+    memory = np.empty(flat.nbytes + ALIGNMENT_BYTES, np.uint8)
+    begin = -memory.ctypes.data % ALIGNMENT_BYTES
+    copy = memory[begin : begin + flat.nbytes].view(flat.dtype)
+    copy[...] = flat
+    return kind(copy)
 
 
-def check_installed() -> None:
-    """Raise `InputError`, with what to type, unless Mitsuba and Dr.Jit are installed."""
-    missing = [name for name in NEEDED if importlib.util.find_spec(name) is None]
+def _candidates(kind: Kind) -> Iterator[Backend]:
+    """The backends of one kind, each tried, best first."""
+    missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(
             f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
             "pip install '.[render]'"
         )
+    if kind == "scalar":
+        yield Backend(kind, VARIANTS[kind], None, True, "scalar mode needs no library")
+    elif kind == "llvm":
+        for path in _llvm_libraries():
+            yield _trial(kind, str(path), f"LLVM {_llvm_version(path) or ''}".strip())
+    elif library := ctypes.util.find_library("cuda"):
+        yield _trial(kind, library, "CUDA")
+
+
+def _trial(kind: Kind, library: str, name: str) -> Backend:
+    """Run the probe kernel in a subprocess, or read what it showed before."""
+    return cached(
+        "backend",
+        _cache_key(kind, library),
+        lambda: dict(zip(("works", "detail"), _probe(kind, library), strict=True)),
+        lambda answer: Backend(
+            kind, VARIANTS[kind], library, bool(answer["works"]), f"{name} {answer['detail']}"
+        ),
+    )
+
+
+def _probe(kind: Kind, library: str) -> tuple[bool, str]:
+    environment = os.environ | ({"DRJIT_LIBLLVM_PATH": library} if kind == "llvm" else {})
+    command = [sys.executable, "-c", _PROBE, VARIANTS[kind]]
+    try:
+        run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return False, f"did not answer within {PROBE_LIMIT_S} s"
+    if run.returncode == 0:
+        return True, "works"
+    if run.returncode < 0:
+        return False, f"ended the trial process with signal {-run.returncode}"
+    last_line = (run.stderr.strip().splitlines() or ["no message"])[-1]
+    return False, f"failed: {last_line[:200]}"
+
+
+def _llvm_libraries() -> list[Path]:
+    """LLVM libraries of this machine: the one of DRJIT_LIBLLVM_PATH, or all, the newest first."""
+    if path := os.environ.get("DRJIT_LIBLLVM_PATH"):
+        return [Path(path)]
+    files = [file for folder in LIBRARY_FOLDERS for file in Path("/").glob(f"{folder}/libLLVM*.so*")]
+    for folder in filter(None, os.environ.get("LD_LIBRARY_PATH", "").split(":")):
+        files += Path(folder).glob("libLLVM*.so*")
+    libraries = {file.resolve() for file in files if _llvm_version(file)}
+    return sorted(libraries, key=lambda file: (-_llvm_version(file), file))
+
+
+def _llvm_version(library: Path) -> int:
+    """Major version from the library's file name, 0 if it does not say."""
+    digits = re.match(r"libLLVM(?:-|\.so\.)(\d+)", library.resolve().name)
+    return int(digits[1]) if digits else 0
+
+
+def _cache_key(kind: Kind, library: str) -> list[str]:
+    """What decides on the probe's answer: the libraries, the interpreter and the devices."""
+    parts = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
+    if (path := Path(library).resolve()).exists():
+        parts += [str(path), str(path.stat().st_size), str(path.stat().st_mtime_ns)]
+    if kind == "cuda":
+        driver = Path("/proc/driver/nvidia/version")
+        parts += [driver.read_text() if driver.exists() else "", os.environ.get("CUDA_VISIBLE_DEVICES", "")]
+        parts += map(str, Path("/dev").glob("nvidia*"))
+    return parts

@@ -1,6 +1,10 @@
-"""What shines and has a place: as Mitsuba's emitters, the light that it gives a plane, and where it is."""
+"""What shines: lamps and objects as Mitsuba's emitters, the light that they give a plane, and where they are.
 
-from collections.abc import Iterator
+Radiance is linear sRGB scaled such that its luminance, 0.2126 R + 0.7152 G + 0.0722 B, is in cd/m^2; for
+spectra see `spectra`.
+"""
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,17 +15,28 @@ from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import Assets
 from simgen.assets.mesh_points import bears_pictures_once, surface_points
 from simgen.assets.solids import card_triangles, globe, triangles_of
-from simgen.renderer.mitsuba_lights import area_light_pose
-from simgen.renderer.mitsuba_shapes import check_texcoords, pose_of, solid_parts
-from simgen.renderer.mitsuba_surfaces import is_spectral, light_spectrum, radiance_plugin, texture_plugin
-from simgen.spec.lights import AreaLight, Illuminant
+from simgen.renderer.backend import is_spectral
+from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
+from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
+from simgen.spec.lights import (
+    AreaLight,
+    DirectionalLight,
+    EnvironmentLight,
+    Illuminant,
+    Light,
+    PointLight,
+    SpotLight,
+    UniformLight,
+)
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spec.shapes import Card, Sphere
 from simgen.spectral.filters import Filters
-from simgen.spectral.spectra import integral
+from simgen.spectral.spectra import DAYLIGHT, integral
 
+NODES = 32
+"""Gauss-Legendre nodes along each side of a lamp, for the light that it gives a plane."""
 POINTS = 1 << 12
-"""On the surface of an object, at which its light is summed up."""
+"""Points on the surface of an object at which its light is summed up."""
 BALL_ROWS = 16
 """Rows of the triangles that a ball's points are drawn on, before they are moved onto the ball itself."""
 
@@ -47,7 +62,7 @@ class ShiningSurface:
 def shining_surfaces(
     mi: Any, scene: Scene, assets: Assets, gain: float, filters: Filters | None
 ) -> Iterator[ShiningSurface]:
-    """All that shines and can be seen: objects, and lamps with a surface."""
+    """All that shines and can be seen: lamps with a surface, and objects."""
 
     def radiance(luminance_cd_m2: float, illuminant: Illuminant) -> np.ndarray:
         if filters is None:
@@ -55,42 +70,37 @@ def shining_surfaces(
         spectrum = gain * luminance_cd_m2 * light_spectrum(mi, illuminant)
         return integral(filters.sensitivity * spectrum)
 
+    def corners_mm(positions: np.ndarray, faces: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        return (positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3])[faces]
+
+    square = card_triangles(2.0, 2.0)
     for light in scene.lights:
         if isinstance(light, AreaLight):
-            square = card_triangles(2.0, 2.0)
             pose = area_light_pose(light) * [1, -1, -1, 1]  # a card faces -Z, Mitsuba's rectangle +Z
-            yield ShiningSurface(
-                0,
-                _placed(square.positions, pose)[square.faces],
-                radiance(light.luminance_cd_m2, light.illuminant),
-            )
+            corners = corners_mm(square.positions, square.faces, pose)
+            yield ShiningSurface(0, corners, radiance(light.luminance_cd_m2, light.illuminant))
     for number, thing in enumerate(scene.objects, start=1):
         emission, shape = thing.material.emission, thing.shape
         if emission is None:
             continue
-        pose = np.array(pose_of(mi, thing).matrix, dtype=np.float64)
-        is_ball = isinstance(shape, Sphere)
-        triangles = (
-            globe(shape.radius_mm, BALL_ROWS) if is_ball else solid_parts(shape, thing.material, assets)
-        )
-        picture, texcoords = None, None
-        if emission.texture is not None and triangles.texcoords is not None:
+        pose, ball, picture, texcoords = _matrix(mi, thing), None, None, None
+        if isinstance(shape, Sphere):
+            triangles, ball = globe(shape.radius_mm, BALL_ROWS), (pose[:3, 3], shape.radius_mm, pose[:3, :3])
+        else:
+            triangles = solid_parts(shape, thing.material, assets)
+        if emission.texture is None:
+            own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
+        else:
+            assert triangles.texcoords is not None
+            own_radiance = np.full(3, gain * emission.luminance_cd_m2)
             picture = assets.image(emission.texture)
             texcoords = triangles.texcoords.astype(np.float64)[triangles.faces]
-        yield ShiningSurface(
-            number,
-            _placed(triangles.positions, pose)[triangles.faces],
-            radiance(emission.luminance_cd_m2, emission.illuminant)
-            if picture is None
-            else np.full(3, gain * emission.luminance_cd_m2),
-            picture,
-            texcoords,
-            (pose[:3, 3], shape.radius_mm, pose[:3, :3]) if is_ball else None,
-        )
+        corners = corners_mm(triangles.positions, triangles.faces, pose)
+        yield ShiningSurface(number, corners, own_radiance, picture, texcoords, ball)
 
 
-def _placed(positions: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    return positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3]
+def _matrix(mi: Any, thing: SceneObject) -> np.ndarray:
+    return np.array(pose_of(mi, thing).matrix, dtype=np.float64)
 
 
 def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) -> dict[str, Any] | None:
@@ -99,13 +109,12 @@ def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) ->
     Raises `InputError` for a texture in spectral mode, and for one on a shape that bears parts of it several
     times: such a lamp is aimed at by the brightness of its image, so each of its pixels must have one place.
     """
-    emission, shape = thing.material.emission, thing.shape
+    emission, shape, where = thing.material.emission, thing.shape, "material.emission.texture"
     if emission is None:
         return None
     luminance = gain * emission.luminance_cd_m2
     if emission.texture is None:
         return {"type": "area", "radiance": radiance_plugin(mi, luminance, emission.illuminant)}
-    where = "material.emission.texture"
     if is_spectral(mi):
         raise InputError(
             f"{where}: images shine only where light is linear sRGB; give the luminance alone, or a recipe "
@@ -121,6 +130,102 @@ def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) ->
     return {"type": "area", "radiance": texture_plugin(mi, pixels, shape, raw=True)}
 
 
+def light_plugin(
+    mi: Any, light: Light, gain: float, surroundings: np.ndarray | None, frame: WorldFrame
+) -> dict[str, Any]:
+    """The Mitsuba emitter of a light that is `gain` times as bright as it says.
+
+    `surroundings` (H, W, 3) are the pixels of an environment light's image; `frame` is that of the renderer.
+    """
+    T = mi.ScalarTransform4f
+    per_cd = 1e6 * frame.unit**2  # cd = cd/m^2 m^2, with lengths in the renderer's unit
+    match light:
+        case UniformLight():
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
+            return {"type": "constant", "radiance": radiance}
+        case PointLight():
+            intensity = radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant)
+            position = frame.points(np.array(light.position_mm)).tolist()
+            return {"type": "point", "position": position, "intensity": intensity}
+        case SpotLight():
+            return {
+                "type": "spot",
+                "to_world": T(frame.rigid_pose(_lamp_pose(light))),
+                "intensity": radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant),
+                "beam_width": light.beam_deg,
+                "cutoff_angle": light.cutoff_deg,
+            }
+        case DirectionalLight():
+            irradiance = radiance_plugin(mi, gain * light.illuminance_lux, light.illuminant)
+            direction = frame.directions(np.array(light.direction)).tolist()
+            return {"type": "directional", "direction": direction, "irradiance": irradiance}
+        case EnvironmentLight():
+            # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z
+            # brings what is above to -Y and what is right to +X.
+            to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
+            return {
+                "type": "envmap",
+                "bitmap": linear_bitmap(mi, np.ascontiguousarray(surroundings, dtype=np.float32)),
+                "scale": gain * light.luminance_cd_m2,
+                "to_world": WorldFrame(frame.rotation).pose(mi, to_world),
+            }
+        case AreaLight():
+            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
+            return {
+                "type": "rectangle",
+                "to_world": frame.pose(mi, T(area_light_pose(light))),
+                "emitter": {"type": "area", "radiance": radiance},
+                "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
+            }
+
+
+def area_light_pose(light: AreaLight) -> np.ndarray:
+    """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
+    return _lamp_pose(light) * [light.width_mm / 2, light.height_mm / 2, 1, 1]
+
+
+def _lamp_pose(light: AreaLight | SpotLight) -> np.ndarray:
+    """From a lamp at the origin that shines towards +z to where it stands and what it faces; (4, 4)."""
+    towards = np.subtract(light.target_mm, light.position_mm)
+    towards = towards / np.linalg.norm(towards)
+    up = np.array([0.0, -1.0, 0.0]) if abs(towards[1]) < 0.99 else np.array([0.0, 0.0, 1.0])
+    left = np.cross(up, towards)
+    left /= np.linalg.norm(left)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1] = left, np.cross(towards, left)
+    pose[:3, 2], pose[:3, 3] = towards, light.position_mm
+    return pose
+
+
+def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
+    """The mean spectrum (N,) of all that shines, each at luminance 1; daylight if only Mitsuba files do."""
+    emissions = [thing.material.emission for thing in scene.objects if thing.material.emission is not None]
+    colours = [getattr(lamp, "illuminant", DAYLIGHT) for lamp in (*scene.lights, *emissions)]
+    return np.mean([light_spectrum(mi, colour) for colour in colours or [DAYLIGHT]], axis=0)
+
+
+def level_gain(
+    mi: Any,
+    scene: Scene,
+    assets: Assets,
+    surroundings: np.ndarray | None,
+    referenced_lux: Callable[[float], float],
+) -> float:
+    """By how much to make all that shines brighter for a plane to get the scene's level; 1 without a level.
+
+    `referenced_lux` gives what lights of a Mitsuba file send to a depth. Raises `InputError` if there is no
+    light on the plane.
+    """
+    if scene.level is None:
+        return 1.0
+    z_mm = scene.level.z_mm
+    lux = sum(illuminance_lux(light, z_mm, surroundings) for light in scene.lights)
+    lux += sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects) + referenced_lux(z_mm)
+    if not lux > 0:
+        raise InputError(f"level: nothing shines on a surface at z_mm = {z_mm:g} that faces the cameras")
+    return scene.level.illuminance_lux / lux
+
+
 def object_lux(mi: Any, thing: SceneObject, z_mm: float, assets: Assets) -> float:
     """Illuminance, in lux, that an object gives a surface at (0, 0, z) that faces the cameras.
 
@@ -130,17 +235,79 @@ def object_lux(mi: Any, thing: SceneObject, z_mm: float, assets: Assets) -> floa
     if emission is None:
         return 0.0
     points = surface_points(solid_parts(thing.shape, thing.material, assets), POINTS)
-    matrix = np.array(pose_of(mi, thing).matrix, dtype=np.float64)[:3]
+    matrix = _matrix(mi, thing)[:3]
     towards = points.position @ matrix[:, :3].T + matrix[:, 3] - [0.0, 0.0, z_mm]
     at_lamp = np.maximum(-(points.normal @ matrix[:, :3].T * towards).sum(axis=1), 0)
     shares = points.area * np.maximum(-towards[:, 2], 0) * at_lamp / (towards**2).sum(axis=1) ** 2
     if emission.texture is not None:
         assert points.texcoord is not None
-        shares *= _luminance_at(points.texcoord, assets.image(emission.texture))
+        pixels = assets.image(emission.texture)
+        size = np.array(pixels.shape[1::-1])
+        col, row = np.clip((points.texcoord * [1, -1] + [0, 1]) * size, 0, size - 1).astype(np.int64).T
+        shares *= pixels[row, col] @ LUMINANCE
     return float(emission.luminance_cd_m2 * shares.sum())
 
 
-def _luminance_at(texcoord: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    size = np.array(pixels.shape[1::-1])
-    col, row = np.clip((texcoord * [1, -1] + [0, 1]) * size, 0, size - 1).astype(np.int64).T
-    return pixels[row, col] @ LUMINANCE
+def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) -> float:
+    """Illuminance, in lux, that a light gives a surface at (0, 0, z) that faces the cameras.
+
+    That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at the
+    lamp; nothing stands in the way.
+    """
+    point = np.array([0.0, 0.0, z_mm])
+    match light:
+        case UniformLight():
+            return float(np.pi * light.luminance_cd_m2)
+        case PointLight() | SpotLight():
+            towards = np.subtract(light.position_mm, point)
+            distance, share = np.linalg.norm(towards), 1.0
+            if isinstance(light, SpotLight):
+                cosine = np.clip(-towards / distance @ _lamp_pose(light)[:3, 2], -1, 1)
+                beyond_deg = light.cutoff_deg - np.degrees(np.arccos(cosine))
+                share = np.clip(beyond_deg / (light.cutoff_deg - light.beam_deg), 0, 1)
+            return float(share * light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
+        case DirectionalLight():
+            along = light.direction[2] / np.linalg.norm(light.direction)
+            return float(light.illuminance_lux * max(along, 0))
+        case EnvironmentLight():
+            assert surroundings is not None
+            return light.luminance_cd_m2 * _lux_from_around(light, surroundings)
+        case AreaLight():
+            pose, (node, weight) = area_light_pose(light), np.polynomial.legendre.leggauss(NODES)
+            x, y = np.meshgrid(node, node)
+            places = pose[:3, :3] @ np.stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + pose[:3, 3:]
+            towards = places - point[:, None]
+            squared = (towards**2).sum(axis=0)
+            at_surface, at_lamp = np.maximum(-towards[2], 0), np.maximum(-pose[:3, 2] @ towards, 0)
+            shares = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
+            return float(light.luminance_cd_m2 * (shares * at_surface * at_lamp / squared**2).sum())
+
+
+def _lux_from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
+    """The integral of the image's luminance times the cosine over the half space behind the cameras.
+
+    Like the renderer, between pixels it is linear: the rows lie at polar angles from 0 to pi.
+    """
+    height, width = pixels.shape[:2]
+    down, right = _midpoints(height), _midpoints(width)
+    longitude = (right - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
+    # The area on the sphere has one factor sin(polar), the cosine sin(polar) cos(longitude) another.
+    row_weight = np.sin(down * np.pi) ** 2 * (np.pi / down.size)
+    col_weight = np.maximum(-np.cos(longitude), 0) * (2 * np.pi / right.size)
+    of_rows = _divide_weights(down * (height - 1), row_weight, height)
+    of_columns = _divide_weights(right * width - 0.5, col_weight, width)
+    return float(of_rows @ (pixels @ LUMINANCE) @ of_columns)
+
+
+def _midpoints(pixels: int) -> np.ndarray:
+    """Midpoints of equal parts of the unit interval, 8 a pixel or more."""
+    number = max(8 * pixels, 4096)
+    return (np.arange(number) + 0.5) / number
+
+
+def _divide_weights(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:
+    """Weights at these places, each divided among the two pixels beside it; the first follows the last."""
+    before = np.floor(position_px).astype(np.int64)
+    after = position_px - before
+    total = np.bincount(before % pixels, weight * (1 - after), pixels)
+    return total + np.bincount((before + 1) % pixels, weight * after, pixels)

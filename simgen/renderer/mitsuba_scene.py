@@ -1,8 +1,8 @@
-"""From a validated scene to Mitsuba's: we alone choose the plugins, a scene file never names one."""
+"""From a validated scene to Mitsuba's: only this package names plugins, never a scene file."""
 
 from collections import Counter
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,21 +12,25 @@ from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
 from simgen.assets.solids import triangles_of
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
-from simgen.renderer.emission import ShiningSurface, emission_plugin, object_lux, shining_surfaces
-from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
+from simgen.renderer.emission import (
+    ShiningSurface,
+    emission_plugin,
+    level_gain,
+    light_plugin,
+    main_spectrum,
+    shining_surfaces,
+)
 from simgen.renderer.mitsuba_reference import reference_to
-from simgen.renderer.mitsuba_shapes import card_pose, placed, placed_shape
+from simgen.renderer.mitsuba_shapes import WorldFrame, card_pose, shape_plugin
 from simgen.renderer.mitsuba_surfaces import (
-    matt,
-    painted_patterns,
+    matt_plugin,
+    paint_patterns,
     reflectance_plugin,
     surface_key,
     surface_plugin,
-    two_sided,
 )
-from simgen.renderer.world_frame import WORLD, WorldFrame
 from simgen.spec.lights import EnvironmentLight
-from simgen.spec.scene import MOST_OBJECTS, Scene, SceneObject
+from simgen.spec.scene import MOST_OBJECTS, Scene
 from simgen.spec.shapes import Mesh, Sphere
 from simgen.spectral.filters import Filters, filters_for
 
@@ -52,7 +56,7 @@ class RenderScene:
     """All that shines and can be seen, but for what shines from all around."""
     why_rendered: str = ""
     """A clause on what the tracer of single photons does not cover, so that views have to be rendered."""
-    frame: WorldFrame = WORLD
+    frame: WorldFrame = field(default_factory=WorldFrame)
     """Where the world is in the renderer's own axes."""
     has_instances: bool = False
     """Whether some objects are instances of a group of shapes."""
@@ -76,37 +80,21 @@ def build(
         load_drjit().flush_malloc_cache()  # which keeps what earlier scenes took, in sizes of their own
     assets = assets or read_assets(scene, folder)
     reference = None if scene.mitsuba is None else reference_to(mi, scene.mitsuba, folder)
+    frame = WorldFrame() if reference is None else reference.frame
     own_names = [thing.name for thing in scene.objects]
     names = dict(enumerate((*own_names, *(reference.names if reference else ())), start=1))
     _check_names(names, folder)
-    frame = WORLD if reference is None else reference.frame
-    plugins: dict[str, Any] = {}
     around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
     surroundings = None if around is None else assets.environment(around.file)
-    gain = gain_for(
-        scene.level,
-        scene.lights,
-        surroundings,
-        lambda z_mm: (
-            sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects)
-            + (reference.illuminance_lux(z_mm) if reference else 0.0)
-        ),
-    )
-    patterns, surfaces, reach_mm = (
-        painted_patterns(scene.objects),
-        dict[Hashable, Any](),
-        _reach_mm(scene, assets),
-    )
-    for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
-        plugins[f"{OBJECT}{number}"] = _object(mi, thing, assets, pattern, gain, surfaces, reach_mm, frame)
+    referenced_lux = (lambda _: 0.0) if reference is None else reference.illuminance_lux
+    gain = level_gain(mi, scene, assets, surroundings, referenced_lux)
+    plugins = _object_plugins(mi, scene, assets, gain, frame)
     if scene.backdrop is not None:
-        wall, half = scene.backdrop, scene.backdrop.half_width_mm
-        facing = placed(mi, frame, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
-        plugins[BACKDROP] = {
-            "type": "rectangle",
-            "to_world": facing @ card_pose(mi, 2 * half, 2 * half),
-            "bsdf": two_sided(matt(reflectance_plugin(mi, wall.reflectance))),
-        }
+        wall, side_mm = scene.backdrop, 2 * scene.backdrop.half_width_mm
+        pose = frame.pose(mi, mi.ScalarTransform4f().translate([0.0, 0.0, wall.z_mm]))
+        surface = matt_plugin(reflectance_plugin(mi, wall.reflectance))
+        to_world = pose @ card_pose(mi, side_mm, side_mm)
+        plugins[BACKDROP] = {"type": "rectangle", "to_world": to_world, "bsdf": surface}
     for number, light in enumerate(scene.lights, start=1):
         plugins[f"{LIGHT}{number}"] = light_plugin(mi, light, gain, surroundings, frame)
     scatters = reference is not None and reference.has_media
@@ -114,12 +102,16 @@ def build(
     if reference is not None:
         loaded = reference.build(plugins, integrator, gain)
     else:
-        loaded = _loaded(mi, {"integrator": integrator} | plugins, folder)
+        # Without optimisation: it merges shapes, and merged shapes lose their names. One after the other:
+        # things are numbered as they come, and kernels that know them by other numbers are compiled anew.
+        content = {"type": "scene", "integrator": integrator} | plugins
+        loaded = mi.load_dict(content, parallel=False, optimize=False)
+        _numbers_as_data(mi, loaded)
     filters = None if curves is None else filters_for(curves, main_spectrum(mi, scene))
     shining, why_rendered = list(shining_surfaces(mi, scene, assets, gain, filters)), ""
     if reference is not None:
-        of_reference, why_rendered = reference.shining(loaded, 1 + len(own_names), filters)
-        shining += of_reference
+        surfaces, why_rendered = reference.shining_surfaces(loaded, 1 + len(own_names), filters)
+        shining += surfaces
     ids = {f"{OBJECT}{number}": number for number in range(1, len(own_names) + 1)}
     ids |= {name: number for number, name in names.items() if number > len(own_names)}
     return RenderScene(
@@ -136,59 +128,47 @@ def build(
     )
 
 
-def _loaded(mi: Any, plugins: dict[str, Any], folder: Path) -> Any:
-    try:
-        # Without optimisation: it merges shapes, and merged shapes lose their names. One after the other:
-        # things are numbered as they come, and kernels that know them by other numbers are compiled anew.
-        loaded = mi.load_dict({"type": "scene"} | plugins, parallel=False, optimize=False)
-    except RuntimeError as fault:
-        raise InputError(f"{folder}: the renderer refuses this scene: {_last_line(fault)}") from None
-    _numbers_as_data(mi, loaded)
-    return loaded
-
-
 def _check_names(names: Mapping[int, str], folder: Path) -> None:
     """`InputError` for too many objects, and for one that is called like a shape of the Mitsuba file."""
-    twice = [name for name, count in Counter(names.values()).items() if count > 1]
-    if twice:
-        raise InputError(f"{folder}: an object and a shape of the Mitsuba file are both named '{twice[0]}'")
+    name, count = Counter(names.values()).most_common(1)[0] if names else ("", 0)
+    if count > 1:
+        raise InputError(f"{folder}: an object and a shape of the Mitsuba file are both named '{name}'")
     if len(names) > MOST_OBJECTS:
         raise InputError(f"{folder}: a scene may have {MOST_OBJECTS} objects, and this has {len(names)}")
 
 
+def _object_plugins(mi: Any, scene: Scene, assets: Assets, gain: float, frame: WorldFrame) -> dict[str, Any]:
+    """Shapes of all objects by id; objects that look alike share a surface."""
+    plugins, surfaces, reach_mm = dict[str, Any](), dict[Hashable, Any](), _reach_mm(scene, assets)
+    patterns = paint_patterns(scene.objects)
+    for number, (thing, pattern) in enumerate(zip(scene.objects, patterns, strict=True), start=1):
+        try:
+            key = surface_key(thing.material, thing.shape, assets)
+            if key not in surfaces:
+                surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
+            emitter = emission_plugin(mi, thing, assets, gain)
+            shape = shape_plugin(mi, thing, assets, surfaces[key], emitter, reach_mm, frame)
+        except InputError as fault:
+            raise InputError(f"object '{thing.name}', {fault}") from None
+        plugins[f"{OBJECT}{number}"] = shape
+    return plugins
+
+
 def _reach_mm(scene: Scene, assets: Assets) -> float:
-    """A distance that no two things that the cameras see are farther apart."""
+    """A distance that no two things that the cameras see are farther apart; 0 where no ball shines."""
+    if not any(isinstance(thing.shape, Sphere) and thing.material.emission for thing in scene.objects):
+        return 0.0
     far_mm = 0.0 if scene.backdrop is None else scene.backdrop.z_mm
     for thing in scene.objects:
         match thing.shape:
-            case Sphere(radius_mm=radius_mm):
-                size_mm = radius_mm
+            case Sphere(radius_mm=size_mm):
+                pass
             case Mesh(file=file, scale=scale):
                 size_mm = np.linalg.norm(assets.mesh(file).positions * np.asarray(scale), axis=1).max()
             case shape:
                 size_mm = np.linalg.norm(triangles_of(shape, assets).positions, axis=1).max()
         far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
     return 2 * far_mm
-
-
-def not_finite(render_scene: RenderScene, number: int) -> str:
-    """The sentence for light of an object (0: none) that is no finite number."""
-    name = render_scene.names.get(number)
-    what = "what is seen beside the objects" if name is None else f"object '{name}'"
-    return (
-        f"{what}: its radiance is not a finite number in the renderer's single precision; make lamps that "
-        "are tiny or almost touch it larger, or move them away"
-    )
-
-
-def shape_number(render_scene: RenderScene, hit: Any) -> Any:
-    """Mitsuba's number of the shapes that rays hit in compiled modes: of the instance, where it is one."""
-    mi, dr = render_scene.mi, load_drjit()
-    number = dr.reinterpret_array(mi.UInt32, hit.shape)
-    if not render_scene.has_instances:
-        return number
-    instance = dr.reinterpret_array(mi.UInt32, hit.instance)
-    return dr.select(instance != 0, instance, number)
 
 
 def _numbers_as_data(mi: Any, loaded: Any) -> None:
@@ -216,26 +196,21 @@ def _object_of_shape(loaded: Any, ids: Mapping[str, int]) -> np.ndarray:
     return table
 
 
-def _object(
-    mi: Any,
-    thing: SceneObject,
-    assets: Assets,
-    pattern: np.ndarray | None,
-    gain: float,
-    surfaces: dict[Hashable, Any],
-    reach_mm: float,
-    frame: WorldFrame,
-) -> Any:
-    """The shape of an object; `surfaces` are those made so far, which objects that look alike share."""
-    try:
-        key = surface_key(thing.material, thing.shape, assets)
-        if key not in surfaces:
-            surfaces[key] = mi.load_dict(surface_plugin(mi, thing.material, thing.shape, assets, pattern))
-        emitter = emission_plugin(mi, thing, assets, gain)
-        return placed_shape(mi, thing, assets, surfaces[key], emitter, reach_mm, frame)
-    except InputError as fault:
-        raise InputError(f"object '{thing.name}', {fault}") from None
+def shape_number(render_scene: RenderScene, hit: Any) -> Any:
+    """Mitsuba's number of the shapes that rays hit in compiled modes: of the instance, where it is one."""
+    mi, dr = render_scene.mi, load_drjit()
+    number = dr.reinterpret_array(mi.UInt32, hit.shape)
+    if not render_scene.has_instances:
+        return number
+    instance = dr.reinterpret_array(mi.UInt32, hit.instance)
+    return dr.select(instance != 0, instance, number)
 
 
-def _last_line(fault: BaseException) -> str:
-    return str(fault).strip().splitlines()[-1].strip()
+def not_finite(render_scene: RenderScene, number: int) -> str:
+    """The sentence for light of an object (0: none) that is no finite number."""
+    name = render_scene.names.get(number)
+    what = "what is seen beside the objects" if name is None else f"object '{name}'"
+    return (
+        f"{what}: its radiance is not a finite number in the renderer's single precision; make lamps that "
+        "are tiny or almost touch it larger, or move them away"
+    )

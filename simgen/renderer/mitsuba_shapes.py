@@ -1,6 +1,12 @@
-"""Shapes as Mitsuba's: its own sphere and rectangle, and meshes built in memory, never from a file."""
+"""Where things stand in the renderer, and their shapes: Mitsuba's sphere and rectangle, or meshes.
 
-from dataclasses import replace
+A Mitsuba file that a scene refers to is rendered as it is: cameras, and what else stands in the scene, are
+brought to its axes. To move the file's shapes would be wrong, since not all of Mitsuba's plugins are right in
+every pose (in 3.9 a turned `sdfgrid` is cut off, and curves keep their radius when they are scaled).
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,7 +16,6 @@ from simgen.assets.asset_files import Assets
 from simgen.assets.cutouts import cut_out
 from simgen.assets.solids import globe, triangles_of
 from simgen.assets.triangles import Triangles
-from simgen.renderer.world_frame import WorldFrame
 from simgen.spec.materials import Material
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Card, Mesh, Shape, Sphere
@@ -22,8 +27,65 @@ of 0.01 of the distance the light is right to 4e-4, at 0.001 to 3e-2."""
 BALL_MESH_ROWS = 32
 LEAST_BALL_MESH_ROWS = 6
 STEPS_PER_EDGE = 100
-"""Edges of such a mesh take at least this many steps of single precision, so that its area is right to 1e-4;
-the coarsest mesh may take as few as eight."""
+"""Steps of single precision that an edge of such a mesh takes at least, so that its area is right to 1e-4."""
+LEAST_STEPS_PER_EDGE = 8
+"""The same of the coarsest mesh; a smaller ball is refused."""
+
+
+@dataclass(frozen=True, eq=False)
+class WorldFrame:
+    """The similarity from the world (X right, Y down, Z forward, mm) to the renderer's axes and unit.
+
+    A point p_mm is at `unit` R p_mm + `origin`, with `rotation` R. The default is the world itself.
+    """
+
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    unit: float = 1.0
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    @cached_property
+    def is_world(self) -> bool:
+        """Whether nothing changes, so that numbers stay what they are to the last bit."""
+        return bool(self.unit == 1 and (self.rotation == np.eye(3)).all() and not self.origin.any())
+
+    def points(self, points_mm: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the world in the renderer's axes and unit."""
+        return points_mm if self.is_world else self.unit * points_mm @ self.rotation.T + self.origin
+
+    def directions(self, directions: np.ndarray) -> np.ndarray:
+        """Directions (..., 3) of the world in the renderer's axes."""
+        return directions if self.is_world else directions @ self.rotation.T
+
+    def points_mm(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the renderer in the world."""
+        return points if self.is_world else (points - self.origin) @ self.rotation / self.unit
+
+    def world_directions(self, directions: np.ndarray) -> np.ndarray:
+        """Directions (..., 3) of the renderer in the world's axes."""
+        return directions if self.is_world else directions @ self.rotation
+
+    def z_mm(self, point: Any) -> Any:
+        """Planar depth of the renderer's own points, as one of its arrays or as a number."""
+        if self.is_world:
+            return point.z
+        x, y, z = (float(part) for part in self.rotation[:, 2] / self.unit)
+        # The origin is subtracted first: far points are large numbers.
+        a, b, c = (float(part) for part in self.origin)
+        return x * (point.x - a) + y * (point.y - b) + z * (point.z - c)
+
+    def rigid_pose(self, pose: np.ndarray) -> np.ndarray:
+        """The pose (4, 4) of what has no size, from the world to the renderer's axes."""
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = self.rotation @ pose[:3, :3], self.points(pose[:3, 3])
+        return result
+
+    def pose(self, mi: Any, pose: Any) -> Any:
+        """A pose of Mitsuba's from the world to the renderer's axes and unit."""
+        if self.is_world:
+            return pose
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.unit * self.rotation, self.origin
+        return mi.ScalarTransform4f(matrix) @ pose
 
 
 def pose_of(mi: Any, thing: SceneObject) -> Any:
@@ -35,12 +97,7 @@ def pose_of(mi: Any, thing: SceneObject) -> Any:
     return pose
 
 
-def placed(mi: Any, frame: WorldFrame, pose: Any) -> Any:
-    """A pose in the world as one in the renderer's axes."""
-    return pose if frame.is_world else mi.ScalarTransform4f(frame.matrix) @ pose
-
-
-def placed_shape(
+def shape_plugin(
     mi: Any,
     thing: SceneObject,
     assets: Assets,
@@ -54,34 +111,30 @@ def placed_shape(
     No two things of the scene are farther from each other than `reach_mm`. Raises `InputError` for a ball
     that shines and is smaller than single precision can tell where it stands.
     """
-    T, pose, shape = mi.ScalarTransform4f, placed(mi, frame, pose_of(mi, thing)), thing.shape
-    plain = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
+    T, pose, shape = mi.ScalarTransform4f, frame.pose(mi, pose_of(mi, thing)), thing.shape
+    parts = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
     matrix = np.array(pose.matrix, dtype=np.float64)
-    if thing.material.opacity is None:
-        if (
-            isinstance(shape, Sphere)
-            and emitter is not None
-            and shape.radius_mm < SMALL_BALL_SHARE * reach_mm
-        ):
-            return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3] / frame.unit), matrix, plain)
-        if isinstance(shape, Sphere):
-            return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | plain
-        if isinstance(shape, Card):
-            to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
-            return {"type": "rectangle", "to_world": to_world} | plain
-    return _mesh(mi, solid_parts(shape, thing.material, assets), matrix, plain)
+    is_whole = thing.material.opacity is None
+    if isinstance(shape, Card) and is_whole:
+        to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
+        return {"type": "rectangle", "to_world": to_world} | parts
+    if isinstance(shape, Sphere) and is_whole:
+        if emitter is not None and shape.radius_mm < SMALL_BALL_SHARE * reach_mm:
+            return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3] / frame.unit), matrix, parts)
+        return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | parts
+    return _mesh(mi, solid_parts(shape, thing.material, assets), matrix, parts)
 
 
 def _small_ball(radius_mm: float, position_mm: np.ndarray) -> Triangles:
     """A ball of the sphere's area at this position, as fine as single precision allows."""
     step_mm = float(np.spacing(np.float32(np.abs(position_mm).max() + radius_mm)))
-    rows = int(np.pi * radius_mm / (STEPS_PER_EDGE * step_mm))
-    if np.pi * radius_mm < 8 * LEAST_BALL_MESH_ROWS * step_mm:
-        least_mm = 8 * LEAST_BALL_MESH_ROWS * step_mm / np.pi
+    least_mm = LEAST_STEPS_PER_EDGE * LEAST_BALL_MESH_ROWS * step_mm / np.pi
+    if radius_mm < least_mm:
         raise InputError(
             f"shape.radius_mm: {radius_mm:g} is too small to shine at {np.linalg.norm(position_mm):.4g} mm "
             f"from the cameras; it must be at least {least_mm:.2g}"
         )
+    rows = int(np.pi * radius_mm / (STEPS_PER_EDGE * step_mm))
     ball = globe(radius_mm, min(max(rows, LEAST_BALL_MESH_ROWS), BALL_MESH_ROWS))
     corner = ball.positions.astype(np.float64)[ball.faces]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -102,12 +155,12 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
         raise InputError(f"{where}: it cannot be laid on a sphere; give a mesh")
     check_texcoords(where, "leave it out", shape, assets)
     try:
-        left = cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
+        rest = cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
     except ValueError as fault:
         raise InputError(f"{where}: {fault}") from None
-    if left is None:
+    if rest is None:
         raise InputError(f"{where}: leaves nothing of the surface")
-    return left
+    return rest
 
 
 def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
@@ -122,8 +175,7 @@ def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> N
 def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
     """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces the cameras (-Z).
 
-    Turning about X by 180 degrees brings the normal to -Z and the texture upright: its top row
-    lies at -Y, which is up.
+    Turning about X by 180 degrees brings the normal to -Z and the top row of a texture up, to -Y.
     """
     T = mi.ScalarTransform4f
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
@@ -138,6 +190,7 @@ def globe_pose(mi: Any) -> Any:
 
 
 def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
+    """A mesh of triangles in mm with a surface and an emitter, moved by a matrix (4, 4)."""
     properties = mi.Properties()
     for name, plugin in parts.items():
         properties[name] = plugin

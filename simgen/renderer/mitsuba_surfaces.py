@@ -11,18 +11,9 @@ import numpy as np
 from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
+from simgen.renderer.backend import is_spectral
 from simgen.renderer.mitsuba_shapes import check_texcoords
-from simgen.spec.materials import (
-    Glass,
-    Material,
-    Matt,
-    Metal,
-    Plastic,
-    Principled,
-    Reflectance,
-    Spectrum,
-    is_clear,
-)
+from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, Reflectance, is_clear
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
 from simgen.spectral.spectra import (
@@ -38,26 +29,14 @@ from simgen.spectral.spectra import (
 )
 
 Triple = tuple[float, float, float]
-PRINCIPLED = {
-    "metallic": "metallic",
-    "roughness": "roughness",
-    "spec_trans": "transmission",
-    "clearcoat": "clearcoat",
-}
-"""Parameters of Mitsuba's plugin by the fields of the finish; each a number or a texture."""
 
 
-def two_sided(surface: dict[str, Any]) -> dict[str, Any]:
-    """The same from behind, so that a card or an open mesh is no black hole there."""
-    return {"type": "twosided", "bsdf": surface}
+def matt_plugin(reflectance: dict[str, Any]) -> dict[str, Any]:
+    """A surface that scatters light evenly (Lambert), on both sides."""
+    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
 
 
-def matt(reflectance: dict[str, Any]) -> dict[str, Any]:
-    """Scatters light evenly (Lambert)."""
-    return {"type": "diffuse", "reflectance": reflectance}
-
-
-def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
+def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
     """The pixels of each object's pattern (see `paint`), None if it carries none; several at a time."""
 
     def pixels(thing: SceneObject) -> np.ndarray | None:
@@ -70,24 +49,44 @@ def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | Non
 
 def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
     """A key that is equal for objects that can share a surface, on which pictures lie alike."""
-    laid_out = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
-    return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), laid_out
+    has_texcoords = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
+    return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), has_texcoords
 
 
 def surface_plugin(
     mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
 ) -> dict[str, Any]:
     """The surface of an object of this shape, on both sides; `pattern` are its pixels if it carries one."""
-    finish = material.finish
-    match finish:
+
+    def texture(pixels: np.ndarray, raw: bool = True) -> dict[str, Any]:
+        return texture_plugin(mi, pixels, shape, raw=raw, tiled=material.tiled)
+
+    def reflectance() -> dict[str, Any]:
+        if material.texture is None:
+            assert material.reflectance is not None
+            return reflectance_plugin(mi, material.reflectance)
+        check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
+        pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
+        assert pixels is not None
+        # Pixels are linear, so they are colours as they stand, which spectral variants make spectra.
+        return texture(pixels, raw=not is_spectral(mi))
+
+    def number_or_texture(field: str) -> float | dict[str, Any]:
+        value, where = getattr(material.finish, field), f"material.finish.{field}"
+        if not isinstance(value, str):
+            return value
+        check_texcoords(where, "give a number instead", shape, assets)
+        return texture(assets.numbers(value, where))
+
+    match material.finish:
         case Matt():
-            surface = matt(_reflectance(mi, material, shape, assets, pattern))
+            surface = {"type": "diffuse", "reflectance": reflectance()}
         case Plastic(roughness=alpha):
             surface = {
                 "type": "roughplastic",
                 "distribution": "ggx",
                 "alpha": alpha,
-                "diffuse_reflectance": _reflectance(mi, material, shape, assets, pattern),
+                "diffuse_reflectance": reflectance(),
             }
         case Metal(name=name, roughness=alpha):
             surface = {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
@@ -97,47 +96,31 @@ def surface_plugin(
         case Principled(refractive_index=index, clearcoat_gloss=gloss):
             surface = {
                 "type": "principled",
-                "base_color": _reflectance(mi, material, shape, assets, pattern),
+                "base_color": reflectance(),
                 "eta": index,
+                "metallic": number_or_texture("metallic"),
+                "roughness": number_or_texture("roughness"),
+                "spec_trans": number_or_texture("transmission"),
+                "clearcoat": number_or_texture("clearcoat"),
                 "clearcoat_gloss": gloss,
             }
-            for name, field in PRINCIPLED.items():
-                given = getattr(finish, field)
-                if isinstance(given, str):
-                    where = f"material.finish.{field}"
-                    check_texcoords(where, "give a number instead", shape, assets)
-                    given = texture_plugin(
-                        mi, assets.numbers(given, where), shape, raw=True, tiled=material.tiled
-                    )
-                surface[name] = given
     if material.normal_map is not None:
         check_texcoords("material.normal_map", "leave it out", shape, assets)
-        tilts = texture_plugin(mi, assets.stored(material.normal_map), shape, raw=True, tiled=material.tiled)
+        tilts = texture(assets.stored(material.normal_map))
         surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
-    return surface if is_clear(finish) else two_sided(surface)
-
-
-def _reflectance(
-    mi: Any, material: Material, shape: Shape, assets: Assets, pattern: np.ndarray | None
-) -> dict[str, Any]:
-    if material.texture is None:
-        assert material.reflectance is not None
-        return reflectance_plugin(mi, material.reflectance)
-    check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
-    pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
-    assert pixels is not None
-    # Linear already, so colours are left as they are, but for being made spectra where these are asked.
-    return texture_plugin(mi, pixels, shape, raw=not is_spectral(mi), tiled=material.tiled)
+    return surface if is_clear(material.finish) else {"type": "twosided", "bsdf": surface}
 
 
 def texture_plugin(
     mi: Any, pixels: np.ndarray, shape: Shape, *, raw: bool, tiled: bool = False
 ) -> dict[str, Any]:
     """Pixels (H, W, C) as the texture of this shape; `raw` ones are no colours that become spectra."""
-    ordered = _in_renderers_order(pixels, shape)
+    if isinstance(shape, Card):
+        pixels = pixels[::-1]  # a rectangle's v runs up, an image's rows down
+    pixels = np.ascontiguousarray(pixels)
     # A bitmap is converted, which takes as long as tracing 500 000 paths; only that can become spectra.
-    held = {"data": mi.TensorXf(ordered)} if raw else {"bitmap": _bitmap(mi, ordered)}
-    return held | {
+    source: dict[str, Any] = {"data": mi.TensorXf(pixels)} if raw else {"bitmap": linear_bitmap(mi, pixels)}
+    return source | {
         "type": "bitmap",
         "raw": raw,
         "filter_type": "bilinear",
@@ -146,54 +129,37 @@ def texture_plugin(
     }
 
 
-def _bitmap(mi: Any, pixels: np.ndarray) -> Any:
+def linear_bitmap(mi: Any, pixels: np.ndarray) -> Any:
+    """Linear pixels (H, W, C) as Mitsuba's bitmap."""
     bitmap = mi.Bitmap(pixels)
-    bitmap.set_srgb_gamma(False)  # linear; otherwise a spectral variant takes them for sRGB
+    bitmap.set_srgb_gamma(False)  # otherwise a spectral variant takes them for sRGB
     return bitmap
-
-
-def _in_renderers_order(pixels: np.ndarray, shape: Shape) -> np.ndarray:
-    """A texture's pixels (H, W, C) in the order that the renderer takes them for this shape."""
-    if isinstance(shape, Card):
-        pixels = pixels[::-1]  # a rectangle's v runs up, an image's rows down
-    return np.ascontiguousarray(pixels)
 
 
 def aspect_of(shape: Shape) -> float:
     """Width over height of what a shape's texture is laid on: a sphere's and a cylinder's go once round."""
     match shape:
-        case Card():
+        case Card() | Box():
             return shape.width_mm / shape.height_mm
         case Sphere():
             return 2.0
         case Cylinder():
             return 2 * math.pi * shape.radius_mm / shape.length_mm
-        case Box():
-            return shape.width_mm / shape.height_mm
         case _:
             return 1.0
-
-
-def is_spectral(mi: Any) -> bool:
-    """Whether rays carry wavelengths; else linear sRGB."""
-    return "spectral" in mi.variant()
 
 
 def reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
     """One reflectance all over. In a spectral variant sRGB is turned into a smooth spectrum by Mitsuba."""
     if isinstance(reflectance, tuple):
         return {"type": "rgb", "value": srgb_to_linear(np.array(reflectance)).tolist()}
-    values = spectrum_of(reflectance)
-    return (
-        spectrum_plugin(values) if is_spectral(mi) else {"type": "rgb", "value": linear_srgb(values).tolist()}
-    )
-
-
-def spectrum_of(reflectance: str | Spectrum) -> np.ndarray:
-    """A reflectance (N,) that is given as a spectrum or as the name of a patch."""
     if isinstance(reflectance, str):
-        return patch(reflectance)
-    return resampled(reflectance.wavelength_nm, reflectance.value)
+        spectrum = patch(reflectance)
+    else:
+        spectrum = resampled(reflectance.wavelength_nm, reflectance.value)
+    if is_spectral(mi):
+        return spectrum_plugin(spectrum)
+    return {"type": "rgb", "value": linear_srgb(spectrum).tolist()}
 
 
 def radiance_plugin(mi: Any, luminance_cd_m2: float, colour: str | Triple) -> dict[str, Any]:

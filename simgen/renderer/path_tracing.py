@@ -1,10 +1,10 @@
 """Light paths, one for each of many camera rays at once: what is hit first, and unbiased radiance.
 
 The estimator is path tracing with next-event estimation (Kajiya 1986) and multiple importance sampling
-by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp
-chosen at random: a candidate photon is accepted in proportion to its path's radiance, so the less that
-varies, the fewer candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays
-with an element for each ray. Needs a compiled backend.
+by the power heuristic (Veach 1997). At every hit each lamp is sampled, instead of one lamp chosen at random:
+a candidate photon is accepted in proportion to its path's radiance, so the less that varies, the fewer
+candidates are needed. Everything here stays on the renderer's side, as Dr.Jit arrays with an element for
+each ray, and needs a compiled backend.
 """
 
 from dataclasses import dataclass
@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from simgen.renderer.backend import is_scalar, load_drjit
-from simgen.renderer.device_arrays import floats
+from simgen.renderer.backend import is_scalar, load_drjit, vectors
 from simgen.renderer.mitsuba_scene import RenderScene, shape_number
 from simgen.renderer.wavelengths import Light
 
 STRATA = 2
 """At the first hit each lamp is sampled in 2 x 2 cells of its surface: what is near varies most."""
 BOUNCES = 2
-"""From the first hit so many directions are followed: a surface nearby that shines on it is rarely met."""
+"""Directions that are followed from the first hit: a surface nearby that shines on it is rarely met."""
 ROULETTE_THROUGHPUT = 0.05
 """Russian roulette ends paths whose throughput since the first hit is below this, in proportion to it.
 
@@ -29,7 +28,9 @@ Larger: more noise from what is left of such a path. Smaller: longer paths, abov
 LEAST_REFLECTANCE = 0.001
 """A surface is never guessed to be less reflective than this: it may shine."""
 LEAST_RADIANCE = 1e-9
-"""What is guessed of nothing, so that it can be divided by."""
+"""The guess where nothing is hit, so that it can be divided by."""
+DIRECTIONS = 256
+"""Evenly spread directions in which light from all around is looked at."""
 GOLDEN = (5**0.5 - 1) / 2
 """Its multiples, less their whole parts, are evenly spread."""
 
@@ -53,41 +54,38 @@ def hit_first(render_scene: RenderScene, ray: Any, active: Any, ambient: Any) ->
     mi, dr = render_scene.mi, load_drjit()
     record = render_scene.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
     hit = record.compute_surface_interaction(ray, mi.RayFlags.All, active)
-    found = active & hit.is_valid()
-    shape = dr.select(found, shape_number(render_scene, hit), 0)
-    z_mm = dr.select(found, render_scene.frame.z_mm(hit.p), dr.inf)
-    missed = active & ~found
+    is_hit, missed = active & hit.is_valid(), active & ~hit.is_valid()
+    shape = dr.select(is_hit, shape_number(render_scene, hit), 0)
+    z_mm = dr.select(is_hit, render_scene.frame.z_mm(hit.p), dr.inf)
     guess = hit.emitter(render_scene.scene, missed).eval(hit, missed)
     bsdf, context = hit.bsdf(ray), mi.BSDFContext()
     for lamp in _lamps(render_scene.scene):
-        towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), found)
-        scattered = bsdf.eval(context, hit, hit.to_local(towards.d), found)
-        guess += dr.select(found & (towards.pdf > 0), scattered * weight, 0)
-    reflectance = bsdf.eval_diffuse_reflectance(hit, found)
-    guess += dr.select(found, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
+        towards, weight = lamp.sample_direction(hit, mi.Point2f(0.5, 0.5), is_hit)
+        scattered = bsdf.eval(context, hit, hit.to_local(towards.d), is_hit)
+        guess += dr.select(is_hit & (towards.pdf > 0), scattered * weight, 0)
+    reflectance = bsdf.eval_diffuse_reflectance(hit, is_hit)
+    guess += dr.select(is_hit, ambient * dr.clip(reflectance, LEAST_REFLECTANCE, 1), LEAST_RADIANCE)
     return FirstHits(record, shape, z_mm, guess)
 
 
 def surrounding_radiance(render_scene: RenderScene, light: Light) -> np.ndarray:
     """What pixels of each colour see of the mean of what shines from all around; (3,) or (C,), float64."""
-    mi, dr = render_scene.mi, load_drjit()
-    around = render_scene.scene.environment()
-    number = dr.arange(mi.Float, 256) + 0.5
-    # Evenly spread directions (a Fibonacci lattice).
-    up, turn = 1 - number / 128, number * (dr.pi * (3 - 5**0.5))
+    mi, dr, around = render_scene.mi, load_drjit(), render_scene.scene.environment()
+    number = dr.arange(mi.Float, DIRECTIONS) + 0.5
+    # A Fibonacci lattice.
+    up, turn = 1 - number / (DIRECTIONS / 2), number * (dr.pi * (3 - 5**0.5))
     across = dr.sqrt(1 - up * up)
-    away = dr.zeros(mi.SurfaceInteraction3f, 256)
+    away = dr.zeros(mi.SurfaceInteraction3f, DIRECTIONS)
     away.wi = mi.Vector3f(across * dr.cos(turn), across * dr.sin(turn), up)
-    found: Any = 0.0
-    for colour in light.colours_to_follow(dr.zeros(mi.UInt32, 256)):
-        # The directions are in no order of colour, so that any will do for wavelengths.
-        wavelength_sample = number * GOLDEN - dr.floor(number * GOLDEN)
-        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, 256), colour, wavelength_sample).wavelengths
+    # The directions are in no order of colour, so that any numbers will do for wavelengths.
+    wavelength_sample = number * GOLDEN - dr.floor(number * GOLDEN)
+    total: Any = 0.0
+    for colour in light.colours_to_follow(dr.zeros(mi.UInt32, DIRECTIONS)):
+        away.wavelengths = light.aim(dr.zeros(mi.Ray3f, DIRECTIONS), colour, wavelength_sample).wavelengths
         radiance = mi.Spectrum(0) if around is None else around.eval(away)
-        found += np.array(light.per_colour(radiance, colour, wavelength_sample)).mean(
-            axis=1, dtype=np.float64
-        )
-    return found
+        seen = np.array(light.per_colour(radiance, colour, wavelength_sample))
+        total += seen.mean(axis=1, dtype=np.float64)
+    return total
 
 
 def bright_directions(render_scene: RenderScene, number: int, seed: int) -> np.ndarray:
@@ -100,14 +98,14 @@ def bright_directions(render_scene: RenderScene, number: int, seed: int) -> np.n
         return np.zeros((0, 3))
     points = np.random.default_rng(seed).random((number, 2))
     if is_scalar(mi):
-        seen_from = mi.Interaction3f()
-        drawn = (around[0].sample_direction(seen_from, mi.Point2f(point))[0] for point in points.tolist())
-        return render_scene.frame.world_directions(np.array([np.ravel(sample.d) for sample in drawn]))
-    seen_from = load_drjit().zeros(mi.Interaction3f, number)
-    sample, _ = around[0].sample_direction(
-        seen_from, mi.Point2f(*(floats(mi, column) for column in points.T))
-    )
-    return render_scene.frame.world_directions(np.array(sample.d).T.astype(np.float64))
+        place = mi.Interaction3f()
+        samples = (around[0].sample_direction(place, mi.Point2f(point))[0] for point in points.tolist())
+        directions = np.array([np.ravel(sample.d) for sample in samples])
+    else:
+        place = load_drjit().zeros(mi.Interaction3f, number)
+        sample, _ = around[0].sample_direction(place, vectors(mi, mi.Point2f, points))
+        directions = np.array(sample.d).T.astype(np.float64)
+    return render_scene.frame.world_directions(directions)
 
 
 def _lamps(scene: Any) -> list[Any]:
@@ -118,8 +116,8 @@ def _lamps(scene: Any) -> list[Any]:
 def _surroundings(mi: Any, scene: Any) -> list[Any]:
     """The image of what shines from all around, if there is one: a sun in it is to be aimed at.
 
-    Uniform surroundings are found by following the surface's own scattering, which has no variance but
-    for what stands in the way.
+    Uniform surroundings are met by following the surface's own scattering, which has no variance but for what
+    stands in the way.
     """
     around = scene.environment()
     varies = around is not None and mi.has_flag(around.flags(), mi.EmitterFlags.SpatiallyVarying)
@@ -145,28 +143,19 @@ def radiance_along(render_scene: RenderScene, ray: Any, record: Any, sampler: An
     radiance += tracer.direct_light(hit, bsdf, sampler, STRATA, BOUNCES, is_hit)
     left = dr.opaque(mi.UInt32, max_depth - 2)  # as data, so that paths of all lengths share one kernel
     for bounce in range(BOUNCES):
-        onward = tracer.next_segment(hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit)
-        path = _Path(onward.ray, onward.hit, onward.emitted, mi.Spectrum(1), onward.goes_on, left, sampler)
+        onward, weight = tracer.next_segment(hit, bsdf, sampler, STRATA, BOUNCES, bounce, is_hit)
+        path = _Path(*onward, mi.Spectrum(1), left, sampler)
         if max_depth > 2:
-            path = tracer.follow(path)
+            # A loop also for short paths: it is as fast as unrolled segments.
+            (path,) = dr.while_loop(
+                (path,),
+                lambda path: path.active & (path.left > 0),
+                lambda path: (tracer.lengthen(path),),
+                label="path",
+            )
         sampler = path.sampler
-        radiance += onward.weight * path.radiance / BOUNCES
+        radiance += weight * path.radiance / BOUNCES
     return radiance
-
-
-@dataclass(frozen=True)
-class _Segment:
-    """A segment of a path, in a direction that the surface at its beginning chose.
-
-    `weight` is what share of the light that arrives along `ray` leaves the surface, 0 for rays that are not
-    active; `emitted` is what shines where the segment ends at `hit`, weighted against aiming at it.
-    """
-
-    ray: Any
-    hit: Any
-    weight: Any
-    emitted: Any
-    goes_on: Any
 
 
 @dataclass
@@ -180,9 +169,9 @@ class _Path:
 
     ray: Any
     hit: Any
+    active: Any
     radiance: Any
     throughput: Any
-    active: Any
     left: Any
     sampler: Any
 
@@ -193,36 +182,25 @@ class _Tracer:
     def __init__(self, render_scene: RenderScene) -> None:
         self.mi, self.dr, self.scene = render_scene.mi, load_drjit(), render_scene.scene
         self.context = self.mi.BSDFContext()
-        around = _surroundings(render_scene.mi, render_scene.scene)
-        self.lamps, self.aims_around = _lamps(render_scene.scene) + around, bool(around)
+        around = _surroundings(self.mi, self.scene)
+        self.lamps, self.aims_around = _lamps(self.scene) + around, bool(around)
 
-    def follow(self, path: _Path) -> _Path:
-        """The same paths at their ends."""
-        # A loop also for short paths: it is as fast as unrolled segments, and one kernel serves all lengths.
-        (path,) = self.dr.while_loop(
-            (path,),
-            lambda path: path.active & (path.left > 0),
-            lambda path: (self._lengthened(path),),
-            label="path",
-        )
-        return path
-
-    def _lengthened(self, path: _Path) -> _Path:
+    def lengthen(self, path: _Path) -> _Path:
         """Paths with one more segment, unless Russian roulette (Arvo and Kirk 1990) ends them."""
         dr, sampler = self.dr, path.sampler
         bsdf = path.hit.bsdf(path.ray)
         direct = self.direct_light(path.hit, bsdf, sampler, 1, 1, path.active)
-        onward = self.next_segment(path.hit, bsdf, sampler, 1, 1, 0, path.active)
-        throughput = path.throughput * onward.weight
-        radiance = path.radiance + path.throughput * direct + throughput * onward.emitted
+        (ray, hit, active, emitted), weight = self.next_segment(path.hit, bsdf, sampler, 1, 1, 0, path.active)
+        throughput = path.throughput * weight
+        radiance = path.radiance + path.throughput * direct + throughput * emitted
         left = path.left - 1
-        active = onward.goes_on & dr.any(throughput != 0) & (left > 0)
+        active &= dr.any(throughput != 0) & (left > 0)
         largest = dr.max(throughput)
         is_faint = active & (largest < ROULETTE_THROUGHPUT)
         # Only faint paths draw a number, so that the others are those without roulette.
         active &= ~is_faint | (sampler.next_1d(is_faint) * ROULETTE_THROUGHPUT < largest)
         throughput = dr.select(is_faint, throughput * (ROULETTE_THROUGHPUT / largest), throughput)
-        return _Path(onward.ray, onward.hit, radiance, throughput, active, left, sampler)
+        return _Path(ray, hit, active, radiance, throughput, left, sampler)
 
     def direct_light(self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, active: Any) -> Any:
         """Light straight from all lamps, from `side` x `side` points of each, that leaves `hit` backwards."""
@@ -233,12 +211,26 @@ class _Tracer:
                 radiance += self._direct(lamp, hit, bsdf, point, side**2, bounces, active) / side**2
         return radiance
 
+    def _direct(
+        self, lamp: Any, hit: Any, bsdf: Any, point: Any, tries: int, bounces: int, active: Any
+    ) -> Any:
+        mi, dr = self.mi, self.dr
+        able = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
+        towards, weight = lamp.sample_direction(hit, point, able)
+        able &= towards.pdf != 0
+        blocked = self.scene.ray_test(hit.spawn_ray_to(towards.p), able)
+        value, pdf = bsdf.eval_pdf(self.context, hit, hit.to_local(towards.d), able)
+        mis_weight = dr.select(towards.delta, 1, _power_heuristic(tries * towards.pdf, bounces * pdf))
+        return dr.select(able & ~blocked, value * weight * mis_weight, 0)
+
     def next_segment(
         self, hit: Any, bsdf: Any, sampler: Any, side: int, bounces: int, bounce: int, active: Any
-    ) -> _Segment:
-        """The segment that leaves `hit` as the number `bounce` of `bounces`.
+    ) -> tuple[tuple[Any, Any, Any, Any], Any]:
+        """The segment that leaves `hit` as number `bounce` of `bounces`, in a direction that `bsdf` chose.
 
-        At each lamp `side` x `side` points are aimed at besides.
+        Its ray, its end, whether a path goes on from there, and what shines there, weighted against aiming at
+        it: at `side` x `side` points of each lamp. Last the share of the light along the ray that leaves
+        `hit`, 0 for rays that are not active.
         """
         mi, dr, scene = self.mi, self.dr, self.scene
         across = sampler.next_2d(active)
@@ -250,31 +242,13 @@ class _Tracer:
         lamp = arrival.emitter(scene, active)
         towards = mi.DirectionSample3f(scene, arrival, mi.Interaction3f(hit))
         # Lamps could have been aimed at instead, but not evenly lit surroundings behind everything.
-        aimed = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
+        could_be_aimed_at = ~mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
         if not self.aims_around:
-            aimed &= arrival.is_valid()
+            could_be_aimed_at &= arrival.is_valid()
         pdf_lamp = side**2 * lamp.pdf_direction(mi.Interaction3f(hit), towards, active)
-        mis_weight = dr.select(aimed, _power_heuristic(bounces * sample.pdf, pdf_lamp), 1)
-        return _Segment(
-            ray,
-            arrival,
-            dr.select(active, weight, 0),
-            dr.select(active, lamp.eval(arrival, active) * mis_weight, 0),
-            active & arrival.is_valid(),
-        )
-
-    def _direct(
-        self, lamp: Any, hit: Any, bsdf: Any, point: Any, tries: int, bounces: int, active: Any
-    ) -> Any:
-        """Light that arrives straight from one lamp and is scattered towards where we came from."""
-        mi, dr = self.mi, self.dr
-        able = active & mi.has_flag(bsdf.flags(), mi.BSDFFlags.Smooth)
-        towards, weight = lamp.sample_direction(hit, point, able)
-        able &= towards.pdf != 0
-        blocked = self.scene.ray_test(hit.spawn_ray_to(towards.p), able)
-        value, pdf = bsdf.eval_pdf(self.context, hit, hit.to_local(towards.d), able)
-        mis_weight = dr.select(towards.delta, 1, _power_heuristic(tries * towards.pdf, bounces * pdf))
-        return dr.select(able & ~blocked, value * weight * mis_weight, 0)
+        mis_weight = dr.select(could_be_aimed_at, _power_heuristic(bounces * sample.pdf, pdf_lamp), 1)
+        emitted = dr.select(active, lamp.eval(arrival, active) * mis_weight, 0)
+        return (ray, arrival, active & arrival.is_valid(), emitted), dr.select(active, weight, 0)
 
 
 def _power_heuristic(pdf: Any, other: Any) -> Any:

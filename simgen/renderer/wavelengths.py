@@ -4,73 +4,48 @@ Everything here is on the renderer's side: Dr.Jit arrays with an element for eac
 """
 
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Any
 
 from pcii.base.srgb import LUMINANCE
-from simgen.renderer.backend import load_drjit
-from simgen.renderer.device_arrays import floats
+from simgen.renderer.backend import floats, load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral.filters import CELLS, HEROES, Filters
 from simgen.spectral.spectra import WAVELENGTH_NM
 
 
-class Light(Protocol):
-    """What rays carry, for pixels of a `colour` (its number).
+class Light:
+    """What rays carry for pixels of a `colour` (its number): here linear sRGB, all colours at once.
 
     `wavelength_sample` is what `wavelength_samples` gave the ray.
     """
-
-    def wavelength_samples(self, sampler: Any, number: int) -> Any:
-        """Random numbers that decide on wavelengths."""
-        ...
-
-    def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """The ray with the wavelengths that it is followed at."""
-        ...
-
-    def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """Light from all around, which is `ambient` in each colour, as rays carry it."""
-        ...
-
-    def colours_to_follow(self, colour: Any) -> Iterator[Any]:
-        """Colours to follow rays in, one after the other, so that together they show all."""
-        ...
-
-    def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        """Radiance in each colour, as far as these wavelengths show it; 0 in the other colours."""
-        ...
-
-
-class Colours:
-    """Linear sRGB: every ray carries all colours."""
 
     def __init__(self, mi: Any, cfa: str | None) -> None:
         self.mi, self.cfa = mi, cfa
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
-        """None are needed: zeros."""
+        """Random numbers that decide on wavelengths; zeros where there are none."""
         return load_drjit().zeros(self.mi.Float, number)
 
     def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """See `Light`."""
+        """The ray with the wavelengths that it is followed at."""
         return ray
 
     def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """See `Light`."""
+        """Light from all around, which is `ambient` in each colour, as rays carry it."""
         return self.mi.Color3f(*ambient) if len(ambient) == 3 else self.mi.Color3f(ambient[0])
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
-        """See `Light`."""
+        """Colours to follow rays in, one after the other, so that together they show all."""
         yield colour
 
     def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        """R, G, B, or luminance for a monochrome sensor."""
+        """Radiance in each colour that these wavelengths show, 0 in the others; luminance without a CFA."""
         if self.cfa is not None:
             return list(radiance)
         return [sum(float(share) * part for share, part in zip(LUMINANCE, radiance, strict=True))]
 
 
-class Wavelengths:
+class SpectralLight(Light):
     """Four wavelengths for each ray, drawn for its own pixel's filter."""
 
     def __init__(self, mi: Any, filters: Filters) -> None:
@@ -81,38 +56,34 @@ class Wavelengths:
         self.white = floats(mi, filters.white)
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
-        """See `Light`."""
         return sampler.next_1d()
 
     def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """See `Light`."""
-        ray.wavelengths = self._drawn(colour, wavelength_sample)[0]
+        ray.wavelengths = self._draw(colour, wavelength_sample)[0]
         return ray
 
     def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
-        """See `Light`: of the spectrum of most of the light."""
+        # It has the spectrum of most of the light.
         dr = load_drjit()
-        chosen_nm, _ = self._drawn(colour, wavelength_sample)
+        wavelengths_nm, _ = self._draw(colour, wavelength_sample)
         white = dr.gather(self.mi.Float, self.white, colour)
         relative = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
-        return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in chosen_nm))
+        return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in wavelengths_nm))
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
-        """See `Light`."""
         for other in range(self.channels):
             yield load_drjit().full(self.mi.UInt32, other, len(colour))
 
     def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        """See `Light`."""
         dr = load_drjit()
-        _, weight = self._drawn(colour, wavelength_sample)
+        _, weight = self._draw(colour, wavelength_sample)
         total = dr.sum(radiance * weight)
         return [dr.select(colour == other, total, 0) for other in range(self.channels)]
 
-    def _drawn(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
+    def _draw(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
         """Wavelengths and their weights, as `Filters.draw` has them."""
         mi, dr = self.mi, load_drjit()
-        chosen_nm, weight = [], []
+        wavelengths_nm, weight = [], []
         for hero in range(HEROES):
             place = (wavelength_sample + hero) * (CELLS / HEROES)
             cell = dr.minimum(mi.UInt32(place), CELLS - 1)
@@ -120,9 +91,9 @@ class Wavelengths:
             low, high = dr.gather(mi.Float, self.cell_nm, first), dr.gather(mi.Float, self.cell_nm, first + 1)
             here_nm = low + (high - low) * (place - mi.Float(cell))
             curve = self._at(self.sensitivity, here_nm, colour * WAVELENGTH_NM.size)
-            chosen_nm.append(here_nm)
+            wavelengths_nm.append(here_nm)
             weight.append(curve * (high - low) * (CELLS / HEROES))
-        return mi.Spectrum(*chosen_nm), mi.Spectrum(*weight)
+        return mi.Spectrum(*wavelengths_nm), mi.Spectrum(*weight)
 
     def _at(self, table: Any, wavelength_nm: Any, start: Any) -> Any:
         """A table's value at a wavelength; its row begins at `start`."""
@@ -136,14 +107,13 @@ class Wavelengths:
 def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     """How rays carry light in this scene's variant."""
     if render_scene.filters is None:
-        return Colours(render_scene.mi, cfa)
-    return Wavelengths(render_scene.mi, render_scene.filters)
+        return Light(render_scene.mi, cfa)
+    return SpectralLight(render_scene.mi, render_scene.filters)
 
 
 def of_colour(values: Any, colour: Any) -> Any:
     """Each element's value in its own colour, of `values` in all colours."""
-    dr = load_drjit()
-    values = list(values)
+    dr, values = load_drjit(), list(values)
     if len(values) == 1:
         return values[0]
     return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))

@@ -31,13 +31,12 @@ def film(height: int = 32, width: int = 32, focal_mm: float = 50.0) -> CameraGri
     )
 
 
+def thing(name: str, x_mm: float, y_mm: float, z_mm: float, material: dict, **shape: Any) -> dict[str, Any]:
+    return {"name": name, "position_mm": (x_mm, y_mm, z_mm), "shape": shape, "material": material}
+
+
 def card(z_mm: float, size_mm: float, material: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "name": "card",
-        "position_mm": (0.0, 0.0, z_mm),
-        "shape": {"type": "card", "width_mm": size_mm, "height_mm": size_mm},
-        "material": material,
-    }
+    return thing("card", 0.0, 0.0, z_mm, material, type="card", width_mm=size_mm, height_mm=size_mm)
 
 
 def made(
@@ -78,12 +77,6 @@ def thinned(
     return thin_photons(setup, photons, seed=seed, photons_per_radiance=gain)
 
 
-def counted(photons: PhotonTable, grid: CameraGrid) -> np.ndarray:
-    counts = np.zeros((grid.height, grid.width))
-    np.add.at(counts, (photons.i, photons.j), 1)
-    return counts
-
-
 def surprise(
     photons: PhotonTable, radiance: np.ndarray, grid: CameraGrid, gain: float, block_px: int = 4
 ) -> float:
@@ -91,7 +84,8 @@ def surprise(
 
     Blocks of each colour, but those where less than five photons are expected, are compared.
     """
-    counts, rates = counted(photons, grid), gain * mosaic(radiance, "GRBG")
+    counts, rates = np.zeros((grid.height, grid.width)), gain * mosaic(radiance, "GRBG")
+    np.add.at(counts, (photons.i, photons.j), 1)
     colours = colour_index(grid.height, grid.width, "GRBG")
     found, expected = (
         np.concatenate([on_blocks(values * (colours == colour), block_px).ravel() for colour in range(3)])

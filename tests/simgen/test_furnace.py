@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lit_views import SCALAR, card, film, made, seen, thinned, white
+from lit_views import SCALAR, card, film, made, seen, thing, thinned, white
 
 from pcii.core.bayer import colour_index
 from simgen.renderer import backend
@@ -32,20 +32,9 @@ def variant_is_put_back() -> Iterator[None]:
 
 def things(material: dict[str, Any]) -> list[dict[str, Any]]:
     """A ball and a turned box before a card that fills the view."""
-    ball = {
-        "name": "ball",
-        "position_mm": (-60.0, 20.0, 400.0),
-        "shape": {"type": "sphere", "radius_mm": 55.0},
-        "material": material,
-    }
-    box = {
-        "name": "box",
-        "position_mm": (60.0, -30.0, 420.0),
-        "rotation_deg": (20.0, 35.0, 0.0),
-        "shape": {"type": "box", "width_mm": 70.0, "height_mm": 90.0, "depth_mm": 60.0},
-        "material": material,
-    }
-    return [ball, box, card(600.0, 600.0, material)]
+    ball = thing("ball", -60.0, 20.0, 400.0, material, type="sphere", radius_mm=55.0)
+    box = thing("box", 60.0, -30.0, 420.0, material, type="box", width_mm=70, height_mm=90, depth_mm=60)
+    return [ball, box | {"rotation_deg": (20.0, 35.0, 0.0)}, card(600.0, 600.0, material)]
 
 
 def matt(reflectance: Any) -> dict[str, Any]:
@@ -69,8 +58,8 @@ def test_thinned_photons_see_nothing_in_the_furnace(spectral: bool) -> None:
     # Each thing alone, so that short paths, which are unrolled, leave nothing out.
     wanted = 5_000 if SCALAR else 200_000
     colours = colour_index(GRID.height, GRID.width, "GRBG")
-    for thing in things(matt(TELLS_NOTHING))[: 1 if SCALAR else 3]:
-        built = made([thing], [EVERYWHERE], spectral=spectral)
+    for alone in things(matt(TELLS_NOTHING))[: 1 if SCALAR else 3]:
+        built = made([alone], [EVERYWHERE], spectral=spectral)
         gain = wanted / GRID.height / GRID.width / white(built).mean()
         photons, _ = thinned(built, GRID, 2, gain)
         found = np.bincount(colours[photons.i, photons.j], minlength=3)
@@ -96,14 +85,9 @@ def test_plastic_gives_no_more_than_it_gets(roughness: float, spectral: bool) ->
 @both_modes
 @pytest.mark.parametrize("pane", [False, True], ids=["ball", "pane"])
 def test_glass_in_the_furnace_cannot_be_seen(pane: bool, spectral: bool) -> None:
-    ball = {"type": "sphere", "radius_mm": 80.0}
-    glass = {
-        "name": "glass",
-        "position_mm": (0.0, 0.0, 300.0),
-        "rotation_deg": (0.0, 30.0, 0.0),
-        "shape": {"type": "card", "width_mm": 150.0, "height_mm": 150.0} if pane else ball,
-        "material": {"finish": {"type": "glass"}},
-    }
+    material = {"finish": {"type": "glass"}}
+    ball = thing("ball", 0.0, 0.0, 300.0, material, type="sphere", radius_mm=80.0)
+    glass = (card(300.0, 150.0, material) if pane else ball) | {"rotation_deg": (0.0, 30.0, 0.0)}
     view = seen(made([glass], [EVERYWHERE], spectral=spectral, max_depth=DEPTH), GRID, 256)
     # Every path brings 1 but those that are given up or still inside after 12 segments, one in 100 000.
     # The wavelengths that are drawn vary by 0.3 (half a million paths in all, and 256 in a pixel).

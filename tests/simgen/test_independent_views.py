@@ -113,18 +113,6 @@ def test_all_pairs_of_a_hundred_views_have_noise_of_their_own(
     assert (likeness(pixels) > 0.5).sum() == 1  # 0.7: half of that view is the other
 
 
-def test_one_seed_for_two_views_is_caught(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    exact = seeds._sequence
-
-    def slipped(seed: int, stage: seeds.Stage, view: int, *rest: int) -> np.random.SeedSequence:
-        return exact(seed, stage, 41 if view == 73 else view, *rest)
-
-    monkeypatch.setattr(seeds, "_sequence", slipped)
-    found = likeness(rendered(tmp_path))
-    assert (found > MOST).sum() == 1
-    assert found.max() > 0.9
-
-
 def test_a_grid_has_as_many_seeds_as_views() -> None:
     for stage in ("radiance", "photons", "full light"):
         own = {seeds.integer(11, view=view, stage=stage) for view in range(10_000)}

@@ -11,7 +11,6 @@ from lit_views import SCALAR, card, film, made, seen, sky, surprise, thinned
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, srgb_to_linear
 from simgen.renderer import backend
-from simgen.spec.lights import DirectionalLight
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GREY = 0.6
@@ -55,11 +54,8 @@ def point(x: float, y: float, z: float, intensity_cd: float) -> dict[str, Any]:
     return {"type": "point", "position_mm": (x, y, z), "intensity_cd": intensity_cd}
 
 
-PLACES = [(0.0, 0.0, 300.0), (200.0, -150.0, 100.0), (-100.0, 60.0, -400.0)]
-
-
-@pytest.mark.parametrize("place", PLACES)
-def test_a_points_light_falls_off_with_the_square_and_the_cosine(place: tuple[float, float, float]) -> None:
+def test_a_points_light_falls_off_with_the_square_and_the_cosine() -> None:
+    place = (200.0, -150.0, 100.0)
     view = seen(made([FLAT], [point(*place, 2.5)]), GRID, 256)
     expected = in_pixels(lit_by_a_point(np.array(place), 2.5, fine=8))
     # Only the place within a pixel varies: by a few per cent, of which 256 paths leave a sixteenth.
@@ -69,29 +65,6 @@ def test_a_points_light_falls_off_with_the_square_and_the_cosine(place: tuple[fl
     other = lit_by_a_point(np.add(place, (0, 0, 1)), 2.5)
     assert abs(view.mean() / other.mean() - 1) > 5e-4
     assert abs(view.mean() / (1.01 * expected.mean()) - 1) > 5e-4
-
-
-def test_a_points_light_in_spectra_is_that_in_colours() -> None:
-    place = PLACES[1]
-    grey = {"wavelength_nm": (400, 700), "value": (RHO, RHO)}
-    lamp = point(*place, 2.5) | {"illuminant": "A"}
-    built = made([card(Z_MM, 600.0, {"reflectance": grey})], [lamp], spectral=True)
-    expected = lit_by_a_point(np.array(place), 2.5, fine=8).mean()
-    # A quarter of a million paths whose wavelengths vary by 0.5 of the mean.
-    np.testing.assert_allclose(seen(built, GRID, 256).mean(axis=(0, 1)), expected, rtol=5e-3)
-
-
-def test_photons_of_a_points_light_fall_off_likewise() -> None:
-    place, wanted = PLACES[1], 20_000 if SCALAR else 400_000
-    expected = in_pixels(lit_by_a_point(np.array(place), 2.5, fine=8))
-    gain = wanted / expected.sum()
-    photons, _ = thinned(made([FLAT], [point(*place, 2.5)]), GRID, 2, gain)
-    assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
-    # The fault: the cosine is forgotten.
-    y, x = np.indices((32, 32)) - 15.5
-    distance_mm = np.linalg.norm(np.stack([10 * x - place[0], 10 * y - place[1], 0 * x + 400]), axis=0)
-    bare = expected * distance_mm / distance_mm.mean()
-    assert surprise(photons, bare[..., None].repeat(3, axis=2), GRID, gain) > (4 if SCALAR else 10)
 
 
 SPOT = point(150.0, -80.0, 100.0, 2.5) | {
@@ -120,6 +93,9 @@ def test_a_spot_is_bright_in_its_beam_and_dark_beyond_its_cutoff() -> None:
     gain = (20_000 if SCALAR else 400_000) / expected.sum()
     photons, _ = thinned(built, GRID, 2, gain)
     assert abs(surprise(photons, expected[..., None].repeat(3, axis=2), GRID, gain)) < 5
+    # The fault: light is as strong at the rim of the cone as in its middle.
+    flat = expected.sum() * (expected > 0)[..., None].repeat(3, axis=2) / (expected > 0).sum()
+    assert surprise(photons, flat, GRID, gain) > 10
 
 
 DIRECTIONAL = {"type": "directional", "direction": (0.3, 0.8, 1.5), "illuminance_lux": 40.0}
@@ -128,12 +104,7 @@ DIRECTIONAL = {"type": "directional", "direction": (0.3, 0.8, 1.5), "illuminance
 @pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
 def test_parallel_light_is_even_and_throws_a_shadow_along_its_direction(spectral: bool) -> None:
     grey = {"reflectance": {"wavelength_nm": (400, 700), "value": (RHO, RHO)}}
-    blind = {
-        "name": "blind",
-        "position_mm": (0.0, 0.0, Z_MM - 40),
-        "shape": {"type": "card", "width_mm": 60.0, "height_mm": 60.0},
-        "material": {"reflectance": [0, 0, 0]},
-    }
+    blind = card(Z_MM - 40, 60.0, {"reflectance": [0, 0, 0]}) | {"name": "blind"}
     # Both stand where a camera without parallax sees them: the blind at (0, 0), its shadow 40 mm behind it.
     view = seen(made([card(Z_MM, 600.0, grey), blind], [DIRECTIONAL], spectral=spectral), GRID, 256).mean(
         axis=2
@@ -179,14 +150,6 @@ def lights_of(kind: str, folder: Path, coloured: bool) -> list[dict[str, Any]]:
     }[kind]
 
 
-@pytest.mark.parametrize("length", [0.0, 1e-30, 1e300])
-def test_a_direction_whose_length_the_renderer_cannot_use_is_refused(length: float) -> None:
-    with pytest.raises(
-        InputError, match=r"'direction': the largest number of a direction must be 1e-06 to 1e"
-    ):
-        DirectionalLight(direction=(0.0, length, 0.0), illuminance_lux=1.0)
-
-
 @pytest.mark.parametrize("kind", ["uniform", "area", "point", "spot", "directional", "two", SUN])
 @pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
 def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_path: Path) -> None:
@@ -206,13 +169,11 @@ def test_a_plane_gets_the_lux_that_are_asked_for(kind: str, spectral: bool, tmp_
     "light",
     [
         point(0.0, 0.0, Z_MM + 1, 2.0),
-        point(100.0, 0.0, Z_MM, 2.0),
-        NEAR_LAMP | {"position_mm": (0.0, 0.0, 900.0)},
         NEAR_LAMP | {"target_mm": (-800.0, 40.0, 400.0)},
         SPOT | {"target_mm": (400.0, 10.0, Z_MM)},
         DIRECTIONAL | {"direction": (0.0, 1.0, -0.1)},
     ],
-    ids=["behind", "in the plane", "a lamp behind", "a lamp that looks away", "a spot beside", "from behind"],
+    ids=["behind", "a lamp that looks away", "a spot beside", "from behind"],
 )
 def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> None:
     with pytest.raises(InputError, match=r"level: nothing shines on a surface at z_mm = 500"):
@@ -220,10 +181,8 @@ def test_light_that_does_not_reach_the_plane_is_told(light: dict[str, Any]) -> N
 
 
 def test_surroundings_that_shine_only_from_ahead_give_the_plane_nothing(tmp_path: Path) -> None:
-    pixels = np.zeros((16, 32, 3))
+    pixels, level = np.zeros((16, 32, 3)), {"illuminance_lux": LUX, "z_mm": Z_MM}
     pixels[6:10, 14:18] = 1
+    made([FLAT], [sky(tmp_path, pixels, turn_deg=180.0)], folder=tmp_path, level=level)
     with pytest.raises(InputError, match="level: nothing shines"):
-        made([FLAT], [sky(tmp_path, pixels)], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
-    # Turned round they shine from behind the cameras.
-    turned = sky(tmp_path, pixels, turn_deg=180.0)
-    made([FLAT], [turned], folder=tmp_path, level={"illuminance_lux": LUX, "z_mm": Z_MM})
+        made([FLAT], [sky(tmp_path, pixels)], folder=tmp_path, level=level)

@@ -1,116 +1,116 @@
-"""Choosing a renderer: what is refused, what is tried, and what is remembered."""
+"""Choosing a renderer: what is tried, what is refused, and what is remembered."""
 
+import importlib.util
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from pcii.base import command_line
 from pcii.base.errors import InputError
+from simgen.app import commands as simgen_cli
 from simgen.renderer import backend
 
 
 @pytest.fixture
-def no_machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A machine without CUDA and with only the libraries put into the returned folder."""
+def libraries(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The only folder with libraries, at first none, of a machine without CUDA."""
+    folder = tmp_path / "lib"
+    folder.mkdir()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.delenv("SIMGEN_BACKEND", raising=False)
-    monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
-    monkeypatch.setattr(backend.ctypes.util, "find_library", lambda name: None)
-    libraries = tmp_path / "lib"
-    libraries.mkdir()
-    monkeypatch.setattr(
-        backend,
-        "_llvm_libraries",
-        lambda: sorted(libraries.glob("libLLVM*"), key=lambda p: -(backend._major_version(p) or 0)),
-    )
-    return libraries
+    for name in ("SIMGEN_BACKEND", "DRJIT_LIBLLVM_PATH", "LD_LIBRARY_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("ctypes.util.find_library", lambda name: None)
+    monkeypatch.setattr(backend, "LIBRARY_FOLDERS", (str(folder.relative_to("/")),))
+    return folder
 
 
-def answers(monkeypatch: pytest.MonkeyPatch, works: dict[str, bool]) -> list[str]:
-    """Replace the trial process by a table; returns the list of what was tried."""
-    tried: list[str] = []
+@pytest.fixture
+def trials(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Names of the libraries that were tried: 19 works, others end the trial process."""
+    names: list[str] = []
 
     def probe(kind: str, library: str) -> tuple[bool, str]:
-        tried.append(library)
-        return (True, "works") if works[Path(library).name] else (False, "ended with signal 6")
+        names.append(Path(library).name)
+        return (True, "works") if ".so.19" in library else (False, "ended with signal 6")
 
     monkeypatch.setattr(backend, "_probe", probe)
-    return tried
+    return names
 
 
-def test_without_any_library_it_is_scalar(no_machine: Path) -> None:
-    chosen = backend.choose()
-    assert chosen.kind == "scalar"
+def test_without_any_library_it_is_scalar(libraries: Path) -> None:
+    assert backend.choose().kind == "scalar"
     assert "libllvm19" in (backend.advice() or "")
 
 
-def test_llvm_14_and_15_are_refused_without_being_tried(
-    no_machine: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("libLLVM-14.so.1", "libLLVM-15.so"):
-        (no_machine / name).touch()
-    tried = answers(monkeypatch, {})
-    chosen = backend.choose()
-    assert chosen.kind == "scalar"
-    assert tried == []
-    assert "LLVM 15 is too old" in chosen.reason
-
-
-def test_the_newest_that_works_is_taken_and_an_abort_survived(
-    no_machine: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("libLLVM-15.so", "libLLVM.so.19.1", "libLLVM.so.20.1"):
-        (no_machine / name).touch()
-    answers(monkeypatch, {"libLLVM.so.19.1": True, "libLLVM.so.20.1": False})
-    chosen = backend.choose()
-    assert chosen.kind == "llvm"
-    assert (chosen.library or "").endswith("libLLVM.so.19.1")
-    assert "signal 6" in chosen.reason
+def test_the_newest_that_works_is_chosen(libraries: Path, trials: list[str]) -> None:
+    names = ("libLLVM-15.so.1", "libLLVM.so.20.1", "libLLVM.so.19.1", "libLLVM-9.so", "libLLVMCore.so.21")
+    for name in names:
+        (libraries / name).touch()
+    (libraries / "libLLVM-20.so").symlink_to("libLLVM.so.20.1")
+    choice = backend.choose()
+    assert (choice.kind, choice.library) == ("llvm", str(libraries / "libLLVM.so.19.1"))
+    assert trials == ["libLLVM.so.20.1", "libLLVM.so.19.1"]
     assert backend.advice() is None
+    assert [(each.kind, each.works) for each in backend.survey()] == [
+        ("llvm", False),
+        ("llvm", True),
+        ("llvm", False),
+        ("llvm", False),
+        ("scalar", True),
+    ]
+    assert backend.survey()[0].detail == "LLVM 20 ended with signal 6"
 
 
 def test_answers_are_cached_until_the_library_changes(
-    no_machine: Path, monkeypatch: pytest.MonkeyPatch
+    libraries: Path, trials: list[str], tmp_path: Path
 ) -> None:
-    library = no_machine / "libLLVM.so.19.1"
+    library = libraries / "libLLVM.so.19.1"
     library.write_bytes(b"one")
-    tried = answers(monkeypatch, {library.name: True})
     backend.choose()
     backend.choose()
-    assert len(tried) == 1
-    library.write_bytes(b"another")
-    backend.choose()
-    assert len(tried) == 2
-
-
-def test_a_damaged_cache_is_ignored(
-    no_machine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (no_machine / "libLLVM.so.19.1").touch()
-    tried = answers(monkeypatch, {"libLLVM.so.19.1": True})
-    backend.choose()
+    assert len(trials) == 1
     (stored,) = (tmp_path / "cache" / "simgen").glob("*.json")
     assert json.loads(stored.read_text())["works"] is True
-    stored.write_text("{")
+    stored.write_text("{")  # a damaged cache is ignored
     assert backend.choose().kind == "llvm"
-    assert len(tried) == 2
+    assert len(trials) == 2
+    library.write_bytes(b"another")
+    backend.choose()
+    assert len(trials) == 3
 
 
-def test_what_is_asked_for_is_given_or_refused(no_machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_request_is_met_or_refused(libraries: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SIMGEN_BACKEND", "scalar")
     assert backend.choose().variant == "scalar_rgb"
-    monkeypatch.setenv("SIMGEN_BACKEND", "llvm")
-    with pytest.raises(InputError, match="llvm does not work here"):
-        backend.choose()
-    monkeypatch.setenv("SIMGEN_BACKEND", "opencl")
-    with pytest.raises(InputError, match="use one of cuda, llvm, scalar"):
-        backend.choose()
+    for request, sentence in (
+        ("llvm", "llvm does not work here"),
+        ("opencl", "use one of cuda, llvm, scalar"),
+    ):
+        monkeypatch.setenv("SIMGEN_BACKEND", request)
+        with pytest.raises(InputError, match=sentence):
+            backend.choose()
 
 
-def test_a_library_that_kills_its_process_does_not_kill_ours(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_library_that_kills_its_process_does_not_kill_ours(
+    libraries: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (libraries / "libLLVM.so.19.1").touch()
     monkeypatch.setattr(backend, "_PROBE", "import os; os.abort()")
-    assert backend._probe("llvm", "/nowhere/libLLVM.so") == (False, "ended the trial process with signal 6")
+    assert backend.survey()[0].detail == "LLVM 19 ended the trial process with signal 6"
+    (libraries / "libLLVM.so.20.1").touch()
     monkeypatch.setattr(backend, "_PROBE", "raise ImportError('no such library')")
-    works, detail = backend._probe("llvm", "/nowhere/libLLVM.so")
-    assert not works
-    assert "no such library" in detail
+    assert backend.survey()[0].detail == "LLVM 20 failed: ImportError: no such library"
+
+
+@pytest.mark.parametrize("command", ["doctor", "generate small -o out"])
+def test_without_mitsuba_one_sentence_says_what_to_install(
+    command: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    find: Callable[..., object] = importlib.util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "mitsuba" else find(name))
+    monkeypatch.chdir(tmp_path)
+    assert command_line.run(simgen_cli.app, command.split()) == 2
+    sentence = "error: mitsuba: not installed, and needed for rendering; type in the source tree:  "
+    assert capsys.readouterr().err == sentence + "pip install '.[render]'\n"

@@ -63,6 +63,13 @@ FOGGY = """<medium type="homogeneous" id="fog"><float name="sigma_t" value="1.8"
 <rgb name="albedo" value=".9,.8,.6"/>
 </medium><shape type="cube" id="cloud"><transform name="to_world"><scale value=".7"/></transform>
 <bsdf type="null"/><ref name="interior" id="fog"/></shape><emitter type="constant"/>"""
+OBJ = '<shape type="obj"><string name="filename" value="%s"/></shape>'
+BALL: dict[str, Any] = {
+    "name": "ball",
+    "position_mm": [0, 0, 3000],
+    "shape": {"type": "sphere", "radius_mm": 300.0},
+    "material": {"reflectance": [1, 1, 1]},
+}
 
 
 @pytest.fixture
@@ -138,21 +145,10 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
 
 
 @pytest.mark.renders
-def test_objects_lights_and_level_of_the_scene_stand_beside_the_file(folder: Path) -> None:
-    ball = {"type": "sphere", "radius_mm": 300.0}
-    own = {
-        "objects": [
-            {
-                "name": "ball",
-                "position_mm": [0, 0, 4000],
-                "shape": ball,
-                "material": {"reflectance": [1, 1, 1]},
-            }
-        ],
-        "lights": [{"type": "point", "position_mm": [0, 0, 0], "intensity_cd": 50.0}],
-    }
+def test_objects_lights_and_a_level_of_the_scene_stand_beside_the_file(folder: Path) -> None:
+    lamp = {"type": "point", "position_mm": [0, 0, 0], "intensity_cd": 50.0}
     without_light = CAMERA + ROOM[: ROOM.index("<shape", ROOM.index("back"))]
-    scene = scene_of(folder, without_light, **own)
+    scene = scene_of(folder, without_light, objects=[BALL | {"position_mm": [0, 0, 4000]}], lights=[lamp])
     view = simgen.render(scene, GRID, samples_per_pixel=16, max_depth=2).view(0, 0)
     # The nearest point of the ball faces the lamp, 3.7 m away.
     middle = view[SIDE // 2 - 1 : SIDE // 2 + 1, SIDE // 2 - 1 : SIDE // 2 + 1].mean()
@@ -160,25 +156,24 @@ def test_objects_lights_and_level_of_the_scene_stand_beside_the_file(folder: Pat
     _, truth = simgen.draw_photons(scene, GRID, budget=100, cfa=None)
     assert truth.z_mm[SIDE // 2, SIDE // 2] == pytest.approx(3700, abs=5)
     level = {"illuminance_lux": 1000.0, "z_mm": 4000.0}
-    lit_by_file = CAMERA + ROOM + '<emitter type="constant"><rgb name="radiance" value="2"/></emitter>'
-    half = simgen.render(scene_of(folder, lit_by_file), GRID, samples_per_pixel=64, max_depth=2)
-    levelled = simgen.render(
-        scene_of(folder, lit_by_file, level=level), GRID, samples_per_pixel=64, max_depth=2
+    around = CAMERA + ROOM + '<emitter type="constant"><rgb name="radiance" value="2"/></emitter>'
+    plain, levelled = (
+        simgen.render(scene_of(folder, around, **values), GRID, samples_per_pixel=64, max_depth=2)
+        for values in ({}, {"level": level})
     )
     # A surface gets pi times the luminance of what is around it; the lamp in view shines away from it.
-    assert levelled.view(0, 0).mean() / half.view(0, 0).mean() == pytest.approx(1000 / (2 * np.pi), rel=0.05)
+    ratio = levelled.view(0, 0).mean() / plain.view(0, 0).mean()
+    assert ratio == pytest.approx(1000 / (2 * np.pi), rel=0.05)
 
 
 @pytest.mark.renders
 def test_ids_of_the_file_and_objects_of_the_scene_do_not_mix(folder: Path) -> None:
-    ball = {"type": "sphere", "radius_mm": 300.0}
-    own = {"name": "ball", "position_mm": [0, 0, 3000], "shape": ball, "material": {"reflectance": [1, 1, 1]}}
-    scene = scene_of(folder, CAMERA + ROOM.replace('"back"', '"object1"'), objects=[own])
+    scene = scene_of(folder, CAMERA + ROOM.replace('"back"', '"object1"'), objects=[BALL])
     _, truth = simgen.draw_photons(scene, GRID, budget=100, cfa=None)
     assert truth.names[int(truth.object_id[SIDE // 2, SIDE // 2])] == "ball"
     assert truth.names[int(truth.object_id[0, 0])] == "object1"
     with pytest.raises(InputError, match="both named 'back'"):
-        simgen.render(scene_of(folder, CAMERA + ROOM, objects=[own | {"name": "back"}]), GRID)
+        simgen.render(scene_of(folder, CAMERA + ROOM, objects=[BALL | {"name": "back"}]), GRID)
 
 
 @pytest.mark.renders
@@ -196,40 +191,30 @@ def test_size_and_place_are_those_that_are_asked_for(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        ('<!DOCTYPE scene [<!ENTITY a "b">]><scene version="3.0.0"/>', "no DOCTYPE"),
-        ('<scene version="3.0.0"><path value="plugins"/></scene>', "<path> is not followed"),
-        ('<scene version="3.0.0"><bsdf type="../../evil"/></scene>', "outside the scene's folder"),
-        ('<scene version="3.0.0"><bsdf type="a.b"/></scene>', "no name of a plugin"),
-        (
-            '<scene version="3.0.0"><default name="d" value="."/><shape type="obj">'
-            '<string name="filename" value="$d$d/secret.obj"/></shape></scene>',
-            "outside the scene's folder",
-        ),
-        (
-            '<scene version="3.0.0"><shape type="obj"><string name="filename" value="linked.obj"/>'
-            "</shape></scene>",
-            "outside the scene's folder",
-        ),
-        (
-            '<scene version="3.0.0"><shape type="obj"><string name="filename" value="no.obj"/>'
-            "</shape></scene>",
-            "there is no file",
-        ),
-        (
-            '<scene version="3.0.0"><include filename="scene.xml"/><include filename="scene.xml"/></scene>',
-            "deep",
-        ),
-        ("<scene><broken", "not valid XML"),
+        ('<path value="plugins"/>', "<path> is not followed"),
+        ('<bsdf type="../../evil"/>', "outside the scene's folder"),
+        ('<bsdf type="a.b"/>', "no name of a plugin"),
+        ('<default name="d" value="."/>' + OBJ % "$d$d/secret.obj", "outside the scene's folder"),
+        (OBJ % "linked.obj", "outside the scene's folder"),
+        (OBJ % "no.obj", "there is no file"),
+        ('<include filename="scene.xml"/><include filename="scene.xml"/>', "deep"),
+        ("<broken", "not valid XML"),
     ],
 )
 def test_files_that_lead_outside_are_refused(tmp_path: Path, content: str, sentence: str) -> None:
+    """Mitsuba loads and runs whatever library a plugin's type or a <path> names."""
     (tmp_path / "secret.obj").write_text("v 0 0 0")
     folder = tmp_path / "scene"
     folder.mkdir()
     (folder / "linked.obj").symlink_to(tmp_path / "secret.obj")
-    (folder / "scene.xml").write_text(content)
     with pytest.raises(InputError, match=sentence):
-        simgen.load_scene({"title": "x", "mitsuba": "scene.xml"}, folder=folder)
+        scene_of(folder, content)
+
+
+def test_a_file_with_entities_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "scene.xml").write_text('<!DOCTYPE scene [<!ENTITY a "b">]><scene version="3.0.0"/>')
+    with pytest.raises(InputError, match="no DOCTYPE"):
+        simgen.load_scene({"title": "x", "mitsuba": "scene.xml"}, folder=tmp_path)
 
 
 @pytest.mark.renders

@@ -38,9 +38,7 @@ def test_objects_have_their_samples_and_the_background_fewer() -> None:
     assert not np.array_equal(sparse[is_window], dense[is_window])
     assert saved == 255 * GRID.height * GRID.width - 256 * is_window.sum()
 
-
-def test_windows_that_would_cost_more_are_not_made() -> None:
-    scene = two_balls()
+    # Windows that would cost more are not rendered.
     plain, fewer = (
         render_view(scene, GRID, 0, 0, samples_per_pixel=2, background_samples=n, seed=4) for n in (None, 2)
     )
