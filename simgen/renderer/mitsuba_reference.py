@@ -59,7 +59,8 @@ class Reference:
             mi.Interaction3f() if is_scalar(mi) else load_drjit().zeros(mi.Interaction3f, len(numbers))
         )
         seen_from.p = self.frame.points(np.array([0.0, 0.0, z_mm])).tolist()
-        for light in _instantiate(mi, *_parse(mi, self.path), self.path).emitters():
+        scene = _instantiate(mi, *_parse(mi, self.path), self.path)  # whose lights go with it
+        for light in scene.emitters():
             if is_scalar(mi):
                 pairs = [light.sample_direction(seen_from, mi.Point2f(pair)) for pair in numbers.tolist()]
                 towards = np.array([np.ravel(sample.d) for sample, _ in pairs])
