@@ -107,7 +107,7 @@ def generate(
     trust_python
         Run the Python function that a recipe file names as its scene: only if you trust its author.
     """
-    from pcii.exporting.card_files import write_card
+    from pcii.exporting.dataset_card import write_card
     from simgen.dataset.dataset_collection import generate_collection
     from simgen.dataset.generation import generate as make
     from simgen.renderer import backend

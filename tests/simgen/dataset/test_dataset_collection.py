@@ -16,7 +16,7 @@ from pcii.base.executor import Executor
 from pcii.io.collection import open_collection
 from pcii.io.collection_layout import COLLECTION, INDEX
 from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import CARD, CROISSANT, MARKER
+from pcii.io.dataset_layout import CARD, MARKER
 from pcii.io.verification import verify
 from pcii.store import software
 from simgen.app import commands as cli
@@ -54,7 +54,7 @@ def test_the_index_says_what_the_manifests_say(collection: Path) -> None:
         f"budget_{budget}_seed_{seed}" for budget in (100, 200) for seed in (7, 8, 9)
     ]
     assert sorted(entry.name for entry in collection.iterdir()) == sorted(
-        [COLLECTION, INDEX, CARD, CROISSANT, *(row["path"] for row in opened.rows)]
+        [COLLECTION, INDEX, CARD, *(row["path"] for row in opened.rows)]
     )
     for row, dataset in zip(opened.rows, opened, strict=True):
         recipe = dataset.manifest["recipe"]
