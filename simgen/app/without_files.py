@@ -17,13 +17,10 @@ from pcii.core.photon_limit import sense
 from pcii.core.truth import PhotonTruth, Truth
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
-from simgen.dataset.prepared import Prepared, capture_of, needs_of, prepare_scene
+from simgen.dataset.prepared import Prepared, prepare_scene
 from simgen.dataset.rendered_views import exact_view, halved_view
-from simgen.dataset.resources import available_bytes, check_resources, fits, in_bytes
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import plan
+from simgen.dataset.resources import available_bytes, check_resources, in_bytes
 from simgen.photons.photon_counting import draw_from_views, thin
-from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import detect
 from simgen.sensor.frame_readout import counts_of, read_out
@@ -74,16 +71,14 @@ def draw_photons(
     }
     prepared = _prepared("draw_photons", scene, _grid_values(grid, lens, errors), seed, values)
     recipe, render_scene = prepared.recipe, prepared.render_scene()
-    capture, needs, kind = capture_of(recipe, prepared.seed), needs_of(recipe), backend.choose().kind
-    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-    made = plan(capture, setup, kind, may_explore=fits(needs))
-    check_resources(needs, made, Path())
-    drawn = thin(capture, setup, made, report) if made.thins else None
+    capture, made = prepared.capture, prepared.plan(render_scene)
+    check_resources(prepared.needs, made, Path())
+    drawn = thin(capture, prepared.setup(render_scene), made, report) if made.thins else None
 
     @cache
     def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
-        view = halved_view(render_scene, capture.rig, k, l, made.samples, capture.seed, recipe.cfa)
-        return sense(view.image, recipe.cfa), view.variance
+        image, variance = halved_view(render_scene, capture, k, l, made.samples)
+        return sense(image, recipe.cfa), variance
 
     arrivals, _ = drawn or draw_from_views(
         capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], made, report
@@ -126,11 +121,11 @@ def render(
             f"grid: radiance of all views takes {in_bytes(needed)} of memory, and this machine has "
             f"{in_bytes(room)} available; take fewer or smaller views"
         )
-    check_resources(needs_of(prepared.recipe), None, Path())
-    render_scene, capture = prepared.render_scene(), capture_of(prepared.recipe, prepared.seed)
+    check_resources(prepared.needs, None, Path())
+    render_scene, capture = prepared.render_scene(), prepared.capture
     radiance = np.empty((*grid.shape_KLHW, 3), np.float32)
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        radiance[k, l] = exact_view(render_scene, capture.rig, k, l, samples_per_pixel, capture.seed)
+        radiance[k, l] = exact_view(render_scene, capture, k, l, samples_per_pixel)
         report("views", done, grid.view_count)
     return Views(radiance, grid)
 

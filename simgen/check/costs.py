@@ -8,7 +8,6 @@ from simgen.dataset.resources import (
     least_rendered_bytes,
     peak_bytes,
     product_bytes,
-    rounded,
     shortage,
 )
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
@@ -91,5 +90,9 @@ def in_time(spent_s: float) -> str:
     """A time in the unit that suits it, with one digit; no less than a second."""
     for size, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
         if spent_s >= 2 * size:
-            return f"{rounded(spent_s / size, 1)} {unit}"
-    return f"{rounded(max(spent_s, 1), 1)} s"
+            return f"{_one_digit(spent_s / size)} {unit}"
+    return f"{_one_digit(max(spent_s, 1))} s"
+
+
+def _one_digit(value: float) -> str:
+    return f"{float(f'{value:.1g}'):g}"

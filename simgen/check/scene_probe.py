@@ -16,10 +16,8 @@ from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Camera, as_rig, centre_camera, corners, with_larger_pixels
 from simgen.check.scene_facts import Elsewhere, Facts, ObjectFacts, OnFilm
-from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
-from simgen.dataset.resources import available_bytes, fits
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan, plan
+from simgen.dataset.prepared import Prepared
+from simgen.dataset.resources import available_bytes
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
@@ -55,7 +53,7 @@ def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, scene, compiled = target.recipe, target.scene, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
-    made = _plan_of(target, render_scene) if recipe.products.counts else None
+    made = target.plan(render_scene) if recipe.products.counts else None
     small = coarser(grid, SIDE_PX if compiled else SCALAR_SIDE_PX)
     image, path_s = _picture(render_scene, small, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, small)
@@ -71,7 +69,7 @@ def probe_scene(target: Prepared) -> Facts:
         photons=recipe.photons,
         render=recipe.render,
         analysis=recipe.analysis,
-        needs=needs_of(recipe),
+        needs=target.needs,
         objects=tuple(_object_facts(look, number, name) for number, name in render_scene.names.items()),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
         colour_share=_colour_share(light, recipe.cfa),
@@ -92,14 +90,6 @@ def probe_scene(target: Prepared) -> Facts:
         backdrop_mm=None if scene.backdrop is None else scene.backdrop.z_mm,
         probe_px=(small.height, small.width),
     )
-
-
-def _plan_of(target: Prepared, render_scene: RenderScene) -> Plan:
-    """How the counts would be made."""
-    recipe, capture = target.recipe, capture_of(target.recipe, target.seed)
-    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-    kind, may_explore = backend.choose().kind, fits(needs_of(recipe))
-    return plan(capture, setup, kind, least_samples(recipe), may_explore=may_explore)
 
 
 def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:

@@ -14,7 +14,7 @@ from simgen.check.expected_photons import photon_findings
 from simgen.check.scene_facts import Facts, Finding
 from simgen.check.scene_probe import probe_scene
 from simgen.check.sight import sight_findings
-from simgen.dataset.prepared import Prepared, needs_of, prepare, prepare_scene
+from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.spec.materials import is_clear
 from simgen.spec.recipe import Recipe, Render
 from simgen.spec.scene import Scene
@@ -45,7 +45,7 @@ def lint(
     pitch = f"pitch {recipe.grid.pitch_mm[0]:g} x {recipe.grid.pitch_mm[1]:g} mm"
     target = target_of(sweep, recipe_folder, scene_number)
     line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {recipe.sensor.cfa}"
-    all_findings = hopeless(needs_of(target.recipe)) or findings(probe_scene(target))
+    all_findings = hopeless(target.needs) or findings(probe_scene(target))
     return f"{line}{_first_values(sweep)}", all_findings
 
 

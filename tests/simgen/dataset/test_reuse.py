@@ -9,9 +9,8 @@ from tiny import GRID_2_X_2
 
 from pcii.base.progress import silent
 from simgen.dataset import generation as module
-from simgen.dataset.generation import generate, make
+from simgen.dataset.generation import Reuse, generate, make
 from simgen.dataset.prepared import Prepared, prepare
-from simgen.dataset.reuse import Reuse
 from simgen.spec.recipe import load_recipe
 
 pytestmark = pytest.mark.renders
@@ -63,7 +62,7 @@ def test_only_what_depends_on_a_change_is_made_again(
     recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
 ) -> None:
     made: list[str] = []
-    for owner, name in ((Prepared, "render_scene"), (module, "plan"), (module, "write_truth")):
+    for owner, name in ((Prepared, "render_scene"), (Prepared, "plan"), (module, "write_truth")):
         work = getattr(owner, name)
 
         def watched(*args: object, work: object = work, name: str = name, **options: object) -> object:
