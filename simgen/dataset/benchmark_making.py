@@ -4,8 +4,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,6 @@ from pcii.base.progress import Report, silent
 from pcii.io.benchmark_layout import (
     CERTIFICATE,
     REFERENCE_METHOD,
-    BenchmarkDataset,
     Content,
     Definition,
     Scores,
@@ -55,28 +53,17 @@ def load_definition(name_or_path: str) -> tuple[Definition, Path]:
     return validate(Definition, read_toml(file), str(file)), file
 
 
-@dataclass(frozen=True)
 class BenchmarkSeries:
     """The datasets of a benchmark as a series of one collection; with `scenes`, those of these names only."""
 
-    definition: Definition
-    recipe_folder: Path
-    scenes: tuple[str, ...] | None = None
+    fields = BENCHMARK_FIELDS
 
-    @property
-    def fields(self) -> tuple[str, ...]:
-        """Names of what distinguishes the datasets."""
-        return BENCHMARK_FIELDS
-
-    @property
-    def base(self) -> dict[str, Any]:
-        """What all of them follow from."""
-        return self.definition.model_dump(mode="json")
-
-    @cached_property
-    def datasets(self) -> list[BenchmarkDataset]:
-        """The datasets in order."""
-        return self.definition.datasets(self.scenes)
+    def __init__(
+        self, definition: Definition, recipe_folder: Path, scenes: tuple[str, ...] | None = None
+    ) -> None:
+        self.definition, self.recipe_folder = definition, recipe_folder
+        self.base = definition.model_dump(mode="json")
+        self.datasets = definition.datasets(scenes)
 
     def __len__(self) -> int:
         return len(self.datasets)

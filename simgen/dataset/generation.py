@@ -4,7 +4,7 @@ import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,18 +76,12 @@ class Reuse:
             self._last["folder"] = key, {str(file.relative_to(folder)): file.read_bytes() for file in files}
 
 
-@dataclass
-class _Clock:
-    """Wall seconds by stage."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        spent = time.perf_counter() - start
-        self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
+@contextmanager
+def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
+    """Add the wall seconds of the block to those of a stage."""
+    start = time.perf_counter()
+    yield
+    timings_s[stage] = round(timings_s.get(stage, 0.0) + time.perf_counter() - start, 3)
 
 
 def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> dict[str, Any]:
@@ -106,23 +100,23 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
     What it has in common with those made before with the same `reuse` is not made again. Raises
     `BusyError` if another process is at it.
     """
-    recipe, identity, clock = prepared.recipe, prepared.identity, _Clock()
+    recipe, identity, timings_s = prepared.recipe, prepared.identity, dict[str, float]()
     engine, counting = backend.describe(spectral=recipe.is_spectral), None
     with named_in_errors(out), claim(out, identity, engine) as marker:
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return read_whole(out, identity, content=True)
         check_resources(prepared.needs, None, out)
-        with clock.stage("load"):  # before anything is written: a bad scene shows here
+        with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
             render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
         if recipe.products.counts:  # likewise: too much light
-            with clock.stage("plan"):
+            with _timed(timings_s, "plan"):
                 counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
                 check_resources(prepared.needs, counting, out)
         sweep_temporaries(out)
-        photons = _write_products(prepared, render_scene, counting, reuse, out, clock, report)
+        photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
-        with clock.stage("hash"):
+        with _timed(timings_s, "hash"):
             budgets = (None, *recipe.photons.nested)
             parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
             files = list_files(out, [TRUTH, *parts, RADIANCE])
@@ -131,7 +125,7 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
             "backend": engine,
             "photons": photons,
             "skipped": _skipped(prepared, photons, traced_for_visibility(out), render_scene),
-            "timings_s": clock.seconds,
+            "timings_s": timings_s,
             "files": files,
         }
         write_manifest(out, manifest)
@@ -145,7 +139,7 @@ def _write_products(
     counting: Plan | None,
     reuse: Reuse,
     out: Path,
-    clock: _Clock,
+    timings_s: dict[str, float],
     report: Report,
 ) -> dict[str, Any] | None:
     """Write all products; what the manifest says of the photons, None without counts."""
@@ -158,14 +152,14 @@ def _write_products(
 
     if products.truth or products.view_truth:
         request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
-        with clock.stage("truth"):
+        with _timed(timings_s, "truth"):
             reuse.folder(
                 prepared.truth_key,
                 out / TRUTH,
                 lambda: write_truth(request, render_scene, capture.rig, out, report),
             )
     if counting is not None and counting.thins:
-        with clock.stage("photons"):
+        with _timed(timings_s, "photons"):
             photons = write(*thin(capture, prepared.setup(render_scene), counting, report))
     dense = None if counting is None or counting.thins else counting
     views = RenderedViews(
@@ -179,10 +173,10 @@ def _write_products(
         are_for_counts=dense is not None,
     )
     if products.radiance != "none" or dense is not None:
-        with clock.stage("radiance"):
+        with _timed(timings_s, "radiance"):
             views.render(render_scene, report)
     if dense is not None:
-        with clock.stage("counts"):
+        with _timed(timings_s, "counts"):
             photons = write(*draw_from_views(capture, views.mosaic, views.variance, dense, report))
     return photons
 
