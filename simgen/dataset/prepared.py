@@ -174,8 +174,8 @@ def capture_of(recipe: Recipe, seed: int) -> Capture:
 
 def needs_of(recipe: Recipe) -> Needs:
     """What of a recipe takes memory and disk."""
-    parts = recipe.grid, recipe.sensor, recipe.photons, recipe.exposure, recipe.products
-    return Needs(*parts, planes=len(recipe.analysis.z_mm))
+    planes = len(recipe.analysis.z_mm)
+    return Needs(recipe.grid, recipe.sensor, recipe.photons, recipe.products, planes)
 
 
 def least_samples(recipe: Recipe) -> int:

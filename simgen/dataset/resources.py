@@ -16,7 +16,7 @@ from simgen.photons.counting_plan import Plan, two_digits
 from simgen.photons.disparity_layers import layers_for, tile_px_for
 from simgen.photons.pilot import MOST_RAYS
 from simgen.spec.camera_grid import Grid
-from simgen.spec.recipe import Exposure, Photons, Products, Sensor
+from simgen.spec.recipe import Photons, Products, Sensor
 
 BASE_BYTES = 4e8
 """The renderer and its libraries."""
@@ -40,7 +40,6 @@ class Needs:
     grid: Grid
     sensor: Sensor
     photons: Photons
-    exposure: Exposure | None
     products: Products
     planes: int
 
