@@ -23,9 +23,8 @@ from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import MANIFEST, TRUTH
 from pcii.sections import reconstruction
 from pcii.sections.reconstruction import extend, reconstruct
-from simgen.dataset.generation import generate, make
+from simgen.dataset.generation import Reuse, generate, make
 from simgen.dataset.prepared import Prepared, prepare
-from simgen.dataset.reuse import Reuse
 from simgen.photons.candidates import Setup
 from simgen.photons.exploration import Exploration, explore
 from simgen.photons.thinning import thin_photons

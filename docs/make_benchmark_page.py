@@ -24,7 +24,7 @@ from pcii.figures.charts import few_ticks, quiet_grid
 from pcii.figures.palette import COLOURS, MARKERS
 from pcii.io.collection_layout import IN_FRAMES
 from pcii.io.evaluation_layout import read_evaluation
-from simgen.dataset.definition import load_definition
+from simgen.dataset.benchmark_making import load_definition
 
 BENCHMARK = "pcii-bench-1"
 DOCS = Path(__file__).parent

@@ -5,34 +5,24 @@ which fails as the system does, without the name of a file. What other languages
 """
 
 import errno
-import json
 import os
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-VARIABLE = "BROKEN_DISK"
-SITE = "import broken_disk\nbroken_disk.break_disk_of_environment()\n"
 _fsync = os.fsync
 
 
 @dataclass
 class BrokenDisk:
-    """A disk on which so many changes in the folder succeed, in each process; all later ones fail."""
+    """A disk on which so many changes in the folder succeed; all later ones fail."""
 
     folder: str
     good: int
     heals: bool = False
     """Only the first of those fails."""
     done: int = 0
-
-    def environment(self, site: Path) -> dict[str, str]:
-        """Variables that give this disk to new processes and to theirs; `site` is a new folder."""
-        site.mkdir()
-        (site / "sitecustomize.py").write_text(SITE)
-        paths = [str(site), str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
-        return os.environ | {VARIABLE: json.dumps(asdict(self)), "PYTHONPATH": os.pathsep.join(paths)}
 
     def fails(self, path: Any) -> bool:
         """Count a change of a file; whether it must fail."""
@@ -52,11 +42,6 @@ def break_disk(disk: BrokenDisk | None) -> None:
         sys.addaudithook(_audited)
         os.fsync = _failing_fsync
     _disk = disk
-
-
-def break_disk_of_environment() -> None:
-    """Break the disk of this process as the environment says."""
-    break_disk(BrokenDisk(**json.loads(os.environ[VARIABLE])))
 
 
 def _audited(event: str, given: tuple[Any, ...]) -> None:

@@ -73,7 +73,7 @@ LONGER = {
 }
 # Where a whole recipe is known, beside the commands: everything else takes parts of it.
 KNOW_RECIPE = {
-    "simgen.dataset.benchmark_datasets",
+    "simgen.dataset.benchmark_making",
     "simgen.dataset.dataset_collection",
     "simgen.check.targets",
     "simgen.dataset.generation",

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from pcii.base.errors import InputError
+from pcii.io.benchmark_layout import Definition
 from pcii.io.collection import Collection, open_collection
-from pcii.io.collection_layout import BENCHMARK_FIELDS, Half, is_collection, read_collection
+from pcii.io.collection_layout import Half, is_collection, read_collection
 from pcii.io.dataset import Dataset
 
 
@@ -52,9 +55,11 @@ def _scene(row: Mapping[str, Any]) -> str:
 
 def open_benchmark(path: Path) -> BenchmarkCollection:
     """Open the collection of a benchmark; `InputError` for a folder that is none."""
+    fault = InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
     if not is_collection(path):
-        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
-    collection = open_collection(path)
-    if {*collection.fields} != {*BENCHMARK_FIELDS}:
-        raise InputError(f"{path}: is no benchmark; make one with `simgen benchmark make`")
-    return BenchmarkCollection(str(read_collection(path)["recipe"].get("name")), collection)
+        raise fault
+    try:
+        definition = Definition.model_validate(read_collection(path).get("recipe"))
+    except ValidationError:
+        raise fault from None
+    return BenchmarkCollection(definition.name, open_collection(path))

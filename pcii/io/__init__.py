@@ -1,9 +1,12 @@
 """Files: datasets and lists of results, sealed and checked, and what a dataset's recipe suggests.
 
+benchmark_layout   The public benchmark: its definition, the datasets that follow from it, and their
+                   certificate.
 collection         Collections of datasets, opened one by one as they are used.
 collection_layout  The folder of a collection of datasets: what they have in common, and the index of
                    them.
-dataset            Datasets: counts, truth and radiance of a dataset folder, checked when they are read.
+dataset            Datasets: counts, truth and radiance of a dataset folder, each checked when it is
+                   read.
 dataset_layout     The dataset folder on disk: its files, their arrays and its manifest.
 dataset_writer     Datasets written from images and truth in memory: whole folders that `open_dataset`
                    opens.
@@ -16,9 +19,6 @@ manifest_schema    Pydantic models of the manifests; members that they do not na
 results_list       The file results.json: the dataset of the results in a folder, and their files with
                    size and SHA-256.
 sample_dataset     The sample dataset that comes with the package, for trying things without a renderer.
-sealed_json        JSON documents that list the files of a folder and end in a checksum of the document
-                   itself.
-stored_radiance    Radiance on disk, one EXR file per view, each read when it is used.
 suggested_depths   Depths to reconstruct: those given, or those that the recipe of a dataset suggests.
 verification       Comparison of all files of a dataset, a collection, results or an evaluation with its
                    manifest.

@@ -25,9 +25,9 @@ from pcii.store.folder_kind import FolderKind
 from pcii.store.safe_files import write_bytes_safely
 
 MANIFEST = "manifest.json"
-CARD, CROISSANT = "README.md", "croissant.json"
-"""What people and search engines read of a dataset or collection. No manifest lists them, since they may be
-written again, with other terms of use; the second ends in a checksum of itself and has that of the first."""
+CARD = "README.md"
+"""What people read of a dataset or collection. No manifest lists it, since it may be written again with
+other terms of use."""
 MARKER = ".unfinished.json"
 """Present in the folder of a dataset while it is being generated."""
 COUNTS = "counts.zarr"

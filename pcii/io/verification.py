@@ -6,7 +6,6 @@ from typing import Any, TypeVar
 
 from pcii.base.command_output import answer_json, say
 from pcii.base.errors import InputError
-from pcii.base.plain_text import visible
 from pcii.base.progress import Report, Stages, silent
 from pcii.io.collection_layout import (
     COLLECTION,
@@ -16,15 +15,13 @@ from pcii.io.collection_layout import (
     read_collection,
     read_index,
 )
-from pcii.io.dataset_layout import CARD, CROISSANT, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
+from pcii.io.dataset_layout import CARD, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
 from pcii.io.evaluation_layout import EVALUATION_FOLDER, is_evaluation, read_evaluation
 from pcii.io.results_list import FINISH, RESULTS, RESULTS_FOLDER, read_results
 from pcii.store.file_list import check_file, strays
 from pcii.store.folder_kind import FolderKind
-from pcii.store.sealed_json import read_sealed
 
 Item = TypeVar("Item")
-CARD_REMEDY = "the same `simgen generate` command writes it again"
 MOST_NAMED = 5
 """Most unlisted files, or unfinished datasets, that an error names."""
 
@@ -62,8 +59,7 @@ def _verify_collection(path: Path, report: Report) -> int:
     files = _all_of(
         rows, lambda row: 1 + _verify_folder(check_manifest(path, row), silent), "datasets", report
     )
-    card = _verify_card(path, {})
-    listed = {COLLECTION, INDEX, *card, *(row["path"] for row in rows)}
+    listed = {COLLECTION, INDEX, CARD, *(row["path"] for row in rows)}
     extra = sorted(entry.name for entry in path.iterdir() if entry.name not in listed)
     begun = [name for name in extra if (path / name / MARKER).is_file()]
     _refuse(path, [name for name in extra if name not in begun], INDEX)
@@ -72,7 +68,7 @@ def _verify_collection(path: Path, report: Report) -> int:
             f"{path}: not finished: {_named(begun)}; the same `simgen generate` command goes on with them; "
             "the others match the index"
         )
-    return 2 + len(card) + files
+    return 2 + files
 
 
 def _verify_folder(path: Path, report: Report) -> int:
@@ -84,13 +80,12 @@ def _verify_folder(path: Path, report: Report) -> int:
         return 1
 
     number = _all_of(list(files.items()), check, "files", report)
-    card = _verify_card(path, files)
-    _refuse(path, strays(path, [kind.document, *files, *card]), kind.document)
+    _refuse(path, strays(path, [kind.document, *files, CARD]), kind.document)
     if kind is RESULTS_FOLDER and (due := held["due"]):
         raise InputError(
             f"{path}: not finished: {_named(due)} are missing, or older than the other results here; {FINISH}"
         )
-    return number + len(card)
+    return number
 
 
 def _kind_and_document(path: Path) -> tuple[FolderKind, dict[str, Any]]:
@@ -101,32 +96,6 @@ def _kind_and_document(path: Path) -> tuple[FolderKind, dict[str, Any]]:
         if is_evaluation(path):
             return EVALUATION_FOLDER, read_evaluation(path)
     return DATASET_FOLDER, read_manifest(path)
-
-
-def _verify_card(path: Path, files: Mapping[str, Any]) -> list[str]:
-    """Names of the files of the card, none if there is none.
-
-    Raises `InputError` if one was changed, or if it is the card of other `files` than the manifest lists.
-    """
-    if not (path / CROISSANT).is_file():
-        return []
-    document = read_sealed(path / CROISSANT, CARD_REMEDY)
-    described: dict[str, Any] = {}
-    try:
-        for part in document["distribution"]:
-            if "contentUrl" in part:
-                size = int(part["contentSize"].removesuffix(" B"))
-                described[part["contentUrl"]] = {"bytes": size, "sha256": part["sha256"]}
-        if CARD not in described:
-            raise ValueError(f"it does not name {CARD}")
-    except (ValueError, KeyError, TypeError, AttributeError) as fault:
-        raise InputError(f"{path / CROISSANT}: damaged ({visible(str(fault))}); {CARD_REMEDY}") from None
-    own = {name: entry for name, entry in described.items() if name in (CARD, COLLECTION)}
-    if {name: entry for name, entry in described.items() if name not in own} != dict(files):
-        raise InputError(f"{path / CROISSANT}: describes other files than the manifest lists; {CARD_REMEDY}")
-    for name, entry in own.items():
-        check_file(path, name, entry, CARD_REMEDY, content=True)
-    return [CARD, CROISSANT]
 
 
 def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, report: Report) -> int:

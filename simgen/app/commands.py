@@ -169,8 +169,8 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from simgen.dataset.definition import load_definition
-    from simgen.dataset.making import CERTIFICATE, certify, make_benchmark
+    from pcii.io.benchmark_layout import CERTIFICATE
+    from simgen.dataset.benchmark_making import certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
     definition, file = load_definition(name)

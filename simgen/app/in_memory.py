@@ -17,13 +17,11 @@ from pcii.core.photon_limit import sense
 from pcii.core.truth import PhotonTruth, Truth
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
-from simgen.dataset.prepared import Prepared, capture_of, needs_of, prepare_scene
+from simgen.dataset.prepared import Prepared, prepare_scene
 from simgen.dataset.rendered_views import exact_view, halved_view
-from simgen.dataset.resources import available_bytes, check_resources, fits, in_bytes
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan, plan
+from simgen.dataset.resources import available_bytes, check_resources, in_bytes
+from simgen.photons.counting_plan import Capture, Plan
 from simgen.photons.photon_counting import draw_from_views, thin
-from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import counts_of, detect, read_out
 from simgen.sensor.photon_table import PhotonTable
@@ -72,11 +70,11 @@ def draw_photons(
     }
     prepared = _prepare("draw_photons", scene, grid, lens, errors, {"seed": seed, **values})
     recipe, render_scene = prepared.recipe, prepared.render_scene()
-    capture, needs, kind = capture_of(recipe, prepared.seed), needs_of(recipe), backend.choose().kind
-    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-    counting = plan(capture, setup, kind, may_explore=fits(needs))
-    check_resources(needs, counting, Path())
-    drawn = thin(capture, setup, counting, report) if counting.thins else None
+    capture, counting = prepared.capture, prepared.plan(render_scene)
+    check_resources(prepared.needs, counting, Path())
+    drawn = None
+    if counting.thins:
+        drawn = thin(capture, prepared.setup(render_scene), counting, report)
     arrivals, _ = drawn or _draw_from_rendered(capture, render_scene, counting, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
     is_single = detected.object_id is not None
@@ -92,8 +90,8 @@ def _draw_from_rendered(
 
     @cache
     def view_of(k: int, l: int) -> tuple[np.ndarray, np.ndarray]:
-        view = halved_view(render_scene, capture.rig, k, l, counting.samples, capture.seed, capture.cfa)
-        return sense(view.image, capture.cfa), view.variance
+        image, variance = halved_view(render_scene, capture, k, l, counting.samples)
+        return sense(image, capture.cfa), variance
 
     return draw_from_views(
         capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], counting, report
@@ -131,11 +129,11 @@ def render(
             f"grid: radiance of all views takes {in_bytes(needed)} of memory, and this machine has "
             f"{in_bytes(room)} available; take fewer or smaller views"
         )
-    check_resources(needs_of(prepared.recipe), None, Path())
-    render_scene, capture = prepared.render_scene(), capture_of(prepared.recipe, prepared.seed)
+    check_resources(prepared.needs, None, Path())
+    render_scene, capture = prepared.render_scene(), prepared.capture
     radiance = np.empty((*grid.shape_KLHW, 3), np.float32)
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
-        radiance[k, l] = exact_view(render_scene, capture.rig, k, l, samples_per_pixel, capture.seed)
+        radiance[k, l] = exact_view(render_scene, capture, k, l, samples_per_pixel)
         report("views", done, grid.view_count)
     return Views(radiance, grid)
 

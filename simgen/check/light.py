@@ -7,7 +7,6 @@ import numpy as np
 from pcii.core.bayer import channel_count
 from pcii.core.photon_events import NEGLIGIBLE_LOSS, clipped_mean
 from simgen.check.scene_probe import Facts, Finding, ObjectFacts
-from simgen.dataset.prepared import needs_of
 from simgen.dataset.resources import (
     Needs,
     available_bytes,
@@ -129,7 +128,7 @@ def shortage_findings(needs: Needs) -> list[Finding]:
 
 def cost_findings(facts: Facts) -> list[Finding]:
     """What will be written and what it takes, before compression and to an order of magnitude."""
-    needs, plan = needs_of(facts.target.recipe), facts.plan
+    needs, plan = facts.target.needs, facts.plan
     sizes = product_bytes(needs, plan)
     size = ", ".join(f"{name} {in_bytes(of_name)}" for name, of_name in sizes.items()) or "only a manifest"
     lack = shortage(needs, plan, facts.memory_bytes)

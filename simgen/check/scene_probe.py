@@ -15,10 +15,9 @@ from pcii.core.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.disparities import apart_px
 from simgen.cameras.rig import corners, with_larger_pixels
-from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of
-from simgen.dataset.resources import available_bytes, fits
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Plan, plan
+from simgen.dataset.prepared import Prepared
+from simgen.dataset.resources import available_bytes
+from simgen.photons.counting_plan import Plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
@@ -139,7 +138,7 @@ def probe_scene(target: Prepared) -> Facts:
     """Look at a recipe's scene. Raises `InputError` for assets or budgets that cannot be used."""
     recipe, is_compiled = target.recipe, backend.choose().kind != "scalar"
     render_scene, grid = target.render_scene(), recipe.grid.camera_grid()
-    counting_plan = _plan_of(target, render_scene) if recipe.products.counts else None
+    counting_plan = target.plan(render_scene) if recipe.products.counts else None
     coarse = coarser(grid, SIDE_PX if is_compiled else SCALAR_SIDE_PX)
     image, path_s = _picture(render_scene, coarse, recipe.cfa, recipe.seed)
     centre = first_hits_at_centre(render_scene, coarse)
@@ -167,14 +166,6 @@ def probe_scene(target: Prepared) -> Facts:
         memory_bytes=available_bytes(),
         pixel_px=grid.width / coarse.width,
     )
-
-
-def _plan_of(target: Prepared, render_scene: RenderScene) -> Plan:
-    """How the counts would be made."""
-    recipe, capture = target.recipe, capture_of(target.recipe, target.seed)
-    setup = Setup(render_scene, capture.rig, recipe.cfa, recipe.render.max_depth)
-    kind, may_explore = backend.choose().kind, fits(needs_of(recipe))
-    return plan(capture, setup, kind, least_samples(recipe), may_explore=may_explore)
 
 
 def coarser(grid: CameraGrid, side_px: int) -> CameraGrid:

@@ -12,7 +12,7 @@ from simgen.check.depths import depth_findings
 from simgen.check.light import cost_findings, photon_findings, shortage_findings
 from simgen.check.scene_probe import Facts, Finding, probe_scene
 from simgen.check.sight import sight_findings
-from simgen.dataset.prepared import Prepared, needs_of, prepare, prepare_scene
+from simgen.dataset.prepared import Prepared, prepare, prepare_scene
 from simgen.spec.materials import is_clear
 from simgen.spec.recipe import Recipe, Render, recipe_file
 from simgen.spec.scene import Scene
@@ -45,7 +45,7 @@ def lint(
     )
     title = target.recipe.title or target.scene.title
     line = f"{title}: {views}, {pitch}, {sensor.cfa}{''.join(first_values)}"
-    return line, shortage_findings(needs_of(target.recipe)) or findings(probe_scene(target))
+    return line, shortage_findings(target.needs) or findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:

@@ -1,22 +1,16 @@
 """From a recipe to a dataset on disk: resources, order of work, resuming, many seeds.
 
-benchmark_datasets  The datasets of a benchmark, in order: of each scene its photons by seed, binary frames,
-                  and full light.
-certificate       Whether the datasets of a benchmark are those that were published: the same bytes, or the
-                  same light.
+benchmark_making  Making the public benchmark: all of its datasets as one collection, and their
+                  certificate.
 dataset_collection  Many datasets as one collection: a series of recipes, each made as a job, one index
                   for all of them.
 dataset_folder    Whose folder it is: what identifies a dataset, finished ones, and unfinished ones that
                   one run works on.
-definition        What a benchmark is: its scenes, each of a kind and in one half, its amounts of light,
-                  and its seeds.
-generation        From a recipe to a dataset folder: the order of the work.
-making            Making a benchmark: all of its datasets as one collection, and the certificate of what
-                  they are.
-prepared          A recipe with all that it names, and the parts of it that each stage of the work takes.
+generation        From a recipe to a dataset folder: the order of the work, and what datasets have in
+                  common.
+prepared          A recipe with all that it names, and what each stage of the work takes of it.
 rendered_views    Radiance images of every view on disk: products of a dataset, or what its photon counts
                   are drawn from.
-resources         What a recipe takes of the machine, estimated before any work: memory of each step,
-                  bytes of each product.
-reuse             What datasets that are made one after another have in common, made once.
+resources         What a recipe takes of the machine, estimated before any work, and refused where it
+                  cannot fit.
 """

@@ -23,10 +23,9 @@ from pcii.io.collection_layout import (
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from pcii.store.safe_files import locked, named_in_errors, temporaries_of
-from simgen.dataset.dataset_folder import decisive_versions, finished, other_versions
-from simgen.dataset.generation import make
+from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_versions
+from simgen.dataset.generation import Reuse, make
 from simgen.dataset.prepared import prepare
-from simgen.dataset.reuse import Reuse
 from simgen.renderer import backend
 from simgen.spec.recipe import Recipe
 
@@ -34,44 +33,93 @@ Row = Mapping[str, Any]
 
 
 class Series(Protocol):
-    """Datasets of one collection, in order; a sweep over the fields of a recipe is one."""
+    """Datasets of one collection, in order: a sweep over the fields of a recipe, or a benchmark.
+
+    `fields` are names of what distinguishes the datasets, `base` is what all have in common, and files that
+    recipes name are in `recipe_folder`. Of each dataset there are the `values` of the fields, the name of its
+    `folder`, the same whatever other datasets there are, and its `recipe`, which raises `InputError` if its
+    values make none.
+    """
 
     @property
-    def fields(self) -> Sequence[str]:
-        """Names of what distinguishes the datasets."""
-        ...
-
+    def fields(self) -> Sequence[str]: ...
     @property
-    def base(self) -> Mapping[str, Any]:
-        """What all datasets have in common."""
-        ...
-
+    def base(self) -> Mapping[str, Any]: ...
     @property
-    def recipe_folder(self) -> Path:
-        """Where files are that recipes name."""
-        ...
-
+    def recipe_folder(self) -> Path: ...
     def __len__(self) -> int: ...
-
-    def values(self, number: int) -> Mapping[str, Any]:
-        """Value of each of the fields of a dataset."""
-        ...
-
-    def folder(self, number: int) -> str:
-        """Name of a dataset's folder, the same whatever other datasets there are."""
-        ...
-
-    def recipe(self, number: int) -> Recipe:
-        """The recipe of a dataset; raises `InputError` if its values make none."""
-        ...
+    def values(self, number: int) -> Mapping[str, Any]: ...
+    def folder(self, number: int) -> str: ...
+    def recipe(self, number: int) -> Recipe: ...
 
 
-def begin(series: Series, out: Path) -> None:
+def generate_collection(
+    series: Series, out: Path, executor: Executor = ALONE, report: Report = silent
+) -> list[str]:
+    """Make all datasets of a series in the folder `out`, or go on with them; faults of those that failed.
+
+    A dataset that cannot be made holds up no other. The index is written at the end, also of work that is
+    interrupted. Raises `InputError` for a folder that holds anything else, and what is no fault of a
+    single dataset, such as a full disk.
+    """
+    backend.choose()  # before work is distributed: a missing backend is reported once
+    out = out.resolve()
+    with named_in_errors(out):
+        _begin(series, out)
+    rows, faults, pieces = dict[int, Row](), list[str](), range(len(series))
+    try:
+        with closing(executor.run(DatasetJob(series, out), pieces, report)) as work:
+            for done in work:
+                if done.result is None:
+                    faults.append(done.fault)
+                else:
+                    rows[done.piece] = done.result
+                report("datasets", len(rows) + len(faults), len(pieces))
+    finally:
+        with named_in_errors(out):
+            _write_whole_index(series, out, list(rows.values()))
+    return faults
+
+
+class DatasetJob:
+    """Makes datasets of `series` in the folder `out`; keeps what one has in common with the next."""
+
+    def __init__(self, series: Series, out: Path) -> None:
+        self.series, self.out, self.reuse = series, out, Reuse()
+        self.versions = decisive_versions()
+
+    def __call__(self, piece: int) -> Row:
+        """Make one dataset, unless it is finished; its row of the index.
+
+        Raises `BusyError` if another process is at it, `InputError` if it cannot be made, or if this process
+        has other versions of the software than the one that made the job.
+        """
+        differences = other_versions(self.versions)
+        if differences:
+            raise InputError(
+                f"{self.name(piece)}: the collection is of other software ({differences}); install that"
+            )
+        prepared = prepare(self.series.recipe(piece), self.series.recipe_folder)
+        folder = self.out / self.series.folder(piece)
+        # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
+        manifest = find_finished(folder, prepared.identity, content=False)
+        return _row(self.series, piece, folder, manifest or make(prepared, folder, silent, self.reuse))
+
+    def name(self, piece: int) -> str:
+        """The dataset's folder."""
+        return str(self.out / self.series.folder(piece))
+
+    def use_threads(self, count: int) -> None:
+        """Let the renderer run on so many threads."""
+        backend.use_threads(count)
+
+
+def _begin(series: Series, out: Path) -> None:
     """Make the folder of a collection, or see that it is one of the same recipe.
 
     Other values of the swept fields may be there already; a collection that ended without any dataset gives
-    way to another. `InputError` for a file, a dataset, the
-    collection of another recipe or other software, or a folder that holds something else.
+    way to another. `InputError` for a file, a dataset, the collection of another recipe or other software, or
+    a folder that holds something else.
     """
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
@@ -91,11 +139,11 @@ def begin(series: Series, out: Path) -> None:
         raise InputError(
             f"{out}: holds the collection of another recipe or of other swept fields; name a new folder"
         )
-    differ = other_versions(known.get("versions", {}))
-    if differ:
+    differences = other_versions(known.get("versions", {}))
+    if differences:
         raise InputError(
-            f"{out}: holds the collection of other software, whose photons may differ ({differ}); name a new "
-            "folder, or install that software"
+            f"{out}: holds the collection of other software, whose photons may differ ({differences}); name "
+            "a new folder, or install that software"
         )
 
 
@@ -106,119 +154,44 @@ def _is_free(out: Path) -> bool:
     return (out / INDEX).is_file() and not any(entry.is_dir() for entry in os.scandir(out))
 
 
-def row_of(series: Series, number: int, out: Path, manifest: Mapping[str, Any]) -> Row:
-    """The index's row of a finished dataset."""
-    name = series.folder(number)
-    return index_row(name, series.values(number), manifest, out / name / MANIFEST)
+def _row(series: Series, number: int, folder: Path, manifest: Mapping[str, Any]) -> Row:
+    return index_row(folder.name, series.values(number), manifest, folder / MANIFEST)
 
 
-def write_whole_index(series: Series, out: Path, rows: Mapping[int, Row]) -> None:
-    """Write the index of all finished datasets in the folder: these of the series by number, and others.
+def _write_whole_index(series: Series, out: Path, rows: Sequence[Row]) -> None:
+    """Write the index of all finished datasets in the folder, `rows` and those that others have made.
 
-    Others are those that the index listed before, and those that other processes have finished. Nothing is
-    written where that is there already, so that a folder that is read-only will do.
+    Nothing is written where it is there already, so that a folder that is read-only will do.
     """
-    if temporaries_of(out, INDEX, COLLECTION) or not _is_listed(out, _finished_rows(series, out, rows)):
+    content = index_bytes(_all_rows(series, out, rows))
+    is_written = (out / INDEX).is_file() and (out / INDEX).read_bytes() == content
+    if temporaries_of(out, INDEX, COLLECTION) or not is_written:
         with locked(out / COLLECTION, wait=True):
-            for left in temporaries_of(out, INDEX, COLLECTION):
-                left.unlink()
-            write_index(out, _finished_rows(series, out, rows))
+            for temporary in temporaries_of(out, INDEX, COLLECTION):
+                temporary.unlink()
+            write_index(out, _all_rows(series, out, rows))
 
 
-def _is_listed(out: Path, rows: Sequence[Row]) -> bool:
-    """Whether the index is that of these rows."""
-    return (out / INDEX).is_file() and (out / INDEX).read_bytes() == index_bytes(rows)
-
-
-def _finished_rows(series: Series, out: Path, rows: Mapping[int, Row]) -> list[Row]:
-    listed = {row["path"]: row for row in _known(out)}
+def _all_rows(series: Series, out: Path, rows: Sequence[Row]) -> list[Row]:
+    """These rows, those of the index as it is, and of what other processes have finished; in order."""
+    by_name = {row["path"]: row for row in [*_rows_of_index(out), *rows]}
     present = {entry.name for entry in os.scandir(out) if entry.is_dir()}
-    found: dict[str, Row] = {}
-    for number in range(len(series)):
-        name = series.folder(number)
-        row = rows.get(number) or listed.get(name)
-        if row is None and name in present and _is_finished(out / name):
-            row = row_of(series, number, out, read_written_manifest(out / name))
-        if row is not None:
-            found[name] = row
-    others = {name: row for name, row in listed.items() if name not in found and name in present}
-    return [*found.values(), *others.values()]
+    names = [series.folder(number) for number in range(len(series))]
+    for number, name in enumerate(names):
+        folder = out / name
+        is_missing = name in present and name not in by_name
+        if is_missing and (folder / MANIFEST).is_file() and not (folder / MARKER).exists():
+            by_name[name] = _row(series, number, folder, read_written_manifest(folder))
+    return [by_name[name] for name in dict.fromkeys([*names, *by_name]) if name in by_name]
 
 
-def _is_finished(folder: Path) -> bool:
-    return (folder / MANIFEST).is_file() and not (folder / MARKER).exists()
-
-
-def _known(out: Path) -> list[dict[str, Any]]:
+def _rows_of_index(out: Path) -> list[Row]:
     """Rows of the index as it is, but for those whose datasets are gone or others by now."""
-    if not (out / INDEX).is_file():
-        return []
-    rows = []
-    for row in read_index(out):
+    rows: list[Row] = []
+    for row in read_index(out) if (out / INDEX).is_file() else ():
         try:
             check_manifest(out, row)
         except InputError:
             continue
         rows.append(row)
     return rows
-
-
-class DatasetJob:
-    """Makes datasets of `series` in the folder `out`; keeps what one has in common with the next."""
-
-    def __init__(self, series: Series, out: Path) -> None:
-        self.series, self.out, self.reuse = series, out, Reuse()
-        self.versions = decisive_versions()
-
-    def __call__(self, piece: int) -> Row:
-        """Make one dataset, unless it is finished; its row of the index.
-
-        Raises `BusyError` if another process is at it, `InputError` if it cannot be made, or if this process
-        has other versions of the software than the one that made the job.
-        """
-        differ = other_versions(self.versions)
-        if differ:
-            raise InputError(
-                f"{self.name(piece)}: the collection is made with other software ({differ}); install that"
-            )
-        prepared = prepare(self.series.recipe(piece), self.series.recipe_folder)
-        folder = self.out / self.series.folder(piece)
-        # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
-        manifest = finished(folder, prepared.identity, content=False)
-        return row_of(self.series, piece, self.out, manifest or make(prepared, folder, silent, self.reuse))
-
-    def name(self, piece: int) -> str:
-        """The dataset's folder."""
-        return str(self.out / self.series.folder(piece))
-
-    def use_threads(self, count: int) -> None:
-        """Let the renderer run on so many threads."""
-        backend.use_threads(count)
-
-
-def generate_collection(
-    series: Series, out: Path, executor: Executor = ALONE, report: Report = silent
-) -> list[str]:
-    """Make all datasets of a series in the folder `out`, or go on with them; faults of those that failed.
-
-    A dataset that cannot be made holds up no other. The index is written at the end, also of work that is
-    interrupted. Raises `InputError` for a folder that holds anything else, and what is no fault of a
-    single dataset, such as a full disk.
-    """
-    backend.choose()  # before work is distributed: a missing backend is reported once
-    out = out.resolve()
-    with named_in_errors(out):
-        begin(series, out)
-    rows, faults, pieces = dict[int, Row](), list[str](), range(len(series))
-    try:
-        with closing(executor.run(DatasetJob(series, out), pieces, report)) as work:
-            for done in work:
-                if done.result is None:
-                    faults.append(done.fault)
-                else:
-                    rows[done.piece] = done.result
-                report("datasets", len(rows) + len(faults), len(pieces))
-    finally:
-        with named_in_errors(out):
-            write_whole_index(series, out, rows)
-    return faults

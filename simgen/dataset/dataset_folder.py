@@ -34,7 +34,7 @@ def other_versions(recorded: Mapping[str, str]) -> str:
     return software.differences(known, decisive_versions())
 
 
-def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
+def find_finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any] | None:
     """The manifest if `out` is this very dataset, finished and whole; None if it is still to do.
 
     Files are compared by their hashes, without `content` by their sizes. `InputError` for a file, or for a
@@ -43,10 +43,10 @@ def finished(out: Path, identity: str, *, content: bool = True) -> dict[str, Any
     # In this order, since another run may finish it meanwhile: the manifest is there before the mark is gone.
     if DATASET_FOLDER.guard(out) <= {MARKER} or (out / MARKER).is_file():
         return None
-    return whole(out, identity, content=content)
+    return read_whole(out, identity, content=content)
 
 
-def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
+def read_whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
     manifest = read_written_manifest(out)
     if manifest.get("identity") != identity:
@@ -56,25 +56,26 @@ def whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
 
 
 @contextmanager
-def claimed(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
+def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
     """Mark the folder as this recipe's unfinished dataset, and keep other runs out of it; the mark.
 
     If nothing was put into the folder before the block raises, the mark is removed, and what folders were
     made for it. Raises `BusyError` at once if another process is making the dataset.
     """
     new = [folder for folder in (out, *out.parents) if not folder.exists()]
+    marker = out / MARKER
     try:
-        with locked(out / MARKER, wait=False) as file:
+        with locked(marker, wait=False) as file:
             text = file.read()
             if text:
-                _check_begun(out / MARKER, text, identity, engine)
+                _check_mark(marker, text, identity, engine)
             else:
                 mark = {"identity": identity, "versions": versions(), "backend": engine}
                 file.write(json.dumps(mark).encode())
                 file.flush()
                 os.fsync(file.fileno())
             try:
-                yield out / MARKER
+                yield marker
             except BaseException:
                 _leave_nothing(out, new)
                 raise
@@ -91,31 +92,31 @@ def _leave_nothing(out: Path, new: Sequence[Path]) -> None:
                 folder.rmdir()
 
 
-def _other(out: Path, what: str, made_with: Mapping[str, str]) -> InputError:
-    """That a folder holds something of another recipe, or of other versions of the software."""
-    differ = other_versions(made_with)
-    if differ:
-        return InputError(
-            f"{out}: holds the {what} of other software, whose photons may differ ({differ}); name a new or "
-            "empty folder, or install that software"
-        )
-    return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
-
-
-def _check_begun(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
-    """Raise `InputError` unless the dataset was begun for the same recipe on the same backend."""
+def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
+    """Raise `InputError` unless the mark is of the same recipe on the same backend."""
     decisive = ("variant", "mitsuba", "drjit")
+    out = marker.parent
     try:
-        begun = json.loads(text)
-        known, before = begun["identity"], {key: begun["backend"][key] for key in decisive}
-        made_with = {name: begun["versions"][name] for name in DECISIVE}
+        mark = json.loads(text)
+        known, before = mark["identity"], {key: mark["backend"][key] for key in decisive}
+        recorded = {name: mark["versions"][name] for name in DECISIVE}
     except (ValueError, KeyError, TypeError):
-        raise InputError(f"{marker}: damaged; delete the folder {marker.parent} to start again") from None
+        raise InputError(f"{marker}: damaged; delete the folder {out} to start again") from None
     if known != identity:
-        raise _other(marker.parent, "unfinished dataset", made_with)
+        raise _other(out, "unfinished dataset", recorded)
     if before != {key: engine[key] for key in decisive}:
         raise InputError(
-            f"{marker.parent}: was begun with {before['variant']}, and this machine now runs "
-            f"{engine['variant']}, whose pixels differ; delete the folder {marker.parent} to start again, "
-            "or set SIMGEN_BACKEND"
+            f"{out}: was begun with {before['variant']}, and this machine now runs {engine['variant']}, "
+            f"whose pixels differ; delete the folder {out} to start again, or set SIMGEN_BACKEND"
         )
+
+
+def _other(out: Path, what: str, recorded: Mapping[str, str]) -> InputError:
+    """That a folder holds something of another recipe, or of other versions of the software."""
+    differences = other_versions(recorded)
+    if differences:
+        return InputError(
+            f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a "
+            "new or empty folder, or install that software"
+        )
+    return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")

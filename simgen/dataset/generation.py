@@ -1,13 +1,12 @@
-"""From a recipe to a dataset folder: the order of the work."""
+"""From a recipe to a dataset folder: the order of the work, and what datasets have in common."""
 
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
-from functools import partial
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pcii.base.progress import Report, silent
 from pcii.io.dataset_layout import (
@@ -21,15 +20,12 @@ from pcii.io.dataset_layout import (
     write_manifest,
 )
 from pcii.store.file_list import list_files
-from pcii.store.safe_files import named_in_errors, sweep_temporaries
-from simgen.cameras.rig import Rig
-from simgen.dataset.dataset_folder import claimed, finished, versions, whole
-from simgen.dataset.prepared import Prepared, capture_of, least_samples, needs_of, prepare
+from pcii.store.safe_files import named_in_errors, new_folder_safely, sweep_temporaries
+from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
+from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved
-from simgen.dataset.resources import check_resources, fits
-from simgen.dataset.reuse import InCommon, Reuse, in_common
-from simgen.photons.candidates import Setup
-from simgen.photons.counting_plan import Capture, Plan, plan
+from simgen.dataset.resources import check_resources
+from simgen.photons.counting_plan import Plan
 from simgen.photons.photon_counting import draw_from_views, thin, write_counts
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
@@ -37,11 +33,155 @@ from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
 from simgen.truth.truth_file import TruthRequest, traced_for_visibility, write_truth
 
+Made = TypeVar("Made")
+
 RGB_UNIT = "linear sRGB whose luminance is in cd/m^2"
 SPECTRAL_UNIT = "cd/m^2 of light of 555 nm that gives as many photons to a pixel that detects them all"
+MAX_REUSED_BYTES = 1 << 26
+"""Larger folders are made anew rather than held in memory."""
 
 
-def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]:
+class Reuse:
+    """What datasets that are made one after another have in common, made once.
+
+    The scene in the renderer, the truth, and the plan of the counts, the last of each kind, with the key of
+    what it was made from (`Prepared`). None of it depends on which dataset is made first.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[str, tuple[str, Any]] = {}
+
+    def once(self, kind: str, key: str, make: Callable[[], Made]) -> Made:
+        """The last thing of this kind if it has this key, else what `make` gives."""
+        if self._last.get(kind, ("", None))[0] != key:
+            self._last.pop(kind, None)  # before another as large is made
+            self._last[kind] = key, make()
+        return self._last[kind][1]
+
+    def folder(self, key: str, folder: Path, make: Callable[[], None]) -> None:
+        """See that `folder` exists: left as it is, or a copy of the last one of this key, or by `make`."""
+        if folder.is_dir():
+            return
+        known, contents = self._last.get("folder", ("", {}))
+        if known == key:
+            with new_folder_safely(folder) as temporary:
+                for name, content in contents.items():
+                    (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+                    (temporary / name).write_bytes(content)
+            return
+        self._last.pop("folder", None)
+        make()
+        files = [file for file in folder.rglob("*") if file.is_file()]
+        if sum(file.stat().st_size for file in files) <= MAX_REUSED_BYTES:
+            self._last["folder"] = key, {str(file.relative_to(folder)): file.read_bytes() for file in files}
+
+
+@contextmanager
+def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
+    """Add the wall seconds of the block to those of a stage."""
+    start = time.perf_counter()
+    yield
+    timings_s[stage] = round(timings_s.get(stage, 0.0) + time.perf_counter() - start, 3)
+
+
+def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> dict[str, Any]:
+    """Make the dataset of `recipe` in the folder `out`; return its manifest.
+
+    Scenes are looked up in `recipe_folder`. An unfinished dataset of the same recipe is resumed, a finished
+    one is checked and left alone; a folder that holds anything else is refused with `InputError`.
+    """
+    prepared = prepare(recipe, recipe_folder)
+    return find_finished(out, prepared.identity) or make(prepared, out, report, Reuse())
+
+
+def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[str, Any]:
+    """Make a dataset that is not finished yet; its manifest. See `generate` for what is refused.
+
+    What it has in common with those made before with the same `reuse` is not made again. Raises
+    `BusyError` if another process is at it.
+    """
+    recipe, identity, timings_s = prepared.recipe, prepared.identity, dict[str, float]()
+    engine, counting = backend.describe(spectral=recipe.is_spectral), None
+    with named_in_errors(out), claim(out, identity, engine) as marker:
+        if (out / MANIFEST).is_file():  # another run has finished it since
+            marker.unlink()
+            return read_whole(out, identity, content=True)
+        check_resources(prepared.needs, None, out)
+        with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
+            render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
+        if recipe.products.counts:  # likewise: too much light
+            with _timed(timings_s, "plan"):
+                counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
+                check_resources(prepared.needs, counting, out)
+        sweep_temporaries(out)
+        photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
+        shutil.rmtree(out / RENDERED, ignore_errors=True)
+        with _timed(timings_s, "hash"):
+            budgets = (None, *recipe.photons.nested)
+            parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
+            files = list_files(out, [TRUTH, *parts, RADIANCE])
+        manifest = _description(prepared, render_scene) | {
+            "identity": identity,
+            "backend": engine,
+            "photons": photons,
+            "skipped": _skipped(prepared, photons, traced_for_visibility(out), render_scene),
+            "timings_s": timings_s,
+            "files": files,
+        }
+        write_manifest(out, manifest)
+        marker.unlink()
+    return read_written_manifest(out)
+
+
+def _write_products(
+    prepared: Prepared,
+    render_scene: RenderScene,
+    counting: Plan | None,
+    reuse: Reuse,
+    out: Path,
+    timings_s: dict[str, float],
+    report: Report,
+) -> dict[str, Any] | None:
+    """Write all products; what the manifest says of the photons, None without counts."""
+    recipe, capture, photons = prepared.recipe, prepared.capture, None
+    products, render = recipe.products, recipe.render
+
+    def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
+        options = {"with_origins": products.truth, "keeps_frames": products.frames}
+        return log | write_counts(capture, recipe.sensor, arrivals, out, **options)
+
+    if products.truth or products.view_truth:
+        request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
+        with _timed(timings_s, "truth"):
+            reuse.folder(
+                prepared.truth_key,
+                out / TRUTH,
+                lambda: write_truth(request, render_scene, capture.rig, out, report),
+            )
+    if counting is not None and counting.thins:
+        with _timed(timings_s, "photons"):
+            photons = write(*thin(capture, prepared.setup(render_scene), counting, report))
+    dense = None if counting is None or counting.thins else counting
+    views = RenderedViews(
+        capture,
+        recipe.sensor,
+        recipe.exposure,
+        products.radiance,
+        render.samples_per_pixel if dense is None else dense.samples,
+        render.background_samples_per_pixel if dense is None else None,
+        out,
+        are_for_counts=dense is not None,
+    )
+    if products.radiance != "none" or dense is not None:
+        with _timed(timings_s, "radiance"):
+            views.render(render_scene, report)
+    if dense is not None:
+        with _timed(timings_s, "counts"):
+            photons = write(*draw_from_views(capture, views.mosaic, views.variance, dense, report))
+    return photons
+
+
+def _description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]:
     """What a dataset is made from and with."""
     recipe, scene = prepared.recipe, prepared.scene
     channels = 3 if render_scene.filters is None else len(render_scene.filters.sensitivity)
@@ -61,168 +201,41 @@ def description(prepared: Prepared, render_scene: RenderScene) -> dict[str, Any]
     }
 
 
-def skipped(
-    prepared: Prepared,
-    photons: dict[str, Any] | None,
-    shadow_rays: int | None,
-    render_scene: RenderScene,
-    rig: Rig,
+def _skipped(
+    prepared: Prepared, photons: dict[str, Any] | None, shadow_rays: int | None, render_scene: RenderScene
 ) -> list[dict[str, Any]]:
     """What was not done: what, why, and how much work that saved, and its unit.
 
     `photons` is what the manifest says of them, `shadow_rays` how many were traced to count the cameras that
     see a point; both None if there was no such work.
     """
-    recipe, products = prepared.recipe, prepared.recipe.products
+    recipe, products, render = prepared.recipe, prepared.recipe.products, prepared.recipe.render
     grid = recipe.grid.camera_grid()
     pixels = grid.view_count * grid.height * grid.width
-    found: list[dict[str, Any]] = []
+    entries: list[dict[str, Any]] = []
 
     def add(what: str, why: str, saved: int, unit: str) -> None:
-        found.append({"what": what, "why": why, "saved": saved, "unit": unit})
+        entries.append({"what": what, "why": why, "saved": saved, "unit": unit})
 
     if photons is not None and photons.get("paths", 0) < photons.get("dense_paths_instead", 0):
         saved = photons["dense_paths_instead"] - photons["paths"]
         add("rendering for the photon counts", "photons are drawn one by one", saved, "light paths")
-    if products.radiance == "none" and (photons is None or photons["method"] == "thinning"):
-        paths = pixels * recipe.render.samples_per_pixel
+    is_dense = photons is not None and photons["method"] == "dense"
+    if products.radiance == "none" and not is_dense:
+        paths = pixels * render.samples_per_pixel
         add("radiance images", "the recipe does not ask for them", paths, "light paths")
     elif products.radiance == "mosaic" and recipe.cfa is not None:
         what = "two of three colours of the radiance images"
         add(what, "the Bayer pattern hides them", 8 * pixels, "bytes before compression")
-    renders_for_photons = photons is not None and photons["method"] == "dense"
-    if products.radiance != "none" and not renders_for_photons:
-        saved = background_paths_saved(render_scene, rig, recipe.render)
+    if products.radiance != "none" and not is_dense:
+        saved = background_paths_saved(render_scene, prepared.capture.rig, render)
         if saved:
-            why = f"the recipe asks for {recipe.render.background_samples_per_pixel} per pixel there"
+            why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
             add("samples where no object can be seen", why, saved, "light paths")
     if shadow_rays is not None:
-        what = "visibility of some points"
-        add(what, "no shape can stand in the way", pixels - shadow_rays, "rays")
+        add("visibility of some points", "no shape can stand in the way", pixels - shadow_rays, "rays")
     elif products.truth:
         add("visibility", "the recipe does not ask for it", pixels, "rays at most")
     if not products.view_truth:
         add("truth of every view", "the recipe does not ask for it", pixels, "first hits")
-    return found
-
-
-@dataclass
-class _Clock:
-    """Wall seconds by stage."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        start = time.perf_counter()
-        yield
-        spent = time.perf_counter() - start
-        self.seconds[name] = round(self.seconds.get(name, 0.0) + spent, 3)
-
-
-def generate(recipe: Recipe, recipe_folder: Path, out: Path, report: Report = silent) -> dict[str, Any]:
-    """Make the dataset of `recipe` in the folder `out`; return its manifest.
-
-    Scenes are looked up in `recipe_folder`. An unfinished dataset of the same recipe is resumed, a finished
-    one is checked and left alone; a folder that holds anything else is refused with `InputError`.
-    """
-    prepared = prepare(recipe, recipe_folder)
-    return finished(out, prepared.identity) or make(prepared, out, report, Reuse())
-
-
-def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[str, Any]:
-    """Make a dataset that is not finished yet; its manifest. See `generate` for what is refused.
-
-    What it has in common with those made before with the same `reuse` is not made again. Raises
-    `BusyError` if another process is at it.
-    """
-    recipe, identity = prepared.recipe, prepared.identity
-    needs = needs_of(recipe)
-    engine = backend.describe(spectral=recipe.is_spectral)
-    clock, made, capture = _Clock(), None, capture_of(recipe, prepared.seed)
-    common = in_common(reuse, prepared, engine)
-    with named_in_errors(out), claimed(out, identity, engine) as marker:
-        if (out / MANIFEST).is_file():  # another run has finished it since
-            marker.unlink()
-            return whole(out, identity, content=True)
-        check_resources(needs, None, out)
-        with clock.stage("load"):  # before anything is written: a bad scene shows here
-            render_scene = common.scene(prepared.render_scene)
-        setup = Setup(render_scene, capture.rig, capture.cfa, recipe.render.max_depth)
-        if recipe.products.counts:  # likewise: too much light
-            planning = partial(
-                plan,
-                capture,
-                setup,
-                engine["kind"],
-                least_samples(recipe),
-                may_explore=fits(needs),
-            )
-            with clock.stage("plan"):
-                made = common.plan(planning)
-                check_resources(needs, made, out)
-        sweep_temporaries(out)
-        photons = _work(prepared, capture, setup, made, common, out, clock, report)
-        shutil.rmtree(out / RENDERED, ignore_errors=True)
-        with clock.stage("hash"):
-            budgets = (None, *recipe.photons.nested)
-            parts = [nested_name(part, budget) for part in (COUNTS, PHOTON_TRUTH) for budget in budgets]
-            files = list_files(out, [TRUTH, *parts, RADIANCE])
-        manifest = description(prepared, render_scene) | {
-            "identity": identity,
-            "backend": engine,
-            "photons": photons,
-            "skipped": skipped(prepared, photons, traced_for_visibility(out), render_scene, capture.rig),
-            "timings_s": clock.seconds,
-            "files": files,
-        }
-        write_manifest(out, manifest)
-        marker.unlink()
-    return read_written_manifest(out)
-
-
-def _work(
-    prepared: Prepared,
-    capture: Capture,
-    setup: Setup,
-    made: Plan | None,
-    common: InCommon,
-    out: Path,
-    clock: _Clock,
-    report: Report,
-) -> dict[str, Any] | None:
-    """Write all products; what the manifest says of the photons, None without counts."""
-    recipe, products, photons = prepared.recipe, prepared.recipe.products, None
-
-    def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
-        kept = {"with_origins": products.truth, "keeps_frames": products.frames}
-        return log | write_counts(capture, recipe.sensor, arrivals, out, **kept)
-
-    if products.truth or products.view_truth:
-        request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
-        with clock.stage("truth"):
-            common.truth(
-                out / TRUTH, lambda: write_truth(request, setup.render_scene, capture.rig, out, report)
-            )
-    if made is not None and made.thins:
-        with clock.stage("photons"):
-            photons = write(*thin(capture, setup, made, report))
-    renders = made is not None and photons is None
-    views = RenderedViews(
-        capture.rig,
-        recipe.sensor,
-        recipe.exposure,
-        products.radiance,
-        made.samples if made is not None and renders else recipe.render.samples_per_pixel,
-        None if renders else recipe.render.background_samples_per_pixel,
-        capture.seed,
-        out,
-        are_for_counts=renders,
-    )
-    if products.radiance != "none" or renders:
-        with clock.stage("radiance"):
-            views.render(setup.render_scene, report)
-    if made is not None and renders:
-        with clock.stage("counts"):
-            photons = write(*draw_from_views(capture, views.mosaic, views.variance, made, report))
-    return photons
+    return entries

@@ -1,4 +1,4 @@
-"""A recipe with all that it names, and the parts of it that each stage of the work takes."""
+"""A recipe with all that it names, and what each stage of the work takes of it."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,8 +15,9 @@ from simgen.base import random_streams as seeds
 from simgen.base.file_lookup import asset
 from simgen.cameras.rig import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
-from simgen.dataset.resources import Needs
-from simgen.photons.counting_plan import Capture
+from simgen.dataset.resources import Needs, available_bytes, shortage
+from simgen.photons.candidates import Setup
+from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.sensor.detector import photons_per_radiance, sensitivities
@@ -58,11 +59,11 @@ class Prepared:
         of the same photons, how they are read out (in frames of so many bits) and words about the scene make
         no other draw.
         """
-        said = {"title", "description", "planes_mm"}
+        words = {"title", "description", "planes_mm"}
         decisive = self.recipe.model_dump(mode="json", include={"grid", "sensor", "photons", "exposure"})
         del decisive["photons"]["nested"]
         del decisive["sensor"]["frames"], decisive["sensor"]["bits"]
-        drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=said)}
+        drawn = self.scene_content | {"scene": self.scene.model_dump(mode="json", exclude=words)}
         return seeds.seed_of_draw(self.recipe.seed, [drawn, decisive, self.recipe.render.max_depth])
 
     @cached_property
@@ -83,6 +84,39 @@ class Prepared:
         }
         return hash_json(content)
 
+    @cached_property
+    def scene_key(self) -> str:
+        """Hash of what the scene in the renderer depends on."""
+        return hash_json([self.scene_content, self.recipe.render.max_depth])
+
+    @cached_property
+    def truth_key(self) -> str:
+        """Hash of what the truth on disk depends on."""
+        recipe = self.recipe_of_data
+        return hash_json([self._camera_key, recipe["products"], recipe["analysis"]["z_mm"]])
+
+    @cached_property
+    def light_key(self) -> str:
+        """Hash of what the plan of the counts depends on: not the seed, unless cameras have errors."""
+        light = [self.recipe_of_data[part] for part in ("sensor", "photons", "exposure")]
+        return hash_json([self._camera_key, light, least_samples(self.recipe)])
+
+    @property
+    def _camera_key(self) -> str:
+        grid = self.recipe.grid
+        seed_of_errors = None if grid.errors is None else self.recipe.seed
+        return hash_json([self.scene_key, grid.model_dump(mode="json"), seed_of_errors])
+
+    @property
+    def needs(self) -> Needs:
+        """What takes memory and disk."""
+        return needs_of(self.recipe)
+
+    @cached_property
+    def capture(self) -> Capture:
+        """What decides which photons arrive where."""
+        return capture_of(self.recipe, self.seed)
+
     def render_scene(self) -> RenderScene:
         """The scene in the renderer, in the variant that the recipe needs."""
         with ThreadPoolExecutor(1) as beside:  # the files are read by another process while this one loads
@@ -90,6 +124,21 @@ class Prepared:
             mi = backend.load(spectral=self.recipe.is_spectral)
             described = self.scene, self.folder, self.recipe.render.max_depth, self.curves
             return build(mi, *described, assets.result())
+
+    def setup(self, render_scene: RenderScene) -> Setup:
+        """The scene as the recipe's cameras and sensor see it."""
+        return Setup(render_scene, self.capture.rig, self.capture.cfa, self.recipe.render.max_depth)
+
+    def plan(self, render_scene: RenderScene) -> Plan:
+        """How the photon counts will be made, as memory is now; raises `InputError` for too many photons."""
+        needs, room = self.needs, available_bytes()
+        return plan(
+            self.capture,
+            self.setup(render_scene),
+            backend.choose().kind,
+            least_samples(self.recipe),
+            may_explore=lambda counting: shortage(needs, counting, room) is None,
+        )
 
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
@@ -125,14 +174,8 @@ def capture_of(recipe: Recipe, seed: int) -> Capture:
 
 def needs_of(recipe: Recipe) -> Needs:
     """What of a recipe takes memory and disk."""
-    return Needs(
-        recipe.grid,
-        recipe.sensor,
-        recipe.photons,
-        recipe.exposure,
-        recipe.products,
-        planes=len(recipe.analysis.z_mm),
-    )
+    planes = len(recipe.analysis.z_mm)
+    return Needs(recipe.grid, recipe.sensor, recipe.photons, recipe.products, planes)
 
 
 def least_samples(recipe: Recipe) -> int:

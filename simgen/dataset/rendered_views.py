@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_
 from pcii.store.safe_files import write_json_safely
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
+from simgen.photons.counting_plan import Capture
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view, windows_of_objects
 from simgen.sensor.detector import full_light_image, photons_per_radiance
@@ -28,56 +28,48 @@ RENDERED = ".rendered"
 
 def exact_view(
     render_scene: RenderScene,
-    rig: Rig,
+    capture: Capture,
     k: int,
     l: int,
     samples_per_pixel: int,
-    seed: int,
     background_samples: int | None = None,
 ) -> np.ndarray:
-    """Radiance (H, W, C), float32, of camera (k, l), with noise of its own; `seed` is that of the draw."""
+    """Radiance (H, W, C), float32, of camera (k, l), with noise of its own."""
     return render_view(
         render_scene,
-        rig,
+        capture.rig,
         k,
         l,
         samples_per_pixel=samples_per_pixel,
         background_samples=background_samples,
-        seed=seeds.integer(seed, view=k * rig.grid.cols + l, stage="radiance"),
+        seed=seeds.integer(capture.seed, view=_view_number(capture, k, l), stage="radiance"),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class HalvedView:
-    """A view (H, W, C) as the mean of two halves of its samples, and the noise that their difference tells.
-
-    `variance` (C,) is that of the mean, in the sensor's colours, summed over the pixels of each.
-    """
-
-    image: np.ndarray
-    variance: np.ndarray
 
 
 def halved_view(
-    render_scene: RenderScene, rig: Rig, k: int, l: int, samples_per_pixel: int, seed: int, cfa: str | None
-) -> HalvedView:
-    """Radiance of camera (k, l) with as many samples per pixel, or one more; `seed` is that of the draw."""
-    number, samples = k * rig.grid.cols + l, math.ceil(samples_per_pixel / 2)
+    render_scene: RenderScene, capture: Capture, k: int, l: int, samples_per_pixel: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Radiance (H, W, C), float32, of camera (k, l) as the mean of two halves of its samples, and its noise.
+
+    It has as many samples per pixel, or one more. The noise (C,), which follows from the difference of the
+    halves, is the variance of the mean in the sensor's colours, summed over the pixels of each.
+    """
+    view, samples = _view_number(capture, k, l), math.ceil(samples_per_pixel / 2)
     one, other = (
         render_view(
             render_scene,
-            rig,
+            capture.rig,
             k,
             l,
             samples_per_pixel=samples,
-            seed=seeds.integer(seed, view=number, stage="radiance", part=part),
+            seed=seeds.integer(capture.seed, view=view, stage="radiance", part=part),
         ).astype(np.float64)
         for part in (0, 1)
     )
-    apart = sense(one - other, cfa)
-    colours = colour_index(apart.shape[0], apart.shape[1], cfa).ravel()
-    variance = np.bincount(colours, (apart**2).ravel() / 4, minlength=channel_count(cfa))
-    return HalvedView(((one + other) / 2).astype(np.float32), variance)
+    apart = sense(one - other, capture.cfa)
+    colours = colour_index(apart.shape[0], apart.shape[1], capture.cfa).ravel()
+    variance = np.bincount(colours, (apart**2).ravel() / 4, minlength=channel_count(capture.cfa))
+    return ((one + other) / 2).astype(np.float32), variance
 
 
 def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
@@ -92,76 +84,78 @@ def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) 
 
 @dataclass(frozen=True, eq=False)
 class RenderedViews:
-    """The rendered views of the dataset in the folder `out`: of which cameras, and what is kept of them.
+    """The rendered views of the dataset in the folder `out`.
 
     `radiance` is the product: "rgb" is all colours, "mosaic" the pixel's own. With `sensor.full_light` it is
     what a camera with this `exposure` reads, else exact radiance.
     """
 
-    rig: Rig
+    capture: Capture
     sensor: Sensor
     exposure: Exposure | None
     radiance: Literal["none", "mosaic", "rgb"]
     samples_per_pixel: int
     background_samples: int | None
-    seed: int
     out: Path
     are_for_counts: bool = False
     """Whether counts are drawn from them: then each is rendered in two halves, and its noise is known."""
 
     def render(self, render_scene: RenderScene, report: Report) -> None:
         """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
-        grid, written, stage = self.rig.grid, 0, "views"
+        grid, stage = self.capture.grid, "views"
         if self.are_for_counts:
             stage = f"views of {self.samples_per_pixel} samples per pixel, for the counts"
         with ThreadPoolExecutor(1, "views") as writer:
-            writing: deque[Future[None]] = deque()
-            for k, l in np.ndindex(grid.rows, grid.cols):
-                view = None
-                if not self._exact_file(k, l).is_file() or (
-                    self.are_for_counts and not self._noise_file(k, l).is_file()
-                ):
-                    view = self._exact(render_scene, k, l)
-                writing.append(writer.submit(self._write, k, l, view))
-                while writing and (len(writing) > 1 or k * grid.cols + l == grid.view_count - 1):
-                    writing.popleft().result()
-                    written += 1
-                    report(stage, written, grid.view_count)
-
-    def _exact(self, render_scene: RenderScene, k: int, l: int) -> HalvedView:
-        samples, seed = self.samples_per_pixel, self.seed
-        if self.are_for_counts:
-            return halved_view(render_scene, self.rig, k, l, samples, seed, self.sensor.bayer)
-        image = exact_view(render_scene, self.rig, k, l, samples, seed, self.background_samples)
-        return HalvedView(image, np.zeros(0))
-
-    def _write(self, k: int, l: int, view: HalvedView | None) -> None:
-        """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""
-        cfa, exact = self.sensor.bayer, self._exact_file(k, l)
-        if view is not None:
-            image = view.image if self.radiance == "rgb" else sense(view.image, cfa)[..., None]
-            write_exr_safely(exact, image)
-            if self.are_for_counts:
-                write_json_safely(self._noise_file(k, l), view.variance.tolist())
-        if self.sensor.full_light is not None and self.radiance != "none":
-            assert self.exposure is not None
-            measured = full_light_image(
-                read_exr(exact),
-                cfa,
-                photons_per_radiance(self.exposure, self.rig.grid.pixel_mm),
-                self.sensor,
-                seeds.generator(self.seed, view=k * self.rig.grid.cols + l, stage="full light"),
-            )
-            write_exr_safely(self.out / radiance_name(k, l), measured)
+            before: Future[None] | None = None
+            for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
+                view = None if self._is_rendered(k, l) else self._rendered(render_scene, k, l)
+                if before is not None:
+                    before.result()
+                    report(stage, number, grid.view_count)
+                before = writer.submit(self._write, k, l, view)
+            if before is not None:
+                before.result()
+                report(stage, grid.view_count, grid.view_count)
 
     def mosaic(self, k: int, l: int) -> np.ndarray:
         """Radiance that each of the sensor's pixels gets in a view that is on disk, (H, W)."""
         image = read_exr(self._exact_file(k, l))
-        return sense(image, self.sensor.bayer) if image.shape[2] == 3 else image[..., 0]
+        return sense(image, self.capture.cfa) if image.shape[2] == 3 else image[..., 0]
 
     def variance(self, k: int, l: int) -> np.ndarray:
-        """Noise of a view that is on disk, as of `HalvedView`."""
+        """Noise (C,) of a view that is on disk, as of `halved_view`."""
         return np.array(json.loads(self._noise_file(k, l).read_bytes()))
+
+    def _is_rendered(self, k: int, l: int) -> bool:
+        return self._exact_file(k, l).is_file() and (
+            not self.are_for_counts or self._noise_file(k, l).is_file()
+        )
+
+    def _rendered(self, render_scene: RenderScene, k: int, l: int) -> tuple[np.ndarray, np.ndarray | None]:
+        """Radiance of a view, and its noise if counts are drawn from it."""
+        if self.are_for_counts:
+            return halved_view(render_scene, self.capture, k, l, self.samples_per_pixel)
+        samples = self.samples_per_pixel, self.background_samples
+        return exact_view(render_scene, self.capture, k, l, *samples), None
+
+    def _write(self, k: int, l: int, view: tuple[np.ndarray, np.ndarray | None] | None) -> None:
+        """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""
+        capture, exact = self.capture, self._exact_file(k, l)
+        if view is not None:
+            image, variance = view
+            write_exr_safely(exact, image if self.radiance == "rgb" else sense(image, capture.cfa)[..., None])
+            if variance is not None:
+                write_json_safely(self._noise_file(k, l), variance.tolist())
+        if self.sensor.full_light is not None and self.radiance != "none":
+            assert self.exposure is not None
+            measured = full_light_image(
+                read_exr(exact),
+                capture.cfa,
+                photons_per_radiance(self.exposure, capture.grid.pixel_mm),
+                self.sensor,
+                seeds.generator(capture.seed, view=_view_number(capture, k, l), stage="full light"),
+            )
+            write_exr_safely(self.out / radiance_name(k, l), measured)
 
     def _noise_file(self, k: int, l: int) -> Path:
         return self.out / radiance_name(k, l).replace(RADIANCE, RENDERED, 1).replace(".exr", ".json")
@@ -171,3 +165,7 @@ class RenderedViews:
         name = radiance_name(k, l)
         is_product = self.radiance != "none" and self.sensor.full_light is None
         return self.out / (name if is_product else name.replace(RADIANCE, RENDERED, 1))
+
+
+def _view_number(capture: Capture, k: int, l: int) -> int:
+    return k * capture.grid.cols + l

@@ -62,18 +62,18 @@ def main(log: Path) -> None:
 
     assert dataset_collection
     backend.load()
-    work, load = generation._work, prepared.Prepared.render_scene
+    work, load = generation._write_products, prepared.Prepared.render_scene
 
     def noted(*given: Any) -> Any:
         with log.open("a") as file:
-            print(given[5], file=file, flush=True)  # the folder
+            print(given[4], file=file, flush=True)  # the folder
         return work(*given)
 
     def slow(self: prepared.Prepared) -> Any:
         time.sleep(LOAD_S)
         return load(self)
 
-    generation._work, prepared.Prepared.render_scene = noted, slow
+    generation._write_products, prepared.Prepared.render_scene = noted, slow
     print("ready", flush=True)
     for line in sys.stdin:
         start, said = time.monotonic(), io.StringIO()

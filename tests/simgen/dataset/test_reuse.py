@@ -8,22 +8,24 @@ from property_settings import mostly_slow
 from tiny import GRID_2_X_2
 
 from pcii.base.progress import silent
-from simgen.dataset import generation as module
-from simgen.dataset.generation import generate, make
+from simgen.dataset import generation
+from simgen.dataset.generation import Reuse, generate, make
 from simgen.dataset.prepared import Prepared, prepare
-from simgen.dataset.reuse import Reuse
 from simgen.spec.recipe import load_recipe
 
 pytestmark = pytest.mark.renders
 TOML = f'scene = "plain_pair"\nseed = 3\n{GRID_2_X_2}[photons]\nbudget = 100\n'
 ERRORS = "grid.errors={position_sd_mm=[1.0,1.0,0.5]}"
-OTHERS = {
-    "another seed": ["seed=4"],
-    "another scene": ["scene=two_objects"],
-    "another grid": ["grid.pitch_mm=[9.0,18.0]"],
-    "errors of cameras from another seed": [ERRORS, "seed=4"],
-    "other planes": ["analysis.z_mm=[500.0]"],
-}
+PLAN, TRUTH, SCENE = "plan", "write_truth", "render_scene"
+CHANGES: list[tuple[list[str], set[str]]] = [
+    (["photons.budget=300"], {PLAN}),
+    ([ERRORS, "seed=4"], {PLAN, TRUTH}),
+    (["seed=4"], set[str]()),
+    (["analysis.z_mm=[500.0]"], {TRUTH}),
+    (["grid.pitch_mm=[9.0,18.0]"], {PLAN, TRUTH}),
+    (["scene=two_objects"], {SCENE, PLAN, TRUTH}),
+]
+"""Settings that differ from the dataset before, and the work that has to be done again."""
 
 
 @pytest.fixture
@@ -33,51 +35,45 @@ def recipe_file(tmp_path: Path) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("others", [["another scene"], pytest.param(list(OTHERS), marks=pytest.mark.slow)])
-def test_datasets_are_the_same_whatever_was_made_before(
-    others: list[str], recipe_file: str, tmp_path: Path
-) -> None:
-    reuse, between = Reuse(), {name: OTHERS[name] for name in others}
-    for name, overrides in {"first": list[str](), **between, "the first again": []}.items():
-        recipe, near = load_recipe(recipe_file, overrides)
-        make(prepare(recipe, near), tmp_path / "reused" / name, silent, reuse)
-        generate(recipe, near, tmp_path / "alone" / name)
-        assert digest(tmp_path / "reused" / name) == digest(tmp_path / "alone" / name), name
-
-
 @pytest.mark.parametrize(
-    ("overrides", "again"),
-    mostly_slow(
-        [
-            (["seed=4"], set[str]()),
-            (["photons.budget=300"], {"plan"}),
-            (["analysis.z_mm=[500.0]"], {"write_truth"}),
-            (["grid.pitch_mm=[9.0,18.0]"], {"plan", "write_truth"}),
-            ([ERRORS, "seed=4"], {"plan", "write_truth"}),
-            (["scene=two_objects"], {"render_scene", "plan", "write_truth"}),
-        ],
-        quick=[(["photons.budget=300"], {"plan"}), ([ERRORS, "seed=4"], {"plan", "write_truth"})],
-    ),
+    "others",
+    [
+        [["scene=two_objects"]],
+        pytest.param([overrides for overrides, _ in CHANGES], marks=pytest.mark.slow),
+    ],
 )
+def test_datasets_are_the_same_whatever_was_made_before(
+    others: list[list[str]], recipe_file: str, tmp_path: Path
+) -> None:
+    reuse = Reuse()
+    for number, overrides in enumerate([[], *others, []]):
+        recipe, near = load_recipe(recipe_file, overrides)
+        reused, alone = tmp_path / f"reused {number}", tmp_path / f"alone {number}"
+        make(prepare(recipe, near), reused, silent, reuse)
+        generate(recipe, near, alone)
+        assert digest(reused) == digest(alone), overrides
+
+
+@pytest.mark.parametrize(("overrides", "again"), mostly_slow(CHANGES, quick=CHANGES[:2]))
 def test_only_what_depends_on_a_change_is_made_again(
     recipe_file: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, overrides: list[str], again: set[str]
 ) -> None:
-    made: list[str] = []
-    for owner, name in ((Prepared, "render_scene"), (module, "plan"), (module, "write_truth")):
+    works: list[str] = []
+    for owner, name in ((Prepared, SCENE), (Prepared, PLAN), (generation, TRUTH)):
         work = getattr(owner, name)
 
-        def watched(*args: object, work: object = work, name: str = name, **options: object) -> object:
-            made.append(name)
+        def watched(*args: object, work: object = work, name: str = name) -> object:
+            works.append(name)
             assert callable(work)
-            return work(*args, **options)
+            return work(*args)
 
         monkeypatch.setattr(owner, name, watched)
     reuse = Reuse()
     make(prepare(*load_recipe(recipe_file)), tmp_path / "first", silent, reuse)
-    assert sorted(made) == ["plan", "render_scene", "write_truth"]
-    made.clear()
+    assert sorted(works) == [PLAN, SCENE, TRUTH]
+    works.clear()
     make(prepare(*load_recipe(recipe_file, overrides)), tmp_path / "second", silent, reuse)
-    assert set(made) == again
+    assert set(works) == again
 
 
 def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -> None:
@@ -93,7 +89,6 @@ def test_an_asset_that_changes_is_read_again(recipe_file: str, tmp_path: Path) -
         corners = "\n".join(f"v {x * size} {y * size} 0" for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
         (scene / "card.obj").write_text(f"{corners}\nf 1 2 3\nf 1 3 4\n")
         recipe, near = load_recipe(recipe_file, [f"scene={scene}"])
-        out = tmp_path / f"of {size}"
-        make(prepare(recipe, near), out, silent, reuse)
-        digests.add(str(digest(out)))
+        make(prepare(recipe, near), tmp_path / f"of {size}", silent, reuse)
+        digests.add(str(digest(tmp_path / f"of {size}")))
     assert len(digests) == 2

@@ -1,0 +1,182 @@
+"""Making the public benchmark: all of its datasets as one collection, and their certificate."""
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from pcii.base.errors import InputError
+from pcii.base.executor import ALONE, Executor
+from pcii.base.progress import Report, silent
+from pcii.io.benchmark_layout import (
+    CERTIFICATE,
+    REFERENCE_METHOD,
+    Content,
+    Definition,
+    Scores,
+    Verdict,
+    compare,
+    content_of,
+    differing_scores,
+    published_certificate,
+)
+from pcii.io.collection import open_collection
+from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
+from pcii.io.evaluation_layout import read_evaluation
+from pcii.store.hashes import hash_json
+from pcii.store.safe_files import write_json_safely
+from simgen.base.locations import recipe_roots
+from simgen.base.strict_models import read_toml, suggestion, validate
+from simgen.dataset.dataset_collection import generate_collection
+from simgen.dataset.dataset_folder import versions
+from simgen.renderer import backend
+from simgen.spec.recipe import Recipe, load_recipe
+
+REFERENCE_PHOTONS_PER_VIEW = 1000.0
+"""Light in which the reference method is scored."""
+
+
+def benchmark_files() -> dict[str, Path]:
+    """Files of the benchmarks that ship, by name."""
+    return {file.stem: file for root in recipe_roots() for file in sorted(root.glob("benchmarks/*.toml"))}
+
+
+def load_definition(name_or_path: str) -> tuple[Definition, Path]:
+    """A benchmark by name or path of its file, and that file; `InputError` if it is missing or wrong."""
+    files = benchmark_files()
+    file = files.get(name_or_path, Path(name_or_path))
+    if not file.is_file():
+        raise InputError(f"benchmark: there is no {name_or_path!r}{suggestion(name_or_path, list(files))}")
+    return validate(Definition, read_toml(file), str(file)), file
+
+
+class BenchmarkSeries:
+    """The datasets of a benchmark as a series of one collection; with `scenes`, those of these names only."""
+
+    fields = BENCHMARK_FIELDS
+
+    def __init__(
+        self, definition: Definition, recipe_folder: Path, scenes: tuple[str, ...] | None = None
+    ) -> None:
+        self.definition, self.recipe_folder = definition, recipe_folder
+        self.base = definition.model_dump(mode="json")
+        self.datasets = definition.datasets(scenes)
+
+    def __len__(self) -> int:
+        return len(self.datasets)
+
+    def values(self, number: int) -> Mapping[str, Any]:
+        """What distinguishes a dataset from the others."""
+        return self.datasets[number].values
+
+    def folder(self, number: int) -> str:
+        """Name of a dataset's folder."""
+        return self.datasets[number].folder
+
+    def recipe(self, number: int) -> Recipe:
+        """The recipe of a dataset; `InputError` if the definition makes none."""
+        scene, light, seed = self.datasets[number]
+        definition = self.definition
+        is_brighter = scene.brighter and seed == definition.seeds[0]
+        brighter = definition.brighter_photons_per_view if is_brighter else ()
+        *fewer, most = *definition.photons_per_view, *brighter
+        settings = [
+            *definition.set,
+            *scene.set,
+            f"title={scene.name}{IN_FRAMES * (light == 'frames')}",
+            f"seed={seed}",
+            "photons.scope=view",
+            f"photons.budget={most}",
+            f"photons.nested={fewer}",
+            "products.visibility=false",
+            "products.view_truth=false",
+            f"products.counts={'false' if light == 'full-light' else 'true'}",
+            f"products.radiance={'mosaic' if light == 'full-light' else 'none'}",
+        ]
+        if light == "frames":
+            settings += [f"sensor.frames={definition.frames}", "sensor.bits=1", "products.frames=true"]
+        return load_recipe(scene.recipe, settings)[0]
+
+
+def make_benchmark(
+    definition: Definition,
+    file: Path,
+    out: Path,
+    *,
+    half: Half | None = None,
+    names: tuple[str, ...] = (),
+    executor: Executor = ALONE,
+    report: Report = silent,
+) -> list[str]:
+    """Make the datasets of a benchmark in the folder `out`, or go on with them; faults of those that failed.
+
+    `file` is that of the definition; `half` and `names` choose scenes, and others may follow in the same
+    folder. Raises `InputError` for a name that is not there, for a half that has none of these scenes, and as
+    `generate_collection` does.
+    """
+    known = [scene.name for scene in definition.scene]
+    for name in names:
+        if name not in known:
+            raise InputError(f"scene: {definition.name} has no {name!r}{suggestion(name, known)}")
+    of_half = [scene.name for scene in definition.scene if half in (None, scene.half)]
+    scenes = tuple(name for name in of_half if not names or name in names)
+    if not scenes:
+        raise InputError(f"scene: none of these scenes is in the {half} half")
+    series = BenchmarkSeries(definition, file.parent.parent, scenes)
+    return generate_collection(series, out, executor, report)
+
+
+def certify(definition: Definition, file: Path, out: Path, report: Report = silent) -> Verdict:
+    """Compare all datasets in `out` with the published ones, and write the certificate there.
+
+    Only where their bytes differ, or where nothing is published, a simple method is scored on them too.
+    """
+    own: dict[str, Content] = {}
+    collection = open_collection(out)
+    for row, dataset in zip(collection.rows, collection, strict=True):
+        own[row["path"]] = content_of(dataset)
+        report("certificate", len(own), len(collection))
+    published = published_certificate(file)
+    verdict = compare(own, published.get("datasets", {}))
+    scores: Scores = {}
+    if verdict.same_bytes < verdict.compared:
+        scores = reference_scores(out, dict.fromkeys(row["values"]["half"] for row in collection.rows))
+        problems = differing_scores(scores, published.get("reference_scores", {}))
+        verdict = replace(verdict, problems=(*verdict.problems, *problems))
+    document = {
+        "benchmark": definition.name,
+        "definition_sha256": hash_json(definition.model_dump(mode="json")),
+        "verdict": verdict.sentence(),
+        "backend": backend.describe(),
+        "versions": versions(),
+        **asdict(verdict),
+        "reference_scores": scores,
+        "datasets": own,
+    }
+    write_json_safely(out / CERTIFICATE, document)
+    return verdict
+
+
+def reference_scores(benchmark: Path, halves: Iterable[Half]) -> dict[str, Mapping[str, Any]]:
+    """IoU of the reference method on each scene of these halves; `InputError` if `pcii benchmark run` fails.
+
+    That runs in a process of its own, since nothing here may import it.
+    """
+    scores: dict[str, Mapping[str, Any]] = {}
+    for half in halves:
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "scores"
+            words = ["benchmark", "run", REFERENCE_METHOD, "--budget", f"{REFERENCE_PHOTONS_PER_VIEW:g}"]
+            words += ["--half", half]
+            program = "import sys; from pcii.app.commands import main; sys.exit(main())"
+            command = [sys.executable, "-c", program, *words, "--data", str(benchmark), "-o", str(out)]
+            if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
+                raise InputError(f"certificate: `pcii {' '.join(words)}` failed, as said above")
+            for group in read_evaluation(out)["groups"]:
+                (result,) = group["results"]
+                if (iou := result["object"]["iou"]) is not None and iou["interval"] is not None:
+                    scores[group["title"]] = {"mean": iou["mean"], "interval": iou["interval"]}
+    return scores
