@@ -28,8 +28,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import detect
 from simgen.sensor.frame_readout import counts_of, read_out
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.camera_grid import CalibrationErrors, Lens
-from simgen.spec.recipe import Recipe, Sensor
+from simgen.spec.recipe import CalibrationErrors, Lens, Recipe, Sensor
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import first_hits_at_centre
 from simgen.truth.pixel_coverage import coverage

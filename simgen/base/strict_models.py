@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Tag, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Tag, ValidationError
 
 from pcii.base.errors import InputError
 
@@ -99,11 +99,6 @@ def _one_line(title: str) -> str:
 
 Title = Annotated[str, Field(max_length=200, json_schema_extra={"pattern": LINE}), AfterValidator(_one_line)]
 Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
-
-
-def at_most(most: int) -> BeforeValidator:
-    """Keeps one item more than a list may have, so that no more than these are checked and reported."""
-    return BeforeValidator(lambda items: items[: most + 1] if isinstance(items, list | tuple) else items)
 
 
 def completed_by(key: Literal["enum", "examples"], names: Callable[[], list[str]]) -> Callable[[Any], None]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig, as_rig
-from simgen.spec.camera_grid import CalibrationErrors, Grid
+from simgen.spec.recipe import CalibrationErrors, Grid
 
 
 def rig_of(grid: Grid, seed: int) -> Rig:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.spec.camera_grid import Lens
+from simgen.spec.recipe import Lens
 
 
 def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:

@@ -18,8 +18,7 @@ from pcii.core.camera_grid import CameraGrid
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import LAYER_BLUR_TILES, MOST_LAYERS, tile_px_for
 from simgen.photons.pilot import MOST_RAYS
-from simgen.spec.camera_grid import Grid
-from simgen.spec.recipe import Exposure, Photons, Products, Sensor
+from simgen.spec.recipe import Exposure, Grid, Photons, Products, Sensor
 
 BASE_BYTES = 4e8
 """What the renderer and its libraries take, whatever the needs."""

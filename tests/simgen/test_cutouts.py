@@ -140,5 +140,5 @@ def test_what_cannot_be_cut_is_told(tmp_path: Path) -> None:
     Image.fromarray(np.full((4, 4), 100, np.uint8)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match=r"object 'leaf', material.opacity: leaves nothing of the surface"):
         made([leaf({})], [SKY], folder=tmp_path)
-    with pytest.raises(ValueError, match="without holes"):
+    with pytest.raises(ValueError, match="opacity: a surface that light passes through"):
         Material.model_validate({"finish": {"type": "glass"}, "opacity": "a.png"})

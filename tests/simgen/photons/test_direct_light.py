@@ -28,8 +28,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.camera_grid import Lens
-from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.recipe import Lens, Photons, Recipe
 
 COMPILED = backend.choose().kind != "scalar"
 BUDGET = 4000.0 if COMPILED else 400.0

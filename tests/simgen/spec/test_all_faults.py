@@ -60,25 +60,6 @@ def test_every_fault_of_a_scene_names_its_field(tmp_path: Path) -> None:
     assert not [line for line in told if "\n" in line]
 
 
-def test_every_missing_file_is_told(tmp_path: Path) -> None:
-    (tmp_path / "scene.toml").write_text("""
-title = "t"
-[[objects]]
-name = "a"
-position_mm = [0, 0, 500]
-shape = { type = "mesh", file = "a.ply" }
-material = { texture = "a.png" }
-[[lights]]
-type = "uniform"
-luminance_cd_m2 = 1
-""")
-    with pytest.raises(InputError) as caught:
-        load_scene(str(tmp_path))
-    first, second = faults_of(caught.value)
-    assert "object 'a', shape.file: there is no file 'a.ply'" in first
-    assert "object 'a', material.texture: there is no file 'a.png'" in second
-
-
 def test_a_command_prints_each_fault_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recipe = tmp_path / "r.toml"
     recipe.write_text('scen = "two_objects"\nseed = -1\n[photons]\nbudgt = 3\n')
@@ -90,13 +71,6 @@ def test_a_command_prints_each_fault_in_a_line(tmp_path: Path, capsys: pytest.Ca
         "  unknown key 'scen'; did you mean 'scene'?",
         "  'seed': input should be greater than or equal to 0, got -1",
     ]
-
-
-def test_one_fault_is_one_line() -> None:
-    with pytest.raises(InputError) as caught:
-        validate(Recipe, {"scene": "x", "seed": -1}, "r.toml")
-    assert not hasattr(caught.value, "__notes__")
-    assert "more" not in str(caught.value)
 
 
 def test_very_many_faults_are_told_in_part() -> None:
