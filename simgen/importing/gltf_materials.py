@@ -17,8 +17,7 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
 from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_texture
 from simgen.assets.cutouts import cut_out
-from simgen.assets.mesh_points import bears_pictures_once
-from simgen.assets.triangles import Triangles
+from simgen.assets.triangles import Triangles, bears_pictures_once
 from simgen.importing.foreign_scene import ForeignScene
 from simgen.importing.gltf_file import GltfFile
 from simgen.importing.gltf_models import Material, MaterialExtensions, Texture, TextureInfo

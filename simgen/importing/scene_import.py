@@ -10,7 +10,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
-from simgen.assets.mesh_files import ply_bytes
+from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, validate
 from simgen.base.toml_layout import toml_text

@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
-from simgen.assets.solids import triangles_of
+from simgen.assets.triangles import triangles_of
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import ShiningSurface, emission_plugin, object_lux, shining_surfaces
 from simgen.renderer.mitsuba_lights import gain_for, light_plugin, main_spectrum
@@ -82,7 +82,7 @@ def build(
     frame = WORLD if reference is None else reference.frame
     plugins: dict[str, Any] = {}
     around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
-    surroundings = None if around is None else assets.environment(around.file)
+    surroundings = None if around is None else assets.environments[around.file]
     gain = gain_for(
         scene.level,
         scene.lights,
@@ -164,9 +164,9 @@ def _reach_mm(scene: Scene, assets: Assets) -> float:
             case Sphere(radius_mm=radius_mm):
                 size_mm = radius_mm
             case Mesh(file=file, scale=scale):
-                size_mm = np.linalg.norm(assets.mesh(file).positions * np.asarray(scale), axis=1).max()
+                size_mm = np.linalg.norm(assets.meshes[file].positions * np.asarray(scale), axis=1).max()
             case shape:
-                size_mm = np.linalg.norm(triangles_of(shape, assets).positions, axis=1).max()
+                size_mm = np.linalg.norm(triangles_of(shape, assets.meshes).positions, axis=1).max()
         far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
     return 2 * far_mm
 

@@ -70,7 +70,7 @@ def painted_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | Non
 
 def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
     """A key that is equal for objects that can share a surface, on which pictures lie alike."""
-    laid_out = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
+    laid_out = not isinstance(shape, Mesh) or assets.meshes[shape.file].texcoords is not None
     return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), laid_out
 
 

@@ -1,6 +1,5 @@
 """Opacity: holes that an image cuts are holes to rays, truth and photons, where the image says."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +11,12 @@ from scipy.ndimage import label
 
 from pcii.base.errors import InputError
 from simgen.assets.cutouts import cut_out
-from simgen.assets.solids import box, card_triangles, cylinder
-from simgen.assets.triangles import Triangles
-from simgen.renderer import backend
+from simgen.assets.triangles import Triangles, box, card_triangles, cylinder
 from simgen.spec.materials import Material
 from simgen.truth.first_hits import first_hits_at_centre
 
 SKY = {"type": "uniform", "luminance_cd_m2": 1.0}
 GRID = film()
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def area(mesh: Triangles | None) -> float:

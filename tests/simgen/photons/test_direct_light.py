@@ -13,7 +13,7 @@ from scipy import stats
 import simgen
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from simgen.assets.solids import globe
+from simgen.assets.triangles import globe
 from simgen.cameras.rig import Rig, as_rig
 from simgen.dataset.prepared import capture_of
 from simgen.photons import scalar_sampler, wavefront_sampler
