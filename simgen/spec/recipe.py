@@ -98,8 +98,8 @@ class Grid(Strict):
     height: Count = 1024
     width: Count = 1024
     shear_px: tuple[Shear, Shear] = (0.0, 0.0)
-    """By how much each camera's axis meets its film further right and down than that of the camera before.
-    What has this disparity stands still: focal pitch / (z pixel) makes the cameras converge at depth z."""
+    """Each camera's axis meets its film so many pixels further right and down than that of the camera before;
+    with focal pitch / (z pixel) the cameras converge at depth z."""
     errors: CalibrationErrors | None = None
     lens: Lens | None = None
 

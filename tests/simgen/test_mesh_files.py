@@ -1,7 +1,6 @@
 """Sound files of strangers: the same mesh in every form, pictures at their full depth."""
 
 import struct
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import tifffile
 from hostile_files import ply, scene_toml
 from PIL import Image, ImageOps
 from png_files import png16
-from property_settings import mostly_slow
 
 from simgen.assets.asset_files import ply_bytes, read_assets, read_mesh, srgb_to_linear
 from simgen.assets.triangles import Triangles
@@ -131,11 +129,7 @@ def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "orientation"),
-    mostly_slow(
-        product(["a.png", "a.tif", "a.jpg"], range(1, 9)),
-        quick=[*product(["a.jpg"], range(2, 9)), ("a.png", 6), ("a.tif", 8)],
-    ),
+    ("name", "orientation"), [*(("a.jpg", number) for number in range(2, 9)), ("a.png", 6), ("a.tif", 8)]
 )
 def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tmp_path: Path) -> None:
     exif = Image.Exif()
@@ -147,21 +141,18 @@ def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tm
     np.testing.assert_allclose(image_of(tmp_path, name), srgb_to_linear(upright), rtol=1e-6)
 
 
-BITS = {1: "bool", 4: "uint8", 8: "uint8", 12: "uint16"}
-
-
-@pytest.mark.parametrize(
-    ("bits", "dtype", "zero_is"),
-    mostly_slow(
-        ((*kind, zero) for kind, zero in product(BITS.items(), ["black", "white"])),
-        quick=[(1, "bool", "white"), (4, "uint8", "black"), (12, "uint16", "white")],
-    ),
-)
-def test_tiff_of_any_bits_is_as_bright(bits: int, dtype: str, zero_is: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("bits", "zero_is"), [(1, "white"), (4, "black"), (12, "black"), (12, "white")])
+def test_tiff_of_any_bits_is_as_bright(bits: int, zero_is: str, tmp_path: Path) -> None:
     numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
-    options = {"photometric": f"minis{zero_is}", "bitspersample": None if bits == 1 else bits}
-    tifffile.imwrite(tmp_path / "a.tif", numbers.astype(dtype), **options)
+    stored = numbers.astype({1: "bool", 4: "uint8", 12: "uint16"}[bits])
+    written_bits = None if bits == 1 else bits
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric=f"minis{zero_is}", bitspersample=written_bits)
     share = numbers / ((1 << bits) - 1)
     expected = srgb_to_linear(1 - share if zero_is == "white" else share)
     half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
     np.testing.assert_allclose(image_of(tmp_path, "a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step)
+
+
+def test_a_picture_of_one_pixel_is_a_texture(tmp_path: Path) -> None:
+    Image.new("RGB", (1, 1), (255, 0, 0)).save(tmp_path / "a.png")
+    np.testing.assert_array_equal(image_of(tmp_path, "a.png"), [[[1, 0, 0]]])

@@ -15,13 +15,12 @@ from pcii.base.srgb import srgb_to_linear
 from simgen.assets.texture_pixels import paint, square_wave
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
-from simgen.renderer.mitsuba_surfaces import aspect_of
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import UniformLight
 from simgen.spec.materials import Checks, Edge, Material, Noise, Star, Stripes, Text, Texture
 from simgen.spec.recipe import Grid
 from simgen.spec.scene import Scene, SceneObject
-from simgen.spec.shapes import Card, Sphere
+from simgen.spec.shapes import Card
 
 RED, GREY = (0.9, 0.1, 0.2), (0.6, 0.6, 0.6)
 LINEAR = srgb_to_linear(np.array([RED, GREY]))
@@ -214,11 +213,6 @@ def test_text_stands_upright_unmirrored_and_fills_its_card() -> None:
     long = 1 - share_of_second(Text(text="The quick brown fox, 12 µm: Ångström!", pixels=512), 3.0)
     assert np.concatenate([long[0], long[-1], long[:, 0], long[:, -1]]).max() == 0
     assert np.ptp(np.nonzero(long.max(0) > 0.5)[0]) > 0.85 * 512
-
-
-def test_a_pattern_is_laid_once_over_a_shape() -> None:
-    assert aspect_of(Card(width_mm=30, height_mm=60)) == 0.5
-    assert aspect_of(Sphere(radius_mm=3)) == 2
 
 
 @pytest.mark.renders
