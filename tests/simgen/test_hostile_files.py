@@ -1,8 +1,6 @@
 """Strangers' scenes: whatever is wrong with their files, the answer is one sentence, soon."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +8,10 @@ import pytest
 from hostile_files import BOMB, animation, binary_ply, obj, picture, ply, png, scene_toml
 from png_files import chunk
 
+from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.io.dataset_layout import write_exr_safely
+from simgen.app import commands
 from simgen.assets.asset_files import read_assets, read_environment
 from simgen.spec.scene_lookup import load_scene
 
@@ -53,7 +53,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "index -1": ("a.ply", binary_ply(0, 1, -1), "vertex -1"),
     "nan vertex": ("a.ply", ply("0 0 0\n10 nan 0\n0 10 0\n"), "a position of nan"),
     "no extent": ("a.ply", ply("1 1 1\n1 1 1\n1 1 1\n"), "no extent"),
-    "1e12 vertices": ("a.ply", ply(vertex_count=10**12), "cannot be read: Unable to allocate"),
+    "1e12 vertices": ("a.ply", ply(vertex_count=10**12), "cannot be read"),
     "no faces": ("a.ply", ply(faces="", face_count=0), "has no faces"),
     "truncated mesh": ("a.ply", binary_ply(0, 1, 2)[:-5], "cannot be read: element 'face'"),
     "face of 2 corners": ("a.ply", binary_ply(0, 1), "a face of 2 corners"),
@@ -124,19 +124,11 @@ def test_a_file_of_a_gigabyte_is_not_read(tmp_path: Path) -> None:
     assert "524288 bytes" in refusal(tmp_path)
 
 
-BALL = """position_mm = [0, 0, 500]
-shape = { type = "sphere", radius_mm = 5 }
-material = { reflectance = [1, 1, 1] }
-"""
 TOMLS: dict[str, tuple[str, str]] = {
     "deep array": ("x = " + "[" * 100_000, "nested too deeply"),
     "deep key": (".".join("a" * 50_000) + " = 1", "a key of more than 32 parts"),
     "1e999": (scene_toml().replace("500]", "1e999]"), "'objects[0].position_mm[2]'"),
     "huge integer": (scene_toml().replace("500]", "9" * 5000 + "]"), "not valid TOML"),
-    "many objects": (
-        "title = 't'\n" + "".join(f"[[objects]]\nname = 'a{n}'\n{BALL}" for n in range(1001)),
-        "'objects': tuple should have at most 1000 items",
-    ),
     "plugin path": (scene_toml(shape='type = "../../x"'), "'../../x'"),
     "not text": ("\x00\x01", "not valid TOML"),
 }
@@ -157,15 +149,15 @@ def test_dots_in_a_description_are_no_deep_key(tmp_path: Path) -> None:
     assert load_scene(str(tmp_path))[0].objects[0].name == "a"
 
 
-def test_the_command_leaves_with_2_and_one_line(tmp_path: Path) -> None:
+def test_the_command_leaves_with_2_and_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Of libraries nothing is printed either."""
     scene_with(tmp_path, "thing.ply", b"nonsense")
-    script = "import sys; from simgen.app.commands import main; sys.exit(main())"
     arguments = ["preview", str(tmp_path), "-o", str(tmp_path / "x.png")]
-    run = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True)
-    assert run.returncode == 2
-    assert run.stderr.startswith("error: ")
-    assert "thing.ply" in run.stderr
-    assert run.stderr.count("\n") == 1
+    assert command_line.run(commands.app, arguments) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("error: ")
+    assert "thing.ply" in error
+    assert error.count("\n") == 1
     assert not (tmp_path / "x.png").exists()
 
 

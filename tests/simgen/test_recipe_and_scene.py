@@ -1,12 +1,15 @@
 """Files that people write: defaults, overrides, and one sentence for each mistake."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import BaseModel
 
+from pcii.base import command_line
 from pcii.base.errors import InputError
-from simgen.base.strict_models import validate
+from simgen.app import commands
+from simgen.base.strict_models import MOST_FAULTS, validate
 from simgen.spec.recipe import Analysis, Recipe, load_recipe
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import load_scene
@@ -187,3 +190,23 @@ def test_a_missing_recipe_or_scene_gets_a_suggestion() -> None:
         load_recipe("papre")
     with pytest.raises(InputError, match="did you mean 'two_objects'"):
         load_scene("two_object")
+
+
+def test_a_command_prints_each_fault_in_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recipe = tmp_path / "r.toml"
+    recipe.write_text('scen = "two_objects"\nseed = -1\n[photons]\nbudgt = 3\n')
+    assert command_line.run(commands.app, ["check", str(recipe)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith(f"error: {recipe}: unknown key 'photons.budgt'; did you mean 'budget'?")
+    # That scene is missing follows from its misspelling, and is not told too.
+    assert lines[1:] == [
+        "  unknown key 'scen'; did you mean 'scene'?",
+        "  'seed': input should be greater than or equal to 0, got -1",
+    ]
+
+
+def test_very_many_faults_are_told_in_part() -> None:
+    with pytest.raises(InputError) as caught:
+        validate(Recipe, {f"key{n}": 0 for n in range(1000)}, "r.toml")
+    assert len([str(caught.value), *caught.value.__notes__]) == MOST_FAULTS
+    assert "(and 1000 more)" in str(caught.value)  # a scene is missing too
