@@ -129,10 +129,10 @@ class Noise(_Pattern):
 
 def _share_outside(mean: float, contrast: float) -> float:
     """Share outside 0 to 1 of normal values about `mean` with a deviation of `contrast` times that."""
-    if mean == 0 or contrast == 0:
+    deviation = mean * contrast
+    if deviation == 0:
         return 0.0
-    room = 1 / contrast, (1 - mean) / (mean * contrast)
-    return sum(math.erfc(deviations / math.sqrt(2)) / 2 for deviations in room)
+    return sum(math.erfc(room / deviation / math.sqrt(2)) / 2 for room in (mean, 1 - mean))
 
 
 Texture = Annotated[Checks | Stripes | Star | Edge | Text | Noise, Field(discriminator="type")]

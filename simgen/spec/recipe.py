@@ -96,7 +96,9 @@ class Grid(Strict):
     pixel_mm: Length = 0.0352
     """Side of a square pixel."""
     height: Count = 1024
+    """Rows of pixels of one view."""
     width: Count = 1024
+    """Columns of pixels of one view."""
     shear_px: tuple[Shear, Shear] = (0.0, 0.0)
     """Each camera's axis meets its film so many pixels further right and down than that of the camera before;
     with focal pitch / (z pixel) the cameras converge at depth z."""

@@ -164,7 +164,8 @@ def test_a_scene_that_cannot_be_saved_writes_nothing(tmp_path: Path) -> None:
     (tmp_path / "taken" / "scene.toml").mkdir(parents=True)
     with pytest.raises(InputError, match=r"scene.toml: is there with other content"):
         SCENE.save(tmp_path / "taken", overwrite=True)
-    spectrum = Spectrum(wavelength_nm=[380 + 0.1234567 * n for n in range(2000)], value=[1 / 3] * 2000)
+    wavelength_nm = tuple(380 + 0.1234567 * n for n in range(2000))
+    spectrum = Spectrum(wavelength_nm=wavelength_nm, value=(1 / 3,) * 2000)
     rainbow = BALL.change(material=Material(reflectance=spectrum))
     with pytest.raises(InputError, match=rf"a scene.toml may have {LARGEST_TOML_BYTES} bytes, and this"):
         SCENE.add(*(rainbow.change(name=f"a{n}") for n in range(10))).save(out)
