@@ -33,7 +33,7 @@ CONDITIONS = {
     "bad depth": "depth not above 0",
     "beyond": "shifts beyond the image",
 }
-SCENES = {f"simgen.spec.{name}" for name in ("scene", "lights", "materials", "shapes", "textures")}
+SCENES = {f"simgen.spec.{name}" for name in ("scene", "lights", "materials", "shapes")}
 NO_NUMBERS = {
     "Collection": "a table of datasets",
     "InputError": "the refusal itself",

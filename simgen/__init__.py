@@ -24,7 +24,6 @@ if TYPE_CHECKING:
         preview,
     )
     from simgen.importing.scene_import import ImportedScene, import_scene
-    from simgen.spec.camera_grid import CalibrationErrors, Lens
     from simgen.spec.lights import (
         AreaLight,
         DirectionalLight,
@@ -34,11 +33,25 @@ if TYPE_CHECKING:
         SpotLight,
         UniformLight,
     )
-    from simgen.spec.materials import Emission, Glass, Material, Matt, Metal, Plastic, Principled, Spectrum
-    from simgen.spec.recipe import Sensor
+    from simgen.spec.materials import (
+        Checks,
+        Edge,
+        Emission,
+        Glass,
+        Material,
+        Matt,
+        Metal,
+        Noise,
+        Plastic,
+        Principled,
+        Spectrum,
+        Star,
+        Stripes,
+        Text,
+    )
+    from simgen.spec.recipe import CalibrationErrors, Lens, Sensor
     from simgen.spec.scene import Backdrop, Scene, SceneObject
     from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Sphere
-    from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text
 
 __all__ = [
     "AreaLight",
@@ -92,7 +105,6 @@ _MODULES = (
     "spec.scene",
     "spec.shapes",
     "spec.materials",
-    "spec.textures",
     "spec.lights",
 )
 """Where the names are, looked for in this order: `load_scene` is that of `app`."""

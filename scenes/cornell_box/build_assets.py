@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from simgen.assets.mesh_files import ply_bytes
+from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 
 Quad = list[tuple[float, float, float]]

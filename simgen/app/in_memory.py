@@ -25,8 +25,7 @@ from simgen.photons.photon_counting import draw_from_views, thin
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.detector import counts_of, detect, read_out
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.camera_grid import CalibrationErrors, Lens
-from simgen.spec.recipe import Recipe, Sensor
+from simgen.spec.recipe import CalibrationErrors, Lens, Recipe, Sensor
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import coverage, first_hits_at_centre
 

@@ -1,25 +1,24 @@
 """Surfaces with holes: what an image of opacity leaves of a mesh, as a mesh.
 
-Holes are cut along the line where the opacity is a half, found in each square between the middles of four
-pixels (marching squares, Lorensen and Cline 1987). What is left is an ordinary mesh: nothing that traces rays
-needs to know of holes.
+Holes are cut where the opacity is a half, along a line in each square between the middles of four pixels
+(marching squares, Lorensen and Cline 1987). What is left is an ordinary mesh.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from simgen.assets.triangles import Triangles, barycentric, check_counts, cross_2d, fan_all
+from simgen.assets.triangles import Triangles, barycentric, cross_2d, fan_all
 
 FULL = 0.5
 """From this opacity on there is a surface."""
 OVERLAP = 1 / 1024
-"""Of a pixel, or of the height of a triangle that is less, by which neighbouring pieces overlap: rounded
-corners would leave gaps between them."""
+"""Neighbouring pieces overlap by this share of a pixel, or of a triangle's height if that is less, since
+rounded corners would leave gaps between them."""
 MOST_CELLS = 1 << 25
 PAIRS_AT_ONCE = 1 << 18
-# Around a cell, counterclockwise with v up: its corners 0, 2, 4, 6 and the ends 1, 3, 5, 7 of the line on its
-# sides. What bounds the full part, by the sum of 1, 2, 4, 8 for the corners that are full.
+# Points around a cell, counterclockwise with v up: its corners 0, 2, 4, 6 and the ends 1, 3, 5, 7 of the line
+# on its sides. The polygons that are full, by the sum of 1, 2, 4, 8 for the corners that are full.
 _PARTS: dict[int, tuple[tuple[int, ...], ...]] = {
     1: ((0, 1, 7),),
     2: ((1, 2, 3),),
@@ -37,17 +36,19 @@ _PARTS: dict[int, tuple[tuple[int, ...], ...]] = {
     14: ((1, 2, 4, 6, 7),),
 }
 _JOINED = {5: ((0, 1, 3, 4, 5, 7),), 10: ((1, 2, 3, 5, 6, 7),)}
-"""Of two full corners that lie across, where the middle between them is full too."""
+"""The same of two opposite full corners, where the middle between them is full too."""
 
 Polygons = tuple[np.ndarray, np.ndarray]
 """Corners (N, V, 2), x right and y up in pixels, and how many of them (N,) each polygon has."""
+Part = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Triangles (M, 3) of new corners, the mesh's face (C,) that each corner lies on, and shares (C, 3) of it."""
 
 
 def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles | None:
     """The part of a mesh with texture coordinates on which `opacity` (H, W), row 0 on top, is full, if any.
 
     Beyond its borders the image is repeated if `tiled`, else its outermost pixels go on. Raises `ValueError`
-    with the end of a sentence for more triangles than a mesh may have.
+    with the end of a sentence for more pixels or triangles than may be.
     """
     assert mesh.texcoords is not None
     height, width = opacity.shape
@@ -57,27 +58,19 @@ def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles |
     if np.prod((last - first).astype(float)) > MOST_CELLS:
         raise ValueError(f"more than {MOST_CELLS} pixels of it lie on the mesh; use a smaller image")
     corners -= first
-    values = _spread(opacity[::-1], first, last, tiled)
-    full = (values >= FULL).astype(np.int8)
-    sums = full[:-1, :-1] + 2 * full[:-1, 1:] + 4 * full[1:, 1:] + 8 * full[1:, :-1]
-    whole, cut = _all_in(sums == 15, corners), ~_all_in(sums == 0, corners)
-    # A triangle that is a line on the picture is there if its first corner is.
-    line = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) < OVERLAP**2
-    col, row = np.round(corners[:, 0]).astype(np.int64).T
-    whole = np.where(line, full[row, col] > 0, whole)
-    parts = [
-        _lifted(mesh, corners, *found)
-        for found in _clipped(_pieces(values, sums), corners, cut & ~whole & ~line)
-    ]
-    return _joined(mesh, mesh.faces[whole], parts)
-
-
-def _spread(opacity: np.ndarray, first: np.ndarray, last: np.ndarray, tiled: bool) -> np.ndarray:
-    """The image from pixel `first` to pixel `last` (x, y), wherever these are."""
     col, row = (np.arange(low, high + 1) for low, high in zip(first, last, strict=True))
     if tiled:
-        return opacity[np.ix_(row % len(opacity), col % opacity.shape[1])]
-    return opacity[np.ix_(np.clip(row, 0, len(opacity) - 1), np.clip(col, 0, opacity.shape[1] - 1))]
+        col, row = col % width, row % height
+    values = opacity[::-1][np.ix_(np.clip(row, 0, height - 1), np.clip(col, 0, width - 1))]
+    full = (values >= FULL).astype(np.int8)
+    sums = full[:-1, :-1] + 2 * full[:-1, 1:] + 4 * full[1:, 1:] + 8 * full[1:, :-1]
+    is_whole, is_empty = _all_in(sums == 15, corners), _all_in(sums == 0, corners)
+    # A triangle that is a line on the picture is there if its first corner is.
+    is_line = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) < OVERLAP**2
+    col, row = np.round(corners[:, 0]).astype(np.int64).T
+    is_whole = np.where(is_line, full[row, col] > 0, is_whole)
+    parts = list(_clipped(_pieces(values, sums), corners, ~is_empty & ~is_whole & ~is_line))
+    return _joined(mesh, mesh.faces[is_whole], parts)
 
 
 def _all_in(flag: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -85,8 +78,8 @@ def _all_in(flag: np.ndarray, corners: np.ndarray) -> np.ndarray:
     running = np.pad(np.cumsum(np.cumsum(flag, axis=0), axis=1), ((1, 0), (1, 0)))
     low, high = (np.floor(end).astype(np.int64) for end in (corners.min(axis=1), corners.max(axis=1)))
     (x0, y0), (x1, y1) = low.T, high.T + 1
-    found = running[y1, x1] - running[y0, x1] - running[y1, x0] + running[y0, x0]
-    return found == (x1 - x0) * (y1 - y0)
+    number = running[y1, x1] - running[y0, x1] - running[y1, x0] + running[y0, x0]
+    return number == (x1 - x0) * (y1 - y0)
 
 
 def _pieces(values: np.ndarray, sums: np.ndarray) -> Polygons:
@@ -95,8 +88,8 @@ def _pieces(values: np.ndarray, sums: np.ndarray) -> Polygons:
     joined = values[:-1, :-1] + values[:-1, 1:] + values[1:, 1:] + values[1:, :-1] >= 4 * FULL
     for number, apart in _PARTS.items():
         here = sums == number
-        for parts, chosen in ((apart, here & ~joined), (_JOINED.get(number, apart), here & joined)):
-            ring = _ring(values, *np.nonzero(chosen))
+        for parts, cells in ((apart, here & ~joined), (_JOINED.get(number, apart), here & joined)):
+            ring = _ring(values, *np.nonzero(cells))
             for part in parts:
                 shapes.append(ring[:, list(part)])
                 counts.append(len(part))
@@ -131,15 +124,13 @@ def _ring(values: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
     return points + np.stack([col, row], axis=-1)[:, None]
 
 
-def _clipped(
-    pieces: Polygons, corners: np.ndarray, wanted: np.ndarray
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Pieces within each wanted triangle of `corners` (M, 3, 2): polygons, counts, the triangles' numbers."""
+def _clipped(pieces: Polygons, corners: np.ndarray, is_cut: np.ndarray) -> Iterator[Part]:
+    """Pieces within those triangles of `corners` (M, 3, 2) that are cut."""
     shapes, counts = pieces
     real = np.arange(shapes.shape[1]) < counts[:, None]
     low = np.where(real[..., None], shapes, np.inf).min(axis=1)
     high = np.where(real[..., None], shapes, -np.inf).max(axis=1)
-    triangles = np.flatnonzero(wanted)
+    triangles = np.flatnonzero(is_cut)
     step = max(1, PAIRS_AT_ONCE // max(1, len(counts)))
     for start in range(0, len(triangles), step):
         some = triangles[start : start + step]
@@ -154,8 +145,11 @@ def _clipped(
             inside = turn[:, None] * cross_2d(along[:, None], polygons - begin[:, None])
             inside += OVERLAP * np.minimum(np.linalg.norm(along, axis=1), doubled)[:, None]
             polygons, number = _on_one_side(polygons, number, inside)
-        left = number >= 3
-        yield polygons[left], number[left], some[owner[left]]
+        remains = number >= 3
+        polygons, number = polygons[remains], number[remains]
+        points = polygons[np.arange(polygons.shape[1]) < number[:, None]]
+        face = np.repeat(some[owner[remains]], number)
+        yield fan_all(np.arange(len(points)), number), face, barycentric(points, corners[face])
 
 
 def _on_one_side(polygons: np.ndarray, counts: np.ndarray, inside: np.ndarray) -> Polygons:
@@ -173,37 +167,26 @@ def _on_one_side(polygons: np.ndarray, counts: np.ndarray, inside: np.ndarray) -
     share = here / np.where(crosses, here - there, 1)
     between = polygons + share[..., None] * (onward - polygons)
     points = np.stack([polygons, between], axis=2).reshape(len(polygons), 2 * size, 2)
-    kept = np.stack([real & (here >= 0), crosses], axis=2).reshape(len(polygons), 2 * size)
-    first = np.argsort(~kept, axis=1, kind="stable")[:, : size + 1]
-    return np.take_along_axis(points, first[..., None], axis=1), kept.sum(axis=1)
+    is_corner = np.stack([real & (here >= 0), crosses], axis=2).reshape(len(polygons), 2 * size)
+    first = np.argsort(~is_corner, axis=1, kind="stable")[:, : size + 1]
+    return np.take_along_axis(points, first[..., None], axis=1), is_corner.sum(axis=1)
 
 
-def _lifted(
-    mesh: Triangles, corners: np.ndarray, polygons: np.ndarray, counts: np.ndarray, owner: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Polygons on the picture as triangles, the mesh's face under each corner, and shares of it."""
-    real = np.arange(polygons.shape[1]) < counts[:, None]
-    points, of = polygons[real], np.repeat(owner, counts)
-    return fan_all(np.arange(len(points)), counts), of, barycentric(points, corners[of])
-
-
-def _joined(
-    mesh: Triangles, kept: np.ndarray, parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]]
-) -> Triangles | None:
-    """The faces that stay whole, and those of the parts, whose corners lie between a face's."""
-    if not len(kept) and not any(len(faces) for faces, _, _ in parts):
+def _joined(mesh: Triangles, whole: np.ndarray, parts: list[Part]) -> Triangles | None:
+    """The faces that stay whole, and those of the parts."""
+    if not len(whole) and not any(len(faces) for faces, _, _ in parts):
         return None
-    check_counts(0, len(kept) + sum(len(faces) for faces, _, _ in parts))
 
-    def of_corners(values: np.ndarray) -> np.ndarray:
-        mixed = [np.einsum("nc,ncd->nd", shares, values[mesh.faces[of]]) for _, of, shares in parts]
+    def at_corners(values: np.ndarray) -> np.ndarray:
+        values = values.astype(np.float64)
+        mixed = [np.einsum("nc,ncd->nd", shares, values[mesh.faces[face]]) for _, face, shares in parts]
         return np.concatenate([values, *mixed])
 
-    starts = len(mesh.positions) + np.cumsum([0, *(len(of) for _, of, _ in parts)])
-    faces = [kept, *(part[0] + start for part, start in zip(parts, starts, strict=False))]
+    starts = len(mesh.positions) + np.cumsum([0, *(len(face) for _, face, _ in parts)])
+    faces = [whole, *(part[0] + start for part, start in zip(parts, starts, strict=False))]
     return Triangles.checked(
-        of_corners(mesh.positions.astype(np.float64)),
+        at_corners(mesh.positions),
         np.concatenate(faces),
-        None if mesh.normals is None else of_corners(mesh.normals.astype(np.float64)),
-        of_corners(mesh.texcoords.astype(np.float64)) if mesh.texcoords is not None else None,
+        None if mesh.normals is None else at_corners(mesh.normals),
+        None if mesh.texcoords is None else at_corners(mesh.texcoords),
     )

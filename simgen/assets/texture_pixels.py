@@ -1,24 +1,23 @@
-"""Textures as pixels: linear reflectance, with every border antialiased by area in linear light."""
+"""Patterns as pixels: linear reflectance, with every border antialiased by area in linear light."""
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pcii.base.srgb import srgb_to_linear
-from simgen.spec.textures import Checks, Edge, Noise, Star, Stripes, Text, Texture
+from simgen.spec.materials import Checks, Edge, Noise, Star, Stripes, Text, Texture
 
 NEGLIGIBLE_CYCLES = 1e-8
 """A wave that changes by less across a pixel is taken as constant that way; see `square_wave`."""
 BAND_ROWS = 256
-"""Rows painted at once, to bound memory."""
+"""Rows that are painted at once, to bound memory."""
 SUBPIXELS = 8
-"""Per side, where a pixel of a star may hold several borders."""
+"""Subpixels per side where a pixel of a star may hold several borders."""
 TEXT_SHARE = 0.9
-"""Of the width or height that text fills."""
+"""Share of the width or height that text fills."""
 
 
 def half_plane(distance: np.ndarray, span_x: np.ndarray | float, span_y: np.ndarray | float) -> np.ndarray:
@@ -70,29 +69,21 @@ def _second_integral(cycles: np.ndarray) -> np.ndarray:
     return np.where(phase < 0.5, parabola, -parabola)
 
 
-@dataclass(frozen=True)
-class _Canvas:
+class _Canvas(NamedTuple):
     """Where the pixels lie; the longer side has length 1, the centre is (0, 0), Y runs down."""
 
     width: float
-    height: float
-    columns: int
-    rows: int
+    x: np.ndarray
+    """Of the columns' centres, (1, W)."""
+    y: np.ndarray
+    """Of the rows' centres, (H, 1)."""
+    pixel: tuple[float, float]
+    """Width and height of a pixel: equal but for whole numbers of pixels."""
 
     @property
-    def pixel(self) -> tuple[float, float]:
-        """Width and height of a pixel: equal but for whole numbers of pixels."""
-        return self.width / self.columns, self.height / self.rows
-
-    @property
-    def x(self) -> np.ndarray:
-        """Of the columns' centres, (1, W)."""
-        return ((np.arange(self.columns) + 0.5) / self.columns - 0.5)[None] * self.width
-
-    @property
-    def y(self) -> np.ndarray:
-        """Of the rows' centres, (H, 1)."""
-        return ((np.arange(self.rows) + 0.5) / self.rows - 0.5)[:, None] * self.height
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.y.size, self.x.size
 
 
 def paint(texture: Texture, width_over_height: float) -> np.ndarray:
@@ -103,7 +94,8 @@ def paint(texture: Texture, width_over_height: float) -> np.ndarray:
     """
     width, height = min(width_over_height, 1.0), min(1 / width_over_height, 1.0)
     columns, rows = (max(1, round(side * texture.pixels)) for side in (width, height))
-    canvas = _Canvas(width, height, columns, rows)
+    x, y = (((np.arange(n) + 0.5) / n - 0.5) * side for n, side in ((columns, width), (rows, height)))
+    canvas = _Canvas(width, x[None], y[:, None], (width / columns, height / rows))
     match texture:
         case Noise():
             return _noise(texture, canvas)
@@ -123,17 +115,17 @@ def paint(texture: Texture, width_over_height: float) -> np.ndarray:
 
 
 def _by_bands(canvas: _Canvas, share: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
-    """What `share` says of x (1, W) and y (h, 1), for all rows, (H, W) float32."""
-    starts = range(0, canvas.rows, BAND_ROWS)
-    bands = (share(canvas.x, canvas.y[start : start + BAND_ROWS]).astype(np.float32) for start in starts)
-    return np.concatenate(list(bands))
+    """Shares (H, W) float32 by a function of x (1, W) and y (h, 1) that is called for a band of rows."""
+    starts = range(0, canvas.y.size, BAND_ROWS)
+    bands = [share(canvas.x, canvas.y[start : start + BAND_ROWS]).astype(np.float32) for start in starts]
+    return np.concatenate(bands)
 
 
 def _checks(texture: Checks, canvas: _Canvas) -> np.ndarray:
     # A chessboard is the product of two square waves, and so is its mean over a pixel.
     across, down = (
         square_wave((np.arange(count) + 0.5) * cells / (2 * count), cells / (2 * count), 0.0)
-        for count, cells in ((canvas.columns, texture.columns), (canvas.rows, texture.rows))
+        for count, cells in ((canvas.x.size, texture.columns), (canvas.y.size, texture.rows))
     )
     return (1 + down[:, None] * across) / 2
 
@@ -184,14 +176,13 @@ def _nearest_border(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], sp
 def _text(texture: Text, canvas: _Canvas) -> np.ndarray:
     from PIL import Image
 
-    size = 256.0
+    (rows, columns), size = canvas.shape, 256.0
     for _ in range(2):  # again, since letters keep whole pixels apart
         ink = _ink(texture.text, size)
-        fill = min(canvas.columns / ink.width, canvas.rows / ink.height)
-        size = max(1.0, size * TEXT_SHARE * fill)
+        size = max(1.0, size * TEXT_SHARE * min(columns / ink.width, rows / ink.height))
     ink = _ink(texture.text, size)
-    page = Image.new("L", (canvas.columns, canvas.rows))
-    page.paste(ink, ((page.width - ink.width) // 2, (page.height - ink.height) // 2))
+    page = Image.new("L", (columns, rows))
+    page.paste(ink, ((columns - ink.width) // 2, (rows - ink.height) // 2))
     # FreeType's grey levels are the covered area, so they are shares of linear light as they are.
     return np.asarray(page) / 255
 
@@ -226,7 +217,7 @@ def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
 
 def _amplitude_spectrum(exponent: float, canvas: _Canvas) -> np.ndarray:
     """Of each frequency of `rfft2`: frequency^-exponent, and 0 for the mean; float32."""
-    columns, rows = canvas.columns, canvas.rows
+    rows, columns = canvas.shape
     across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])
     squared = (down**2)[:, None] + across**2
     squared[0, 0] = 1.0
@@ -240,7 +231,6 @@ def _spectral_noise(generator: np.random.Generator, amplitude: np.ndarray, canva
     # SciPy's transforms stay in single precision, which takes half the time.
     from scipy.fft import irfft2, rfft2
 
-    shape = canvas.rows, canvas.columns
-    white = generator.standard_normal(shape).astype(np.float32)
-    noise = np.asarray(irfft2(rfft2(white) * amplitude, shape))
+    white = generator.standard_normal(canvas.shape).astype(np.float32)
+    noise = np.asarray(irfft2(rfft2(white) * amplitude, canvas.shape))
     return noise / noise.std(dtype=np.float64).astype(np.float32)

@@ -12,7 +12,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
-from simgen.spec.camera_grid import CalibrationErrors, Grid, Lens
+from simgen.spec.recipe import CalibrationErrors, Grid, Lens
 
 
 def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:

@@ -13,7 +13,6 @@ from simgen.dataset.resources import (
     in_bytes,
     peak_bytes,
     product_bytes,
-    rounded,
     shortage,
 )
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
@@ -170,7 +169,7 @@ def seconds(facts: Facts) -> float:
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
         if facts.is_compiled:
             photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
-        share = USUAL_SHARE if plan.explored is None else plan.explored.share
+        share = USUAL_SHARE if plan.explored is None else plan.explored.kept_share
         paths_per_photon = photon_cost / sample_cost * max(USUAL_SHARE / share, 1.0)
         spent_s += facts.path_s * paths_per_photon * plan.photons_per_view * grid.view_count
     return spent_s
@@ -180,5 +179,9 @@ def in_time(spent_s: float) -> str:
     """A time in the unit that suits it, with one digit; no less than a second."""
     for size_s, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
         if spent_s >= 2 * size_s:
-            return f"{rounded(spent_s / size_s, 1)} {unit}"
-    return f"{rounded(max(spent_s, 1), 1)} s"
+            return f"{_one_digit(spent_s / size_s)} {unit}"
+    return f"{_one_digit(max(spent_s, 1))} s"
+
+
+def _one_digit(value: float) -> str:
+    return f"{float(f'{value:.1g}'):g}"

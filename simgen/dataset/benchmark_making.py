@@ -28,7 +28,7 @@ from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
 from pcii.io.evaluation_layout import read_evaluation
 from pcii.store.hashes import hash_json
 from pcii.store.safe_files import write_json_safely
-from simgen.base.locations import recipe_roots
+from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions

@@ -15,8 +15,7 @@ from pcii.base.errors import InputError
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import layers_for, tile_px_for
 from simgen.photons.exploration import MAX_RAYS
-from simgen.spec.camera_grid import Grid
-from simgen.spec.recipe import Photons, Products, Sensor
+from simgen.spec.recipe import Grid, Photons, Products, Sensor
 
 BASE_BYTES = 4e8
 """The renderer and its libraries."""

@@ -9,8 +9,7 @@ import numpy as np
 
 from pcii.base.srgb import LUMINANCE, linear_to_srgb, srgb_to_linear
 from simgen.assets.cutouts import cut_out
-from simgen.assets.mesh_points import bears_pictures_once
-from simgen.assets.triangles import Triangles
+from simgen.assets.triangles import Triangles, bears_pictures_once
 from simgen.importing.foreign_scene import ForeignScene
 from simgen.importing.gltf_document import Material, Sampler, TextureInfo
 from simgen.importing.gltf_file import GltfFile

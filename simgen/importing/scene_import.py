@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from pcii.base.errors import InputError
 from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
-from simgen.assets.mesh_files import ply_bytes
+from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
 from simgen.importing.foreign_scene import ForeignScene, Part

@@ -13,8 +13,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import Assets
-from simgen.assets.mesh_points import bears_pictures_once, surface_points
-from simgen.assets.solids import card_triangles, globe, triangles_of
+from simgen.assets.triangles import bears_pictures_once, card_triangles, globe, surface_points, triangles_of
 from simgen.renderer.backend import is_spectral
 from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
 from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
@@ -121,7 +120,7 @@ def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) ->
             "without sensor.camera"
         )
     check_texcoords(where, "give the luminance alone", shape, assets)
-    if not (isinstance(shape, Card | Sphere) or bears_pictures_once(triangles_of(shape, assets))):
+    if not (isinstance(shape, Card | Sphere) or bears_pictures_once(triangles_of(shape, assets.meshes))):
         raise InputError(
             f"{where}: the shape bears parts of the picture several times, or reaches beyond it; give the "
             "luminance alone, or texture coordinates from 0 to 1 of which each is used once"

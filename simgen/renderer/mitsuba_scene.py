@@ -10,7 +10,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets, read_assets
-from simgen.assets.solids import triangles_of
+from simgen.assets.triangles import triangles_of
 from simgen.renderer.backend import is_scalar, load_drjit, shape_numbers
 from simgen.renderer.emission import (
     ShiningSurface,
@@ -85,7 +85,7 @@ def build(
     names = dict(enumerate((*own_names, *(reference.names if reference else ())), start=1))
     _check_names(names, folder)
     around = next((light for light in scene.lights if isinstance(light, EnvironmentLight)), None)
-    surroundings = None if around is None else assets.environment(around.file)
+    surroundings = None if around is None else assets.environments[around.file]
     referenced_lux = (lambda _: 0.0) if reference is None else reference.illuminance_lux
     gain = level_gain(mi, scene, assets, surroundings, referenced_lux)
     plugins = _object_plugins(mi, scene, assets, gain, frame)
@@ -164,9 +164,9 @@ def _reach_mm(scene: Scene, assets: Assets) -> float:
             case Sphere(radius_mm=size_mm):
                 pass
             case Mesh(file=file, scale=scale):
-                size_mm = np.linalg.norm(assets.mesh(file).positions * np.asarray(scale), axis=1).max()
+                size_mm = np.linalg.norm(assets.meshes[file].positions * np.asarray(scale), axis=1).max()
             case shape:
-                size_mm = np.linalg.norm(triangles_of(shape, assets).positions, axis=1).max()
+                size_mm = np.linalg.norm(triangles_of(shape, assets.meshes).positions, axis=1).max()
         far_mm = max(far_mm, float(np.linalg.norm(thing.position_mm) + size_mm))
     return 2 * far_mm
 

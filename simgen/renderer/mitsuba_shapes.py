@@ -14,8 +14,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from simgen.assets.asset_files import Assets
 from simgen.assets.cutouts import cut_out
-from simgen.assets.solids import globe, triangles_of
-from simgen.assets.triangles import Triangles
+from simgen.assets.triangles import Triangles, globe, triangles_of
 from simgen.spec.materials import Material
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Card, Mesh, Shape, Sphere
@@ -147,7 +146,7 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
 
     Raises `InputError` for an opacity that cannot be laid on the shape or leaves nothing of it.
     """
-    triangles = triangles_of(shape, assets)
+    triangles = triangles_of(shape, assets.meshes)
     if material.opacity is None:
         return triangles
     where = "material.opacity"
@@ -165,7 +164,7 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
 
 def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
     """`InputError` for a picture on a mesh that does not say where it lies."""
-    if isinstance(shape, Mesh) and assets.mesh(shape.file).texcoords is None:
+    if isinstance(shape, Mesh) and assets.meshes[shape.file].texcoords is None:
         raise InputError(
             f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
             f"add them to the file, or {instead}"

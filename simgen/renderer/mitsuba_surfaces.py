@@ -49,7 +49,7 @@ def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]
 
 def surface_key(material: Material, shape: Shape, assets: Assets) -> Hashable:
     """A key that is equal for objects that can share a surface, on which pictures lie alike."""
-    has_texcoords = not isinstance(shape, Mesh) or assets.mesh(shape.file).texcoords is not None
+    has_texcoords = not isinstance(shape, Mesh) or assets.meshes[shape.file].texcoords is not None
     return material, shape.type in ("card", "sphere") and shape.type, aspect_of(shape), has_texcoords
 
 

@@ -30,19 +30,26 @@ NamedIlluminant = Annotated[
 
 def _not_black(colour: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(colour):
-        raise ValueError("light is not black; (1, 1, 1) is that of daylight")
+        raise ValueError("light must not be black")
     return colour
 
 
-def _named_or_colour(given: Any) -> str:
-    return "name" if isinstance(given, str) else "colour"
+def string_or_value(written: Any) -> str:
+    """Which part of a union is meant, so that an error is about that one alone."""
+    return "string" if isinstance(written, str) else "value"
 
 
 Illuminant = Annotated[
-    Annotated[NamedIlluminant, Tag("name")] | Annotated[Colour, AfterValidator(_not_black), Tag("colour")],
-    Discriminator(_named_or_colour),
+    Annotated[NamedIlluminant, Tag("string")] | Annotated[Colour, AfterValidator(_not_black), Tag("value")],
+    Discriminator(string_or_value),
 ]
 """Colour of the light: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""
+
+
+def _check_target(lamp: "AreaLight | SpotLight") -> "AreaLight | SpotLight":
+    if lamp.position_mm == lamp.target_mm:
+        raise ValueError("target_mm: a lamp must face another place than its own position_mm")
+    return lamp
 
 
 class AreaLight(Strict):
@@ -56,15 +63,10 @@ class AreaLight(Strict):
     width_mm: Length
     """Across, level if the lamp can be."""
     height_mm: Length
-    """Along its other side."""
     luminance_cd_m2: Positive
-    """How bright its face is; an overcast sky has some 2000, a white sheet at 500 lux 159."""
     illuminant: Illuminant = "D65"
 
-    @model_validator(mode="after")
-    def _faces_something(self) -> Self:
-        _check_target(self)
-        return self
+    _faces_another_place = model_validator(mode="after")(_check_target)
 
 
 class PointLight(Strict):
@@ -72,7 +74,6 @@ class PointLight(Strict):
 
     type: Literal["point"] = "point"
     position_mm: Position
-    """Where it stands."""
     intensity_cd: Positive
     """Luminous intensity: lux times square metres."""
     illuminant: Illuminant = "D65"
@@ -83,7 +84,6 @@ class SpotLight(Strict):
 
     type: Literal["spot"] = "spot"
     position_mm: Position
-    """Where it stands."""
     target_mm: Position
     """What its axis goes through."""
     intensity_cd: Positive
@@ -94,9 +94,10 @@ class SpotLight(Strict):
     """Beyond this angle it is dark; between the two it falls evenly with the angle."""
     illuminant: Illuminant = "D65"
 
+    _faces_another_place = model_validator(mode="after")(_check_target)
+
     @model_validator(mode="after")
     def _is_a_cone(self) -> Self:
-        _check_target(self)
         if self.beam_deg >= self.cutoff_deg:
             raise ValueError("beam_deg: the angle up to which a spot is bright must be below its cutoff_deg")
         return self
@@ -107,16 +108,10 @@ class DirectionalLight(Strict):
 
     type: Literal["directional"] = "directional"
     direction: Direction
-    """Where the light goes: (0, 0, 1) away from the cameras, (0, 1, 0) down; its length is of no matter."""
+    """Where the light goes, a vector of any length: (0, 0, 1) away from the cameras, (0, 1, 0) down."""
     illuminance_lux: Positive
-    """What a surface that faces the light gets; 100 000 of the sun, 0.2 of the moon."""
+    """What a surface that faces the light gets: 100 000 from the sun."""
     illuminant: Illuminant = "D65"
-
-
-def _check_target(lamp: AreaLight | SpotLight) -> None:
-    if lamp.position_mm == lamp.target_mm:
-        what = "an area light" if isinstance(lamp, AreaLight) else "a spot"
-        raise ValueError(f"target_mm: {what} must face something else than its own position_mm")
 
 
 class UniformLight(Strict):

@@ -1,28 +1,141 @@
-"""What surfaces do with light: a colour, by a reflectance or a texture, and a finish."""
+"""What surfaces do with light: a colour, by a reflectance or a texture, and a finish.
 
+How patterns are painted is in `assets.texture_pixels`.
+"""
+
+import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+import numpy as np
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from pcii.base.srgb import srgb_to_linear
 from simgen.base.file_lookup import ImageName
-from simgen.base.strict_models import Colour, Positive, Real, Share, Strict, completed_by
-from simgen.spec.lights import Illuminant
-from simgen.spec.textures import Texture
+from simgen.base.strict_models import (
+    Colour,
+    NonNegative,
+    Positive,
+    Real,
+    Share,
+    Strict,
+    Whole,
+    completed_by,
+)
+from simgen.spec.lights import Illuminant, string_or_value
 from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
 
 LEAST_INDEX, MOST_INDEX = 1.01, 3.0
 """Refractive indices that the renderer takes."""
-
-
-def _number_or_image(given: Any) -> str:
-    return "image" if isinstance(given, str) else "number"
-
-
+CLIPPED_SHARE = 0.01
+"""Share of a noise's values that may lie outside what a surface can reflect; they are clipped."""
+Roughness = Annotated[Real, Field(ge=0.001, le=1)]
+Index = Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)]
 ShareOrImage = Annotated[
-    Annotated[Share, Tag("number")] | Annotated[str, ImageName, Tag("image")], Discriminator(_number_or_image)
+    Annotated[Share, Tag("value")] | Annotated[str, ImageName, Tag("string")], Discriminator(string_or_value)
 ]
 """A number from 0 to 1, or a grey image of such."""
+Cells = Annotated[Whole, Field(ge=1, le=1024)]
+
+
+class _Pattern(Strict):
+    pixels: Annotated[Whole, Field(ge=16, le=4096)] = 1024
+    """Pixels along the longer side."""
+
+
+class _InTwoColours(_Pattern):
+    colours: tuple[Colour, Colour] = ((0.2, 0.2, 0.2), (0.95, 0.95, 0.95))
+    """Two sRGB colours; by default black ink and white paper."""
+
+
+class Checks(_InTwoColours):
+    """A chessboard; the cell at the top left has the first colour."""
+
+    type: Literal["checks"] = "checks"
+    rows: Cells
+    """Cells from top to bottom."""
+    columns: Cells
+    """Cells from left to right."""
+
+
+class Stripes(_InTwoColours):
+    """Even stripes, upright unless turned; the first begins at the left with the first colour."""
+
+    type: Literal["stripes"] = "stripes"
+    periods: Annotated[Real, Field(ge=1, le=1024)]
+    """Pairs of stripes across the width; turned stripes keep this spacing."""
+    angle_deg: Annotated[Real, Field(ge=-180, le=180)] = 0.0
+    """Turns the stripes clockwise about the centre."""
+    profile: Literal["square", "sine"] = "square"
+    """Sharp borders, or reflectance that goes up and down as a sine."""
+
+
+class Star(_InTwoColours):
+    """A Siemens star about the centre that fills the whole area; it stays round whatever the aspect."""
+
+    type: Literal["star"] = "star"
+    spokes: Annotated[Whole, Field(ge=1, le=360)] = 36
+    """Spokes of each colour."""
+
+
+class Edge(_InTwoColours):
+    """A straight slanted edge through the centre, as ISO 12233 measures sharpness with."""
+
+    type: Literal["edge"] = "edge"
+    angle_deg: Annotated[Real, Field(ge=-180, le=180)] = 5.0
+    """Turns the edge clockwise from upright; at 0 the first colour is on the left."""
+
+
+class Text(_InTwoColours):
+    """One line of text in DejaVu Sans, as large as fits; the first colour on the second."""
+
+    type: Literal["text"] = "text"
+    text: Annotated[str, Field(min_length=1, max_length=64)]
+    """1 to 64 printable Latin-1 characters."""
+
+    @field_validator("text")
+    @classmethod
+    def _can_be_drawn(cls, text: str) -> str:
+        if text.isspace() or not text.isprintable() or max(text) > "ÿ":
+            raise ValueError(f"printable Latin-1 characters, not only spaces, can be drawn; got {text!r}")
+        return text
+
+
+class Noise(_Pattern):
+    """Noise whose amplitude falls as frequency^-exponent, like that of natural scenes; it tiles."""
+
+    type: Literal["noise"] = "noise"
+    exponent: Annotated[Real, Field(ge=0, le=4)] = 1.0
+    """Of the amplitude spectrum: 0 is white noise, 1 natural, 2 cloudy."""
+    contrast: NonNegative = 0.3
+    """Standard deviation of the linear reflectance over its mean, in each channel."""
+    colour: Colour = (0.6, 0.6, 0.6)
+    """Mean reflectance, sRGB."""
+    chroma: Share = 0.0
+    """Share of the variance that each channel has for itself: channels correlate with 1 - chroma."""
+    seed: Annotated[Whole, Field(ge=0, lt=2**63)] = 0
+    """Another number gives another pattern of the same kind."""
+
+    @model_validator(mode="after")
+    def _stays_physical(self) -> Self:
+        means = srgb_to_linear(np.array(self.colour)).tolist()
+        if max(_share_outside(mean, self.contrast) for mean in means) > CLIPPED_SHARE:
+            raise ValueError(
+                f"contrast: {self.contrast:g} puts more than {CLIPPED_SHARE:.0%} of the values outside "
+                "0 to 1; it must be smaller with this colour"
+            )
+        return self
+
+
+def _share_outside(mean: float, contrast: float) -> float:
+    """Share outside 0 to 1 of normal values about `mean` with a deviation of `contrast` times that."""
+    deviation = mean * contrast
+    if deviation == 0:
+        return 0.0
+    return sum(math.erfc(room / deviation / math.sqrt(2)) / 2 for room in (mean, 1 - mean))
+
+
+Texture = Annotated[Checks | Stripes | Star | Edge | Text | Noise, Field(discriminator="type")]
 
 
 class Matt(Strict):
@@ -39,7 +152,7 @@ class Plastic(Strict):
     """
 
     type: Literal["plastic"] = "plastic"
-    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
+    roughness: Roughness = 0.1
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
 
@@ -49,17 +162,17 @@ class Metal(Strict):
     type: Literal["metal"] = "metal"
     name: Literal["Ag", "Al", "Au", "Cr", "Cu", "W"]
     """Silver, aluminium, gold, chromium, copper or tungsten."""
-    roughness: Annotated[Real, Field(ge=0.001, le=1)] = 0.1
+    roughness: Roughness = 0.1
     """Width of the highlights: 0.01 is a mirror to the eye, 0.1 glossy, 0.5 dull (GGX alpha)."""
 
 
 class Glass(Strict):
-    """Clear and smooth; a card of it is a thin pane. Light passes it in as many segments as it has surfaces,
-    so recipes with glass need a larger `render.max_depth`: 6 for a ball in front of a surface."""
+    """Clear and smooth; a card of it is a thin pane. Light passes it in as many segments as it has surfaces:
+    a ball before a surface needs `render.max_depth` = 6."""
 
     type: Literal["glass"] = "glass"
-    refractive_index: Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)] = 1.5
-    """Of the glass against air: 1.5 of windows, 1.33 of water, 1.9 of heavy flint."""
+    refractive_index: Index = 1.5
+    """Of the glass against air."""
 
 
 class Principled(Strict):
@@ -74,7 +187,7 @@ class Principled(Strict):
     """0 is plastic or the like, whose highlights are white; 1 is metal, whose highlights are coloured."""
     roughness: ShareOrImage = 0.5
     """Width of the highlights: its square is the GGX alpha that other finishes take as their roughness."""
-    refractive_index: Annotated[Real, Field(ge=LEAST_INDEX, le=MOST_INDEX)] = 1.5
+    refractive_index: Index = 1.5
     """Of what is no metal: how strong its highlights are, and how much it bends light that passes."""
     transmission: ShareOrImage = 0.0
     """How much of the light that does not go back at once passes through, as in glass; for closed shapes."""
@@ -116,7 +229,7 @@ class Emission(Strict):
     closed shape, and on the side of an unturned card that faces the cameras."""
 
     luminance_cd_m2: Positive
-    """How bright it is; a screen has some 300, a lit lampshade 3000."""
+    """How bright it is; a screen has some 300."""
     illuminant: Illuminant = "D65"
     """Its colour: a CIE illuminant by name, or sRGB, whose brightness is of no matter."""
     texture: ImageName | None = None
@@ -150,22 +263,9 @@ Reflectance = Annotated[
     Discriminator(_kind_of_reflectance),
 ]
 """As sRGB, as the name of a ColorChecker patch, or as a spectrum."""
-
-
-def _file_or_pattern(given: Any) -> str | None:
-    """Which of the two a texture is, so that an error is about that one alone."""
-    if isinstance(given, str):
-        return "file"
-    return "pattern" if isinstance(given, dict | Strict) else None
-
-
 FileOrPattern = Annotated[
-    Annotated[str, ImageName, Tag("file")] | Annotated[Texture, Tag("pattern")],
-    Discriminator(
-        _file_or_pattern,
-        custom_error_type="texture",
-        custom_error_message='give the name of an image file or a table such as { type = "star" }',
-    ),
+    Annotated[str, ImageName, Tag("string")] | Annotated[Texture, Tag("value")],
+    Discriminator(string_or_value),
 ]
 
 
@@ -192,15 +292,14 @@ class Material(Strict):
     """Light that the surface sends out by itself, such as { luminance_cd_m2 = 300.0 }."""
 
     @model_validator(mode="after")
-    def _one_of_two(self) -> Self:
-        coloured = not isinstance(self.finish, Metal | Glass)
-        if coloured and (self.reflectance is None) == (self.texture is None):
+    def _fits_its_finish(self) -> Self:
+        colours = [field for field in ("reflectance", "texture") if getattr(self, field) is not None]
+        if isinstance(self.finish, Metal | Glass):
+            if colours:
+                raise ValueError(f"{colours[0]}: the colour of {self.finish.type} is its own; leave it out")
+        elif len(colours) != 1:
             raise ValueError("give either 'reflectance' or 'texture'")
-        if not coloured and (self.reflectance is not None or self.texture is not None):
-            kind = self.finish.type
-            raise ValueError(f"the colour of {kind} is its own; give no 'reflectance' and no 'texture'")
-        if self.normal_map is not None and is_clear(self.finish):
-            raise ValueError("normal_map: a surface that light passes through cannot be tilted by an image")
-        if self.opacity is not None and is_clear(self.finish):
-            raise ValueError("opacity: what light passes through is bounded by whole surfaces, without holes")
+        for field in ("normal_map", "opacity"):
+            if is_clear(self.finish) and getattr(self, field) is not None:
+                raise ValueError(f"{field}: a surface that light passes through cannot have one")
         return self

@@ -1,8 +1,7 @@
 """A Mitsuba scene that a scene.toml refers to: where it stands, and which files it names.
 
-Mitsuba loads and runs whatever library a plugin's type or a `<path>` names, so one pass of an XML parser
-looks at the file first: all that it names has to be inside the scene's folder (docs/architecture.md, rule of
-trust).
+Mitsuba loads and runs any library that a plugin's type or a `<path>` names, so one pass of an XML parser
+looks at the file first: all that it names has to be inside the scene's folder.
 """
 
 import re
@@ -21,7 +20,6 @@ LARGEST_BYTES = 1 << 24
 MOST_ELEMENTS = 100_000
 DEEPEST = 100
 """Limits of all files together that make up a scene; Mitsuba's own parser has none."""
-MILLIMETRES_OF_A_METRE = 1000.0
 
 
 class MitsubaName(AssetName):
@@ -39,7 +37,7 @@ class MitsubaFile(Strict):
 
     file: Annotated[str, MitsubaName]
     """The XML file inside the scene's folder."""
-    unit_mm: Length = MILLIMETRES_OF_A_METRE
+    unit_mm: Length = 1000.0
     """Millimetres of the file's unit of length."""
     camera: Annotated[str, Field(max_length=200)] | None = None
     """Id of the sensor that becomes the virtual centre; may be left out if the file has only one."""
@@ -51,7 +49,7 @@ class MitsubaFile(Strict):
     @model_validator(mode="after")
     def _stands_in_one_place(self) -> Self:
         if self.camera is not None and self.place_at_mm is not None:
-            raise ValueError("give camera or place_at_mm, not both: each says where the scene stands")
+            raise ValueError("give camera or place_at_mm, not both")
         return self
 
 
@@ -85,7 +83,7 @@ class _XmlPass:
         path = asset(self.folder, name, "mitsuba")
         self.bytes += path.stat().st_size
         if self.bytes > LARGEST_BYTES:
-            raise InputError(f"{path}: the XML of a scene may have {LARGEST_BYTES} bytes, and this has more")
+            raise InputError(f"{path}: the XML of a scene may have {LARGEST_BYTES} bytes")
         names: list[str] = []
         parser = expat.ParserCreate()
 
@@ -96,12 +94,13 @@ class _XmlPass:
             nonlocal depth
             depth, self.elements = depth + 1, self.elements + 1
             if self.elements > MOST_ELEMENTS or depth > DEEPEST:
-                refuse(f"a scene may have {MOST_ELEMENTS} elements, {DEEPEST} deep, and this has more")
+                refuse(f"a scene may have {MOST_ELEMENTS} elements, {DEEPEST} deep")
             if tag == "path":
                 refuse("<path> is not followed; files are those of the scene's folder")
             values = {key: self._completed(value) for key, value in attributes.items()}
             for value in values.values():
-                if _leads_outside(value):
+                kinds = PurePosixPath(value), PureWindowsPath(value)
+                if any(kind.is_absolute() or ".." in kind.parts for kind in kinds):
                     refuse(f"{shown_value(value)} leads outside the scene's folder")
             if not re.fullmatch(r"\w*", values.get("type", ""), re.ASCII):
                 refuse(f"{shown_value(values['type'])} is no name of a plugin")
@@ -138,9 +137,3 @@ class _XmlPass:
             for name in sorted(self.defaults, key=len, reverse=True):
                 value = value.replace(f"${name}", self.defaults[name])
         return value
-
-
-def _leads_outside(value: str) -> bool:
-    """Whether a text would be, as the name of a file, an absolute one or one with `..` in it."""
-    kinds = PurePosixPath(value), PureWindowsPath(value)
-    return any(path.is_absolute() or ".." in path.parts for path in kinds)

@@ -9,12 +9,14 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import PATTERNS
+from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from pcii.exporting.dataset_card import Terms
 from simgen.base.file_lookup import find, recipe_roots
 from simgen.base.strict_models import (
+    LARGEST_MM,
     Count,
+    Length,
     NonNegative,
     Positive,
     Real,
@@ -28,74 +30,105 @@ from simgen.base.strict_models import (
     suggestion,
     validate,
 )
-from simgen.spec.camera_grid import Grid
 from simgen.spectral.filters import camera_names
 
-Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
-ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
-ViewPasses = Annotated[
-    tuple[ViewPass, ...],
-    BeforeValidator(
-        lambda given: {True: get_args(ViewPass), False: ()}[given] if isinstance(given, bool) else given,
-        json_schema_input_type=bool | tuple[ViewPass, ...],
-    ),
-]
-Efficiency = Annotated[Real, Field(gt=0, le=1)]
+MAX_SHEAR_PX = 1e9
+"""Larger shears would overflow the shifts of views, which are 32-bit numbers of pixels."""
+MAX_HALF_WIDTHS_PER_FOCAL = 1e4
+"""Half a view's width by its focal length: if much larger, views are rounded to 180 degrees."""
 MOST_PHOTONS = 1e15
 """Above, NumPy's Poisson numbers have a variance that is some per cent off."""
 MOST_PATHS = 1 << 31
 """One rendering pass counts its paths in 32 bits."""
-OF_ITS_SCENE = ("title", "analysis")
-"""What a recipe says of its own scene alone."""
 MAX_SEGMENTS = 1_000_000
 """Longer paths carry no light, and the renderer counts segments in 32 bits."""
 SEED_LIMIT = 1 << 63
 """Seeds are less."""
 APERTURE_TOLERANCE = 0.01
 """F-numbers are rounded by about so much."""
+OF_ITS_SCENE = ("title", "analysis")
+"""Fields of a recipe that are about its own scene alone."""
+Cfa = Literal["GRBG", "RGGB", "BGGR", "GBRG", "none"]
+ViewPass = Literal["z_mm", "object_id", "normal", "coverage"]
+ViewPasses = Annotated[
+    tuple[ViewPass, ...],
+    BeforeValidator(
+        lambda value: {True: get_args(ViewPass), False: ()}[value] if isinstance(value, bool) else value,
+        json_schema_input_type=bool | tuple[ViewPass, ...],
+    ),
+]
+Efficiency = Annotated[Real, Field(gt=0, le=1)]
+Spread = Annotated[Real, Field(ge=0, le=LARGEST_MM)]
+Shear = Annotated[Real, Field(ge=-MAX_SHEAR_PX, le=MAX_SHEAR_PX)]
 
 
-def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
-    """Put values given as `key=value` into what a recipe says; raises `InputError` for any other text."""
-    for text in overrides:
-        _override(values, text)
+class CalibrationErrors(Strict):
+    """How far the cameras are off. The truth keeps it; the grid that a dataset opens with does not."""
+
+    position_sd_mm: tuple[Spread, Spread, Spread] = (0.0, 0.0, 0.0)
+    """Standard deviation of each camera's place along X, Y and Z."""
+    rotation_sd_deg: tuple[NonNegative, NonNegative, NonNegative] = (0.0, 0.0, 0.0)
+    """Standard deviation of each camera's turn about X (tilt), Y (pan) and Z (roll)."""
+    pitch_error: Annotated[Real, Field(gt=-1, le=1)] = 0.0
+    """The true pitch is (1 + this) times `pitch_mm`, along both axes."""
 
 
-def _override(values: dict[str, Any], text: str) -> None:
-    key, equals, value = text.partition("=")
-    if not equals or not all(key.split(".")):
-        raise InputError(f"--set: expected key=value such as photons.budget=300, got {text!r}")
-    *tables, last = key.split(".")
-    target = values
-    for table in tables:
-        target = target.setdefault(table, {})
-        if not isinstance(target, dict):
-            raise InputError(f"--set: {table!r} in {key!r} is a value, not a table")
-    try:
-        target[last] = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        if value.startswith(("[", "{")):
-            raise InputError(
-                f"--set: {text!r} is a list or table that cannot be read; words in it need quotation marks, "
-                'as in \'scene=["two_objects", "overlap"]\''
-            ) from None
-        target[last] = value
+class Lens(Strict):
+    """A thin lens in place of each pinhole: what is not at the depth in focus is blurred."""
+
+    aperture_mm: Length
+    """Diameter of the lens."""
+    focus_mm: Length
+    """Planar depth from the camera that is in focus."""
 
 
-assert set(Cfa.__args__) == {*PATTERNS, "none"}
+class Grid(Strict):
+    """The camera grid: parallel cameras in the plane Z = 0, pinholes unless they have a lens."""
+
+    rows: Count = 10
+    """Rows of cameras, counted from the top."""
+    cols: Count = 10
+    """Columns of cameras, counted from the left."""
+    pitch_mm: tuple[Length, Length] = (5.0, 5.0)
+    """Distance between neighbouring cameras, (x, y)."""
+    focal_mm: Length = 50.0
+    """Distance from pinhole to sensor."""
+    pixel_mm: Length = 0.0352
+    """Side of a square pixel."""
+    height: Count = 1024
+    """Rows of pixels of one view."""
+    width: Count = 1024
+    """Columns of pixels of one view."""
+    shear_px: tuple[Shear, Shear] = (0.0, 0.0)
+    """Each camera's axis meets its film so many pixels further right and down than that of the camera before;
+    with focal pitch / (z pixel) the cameras converge at depth z."""
+    errors: CalibrationErrors | None = None
+    lens: Lens | None = None
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> Self:
+        least_mm = max(self.width, self.height) * self.pixel_mm / 2 / MAX_HALF_WIDTHS_PER_FOCAL
+        if self.focal_mm < least_mm:
+            raise ValueError(f"focal_mm: {least_mm:g} mm or more is needed for views of this size")
+        if self.lens is not None and self.shear_px != (0, 0):
+            raise ValueError(
+                "shear_px: the film behind a lens cannot be shifted; leave out shear_px or [grid.lens]"
+            )
+        return self
+
+    def camera_grid(self) -> CameraGrid:
+        """The same grid as the type that the dataset is written with, where cameras ought to be."""
+        return CameraGrid(**self.model_dump(exclude={"errors", "lens"}))
 
 
 class Publication(Strict):
-    """Terms under which the data may be used. Only the dataset's card says them: no data depend on them."""
+    """Terms under which the data may be used, for the dataset's card; no data depend on them."""
 
     licence: Annotated[Title, Field(min_length=1)] = Terms.licence
     """Name of a licence in the SPDX list, such as "CC-BY-4.0", or the URL of another one."""
     creators: Annotated[tuple[Title, ...], Field(min_length=1)] = Terms.creators
-    """Who made the data."""
     citation: Title = Terms.citation
-    """How to cite the data."""
     url: Title = ""
-    """Where the data are."""
 
     def terms(self) -> Terms:
         """The same as the type that cards are written with."""
@@ -170,12 +203,9 @@ class Photons(Strict):
 
     @model_validator(mode="after")
     def _budgets_fit(self) -> Self:
-        if self.scope == "exposure":
-            if self.statistics != "poisson":
-                raise ValueError("statistics: an exposure has no fixed total; use 'poisson'")
-            if self.nested:
-                raise ValueError("nested: an exposure has no budget; use scope 'view', 'channel' or 'scene'")
-        elif self.nested and max(self.nested) >= self.budget:
+        if self.scope == "exposure" and (self.nested or self.statistics != "poisson"):
+            raise ValueError("scope: an exposure has no budget, so no 'nested' and no fixed total")
+        if self.scope != "exposure" and max(self.nested, default=0) >= self.budget:
             raise ValueError(f"nested: every budget must be less than budget = {self.budget:g}")
         if len(set(self.nested)) < len(self.nested):
             raise ValueError("nested: give each budget once")
@@ -190,7 +220,6 @@ class Exposure(Strict):
     f_number: Positive = 8.0
     """Focal length by diameter of the aperture."""
     time_s: Positive = 0.01
-    """How long the shutter is open."""
 
 
 class Render(Strict):
@@ -274,32 +303,26 @@ class Recipe(Strict):
     publication: Publication = Publication()
 
     @model_validator(mode="after")
-    def _one_pass_renders_a_view(self) -> Self:
-        grid, samples = self.grid, self.render.samples_per_pixel
-        paths = samples * grid.height * grid.width
+    def _parts_fit_each_other(self) -> Self:
+        grid, exposure = self.grid, self.exposure
+        paths = self.render.samples_per_pixel * grid.height * grid.width
         if paths >= MOST_PATHS:
             raise ValueError(
-                f"a view of {grid.height} x {grid.width} pixels with {samples} samples each is {paths} "
-                f"paths; fewer than {MOST_PATHS} can be rendered at once"
+                f"render.samples_per_pixel: a view of {grid.height} x {grid.width} pixels has {paths} paths; "
+                f"fewer than {MOST_PATHS} can be rendered at once"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _exposure_is_known(self) -> Self:
-        if self.exposure is None and self.photons.scope == "exposure":
-            raise ValueError("photons.scope: 'exposure' needs the table [exposure] with f_number and time_s")
-        if self.exposure is None and self.sensor.full_light is not None:
-            raise ValueError("sensor.full_light: needs the table [exposure] with f_number and time_s")
-        return self
-
-    @model_validator(mode="after")
-    def _one_aperture(self) -> Self:
-        if self.exposure is not None and self.grid.lens is not None:
-            expected_mm = self.grid.focal_mm / self.exposure.f_number
-            if abs(self.grid.lens.aperture_mm / expected_mm - 1) > APERTURE_TOLERANCE:
+        if exposure is None:
+            if self.photons.scope == "exposure" or self.sensor.full_light is not None:
+                raise ValueError(
+                    "exposure: photons.scope = 'exposure' and sensor.full_light need this table with "
+                    "f_number and time_s"
+                )
+        elif grid.lens is not None:
+            expected_mm = grid.focal_mm / exposure.f_number
+            if abs(grid.lens.aperture_mm / expected_mm - 1) > APERTURE_TOLERANCE:
                 raise ValueError(
                     f"grid.lens.aperture_mm: focal_mm / exposure.f_number is {expected_mm:g} mm, "
-                    f"and aperture_mm is {self.grid.lens.aperture_mm:g}; make them agree"
+                    f"and aperture_mm is {grid.lens.aperture_mm:g}; make them agree"
                 )
         return self
 
@@ -314,14 +337,38 @@ class Recipe(Strict):
         return self.sensor.bayer
 
 
+def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
+    """Put values written as `key=value` into what a recipe says; raises `InputError` for any other text.
+
+    A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string.
+    """
+    for text in overrides:
+        key, equals, value = text.partition("=")
+        if not equals or not all(key.split(".")):
+            raise InputError(f"--set: expected key=value such as photons.budget=300, got {text!r}")
+        *tables, last = key.split(".")
+        target = values
+        for table in tables:
+            target = target.setdefault(table, {})
+            if not isinstance(target, dict):
+                raise InputError(f"--set: {table!r} in {key!r} is a value, not a table")
+        try:
+            target[last] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            if value.startswith(("[", "{")):
+                raise InputError(
+                    f"--set: {text!r} is no TOML; words in a list need quotation marks"
+                ) from None
+            target[last] = value
+
+
 def load_recipe(
     name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
 ) -> tuple[Recipe, Path]:
     """A recipe by path or shipped name, with `key=value` overrides; and its folder.
 
-    A key is dotted (`photons.budget=300`), a value is TOML or else taken as a string. With another scene the
-    recipe's title and analysis, which are of its own scene, are dropped but for what is given too.
-    Raises `InputError` for a recipe that is missing or wrong.
+    With another scene the recipe's title and analysis are dropped but for what the overrides say. Raises
+    `InputError` for a recipe that is missing or wrong.
     """
     values, source, recipe_folder = read_recipe(name_or_path, overrides, trust_python=trust_python)
     return validate(Recipe, values, source), recipe_folder

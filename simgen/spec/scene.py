@@ -5,7 +5,7 @@ World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking a
 
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -25,9 +25,7 @@ from simgen.base.strict_models import (
     Strict,
     Title,
     Vector,
-    faults_of,
     shorten,
-    shown_value,
     suggestion,
     toml_text,
     validate,
@@ -47,33 +45,20 @@ MOST_PLANES = 1000
 class SceneObject(Strict):
     """One named thing that truth and scores know."""
 
-    name: Annotated[str, Field(max_length=LONGEST_NAME, json_schema_extra={"pattern": NAME})]
+    name: Annotated[str, Field(max_length=LONGEST_NAME, pattern=NAME)]
     """What truth, scores and pictures call it: a letter, then letters, digits, _ and -."""
     position_mm: Position
     """Where the shape's origin stands: X right, Y down, Z away from the cameras."""
     rotation_deg: Vector = (0.0, 0.0, 0.0)
     """Turns about the X, Y and Z axes, applied in this order, in degrees."""
     shape: Shape
-    """A sphere, card, box, cylinder or mesh."""
     material: Material
-    """Its colour or texture, and its finish."""
-
-    @field_validator("name")
-    @classmethod
-    def _is_a_name(cls, name: str) -> str:
-        if not re.fullmatch(NAME, name):
-            shown = shorten(repr(name), LONGEST_PART)
-            raise ValueError(
-                f"a name is a letter, then letters, digits, _ and -, such as 'left-wheel', not {shown}"
-            )
-        return name
 
 
 class Backdrop(Strict):
     """A flat wall parallel to the camera plane, endless for the cameras."""
 
     z_mm: Length
-    """Depth of the wall."""
     reflectance: Reflectance = (0.0, 0.0, 0.0)
     """sRGB, the name of a ColorChecker patch, or a spectrum; as of a material."""
     half_width_mm: Annotated[Real, Field(ge=0, le=LARGEST_MM)] = 5000.0
@@ -81,19 +66,9 @@ class Backdrop(Strict):
 
 
 class _Move(Strict):
-    """Where an object goes, and how it is turned there."""
-
-    by_mm: Position | None
-    to_mm: Position | None
-    rotation_deg: Vector | None
-
-    @model_validator(mode="after")
-    def _says_where(self) -> Self:
-        if self.by_mm is not None and self.to_mm is not None:
-            raise ValueError("give by_mm or to_mm, not both")
-        if {self.by_mm, self.to_mm, self.rotation_deg} == {None}:
-            raise ValueError("give by_mm, to_mm or rotation_deg")
-        return self
+    by_mm: Position
+    to_mm: Position
+    rotation_deg: Vector
 
 
 class Scene(Strict):
@@ -111,16 +86,14 @@ class Scene(Strict):
     """
 
     _folder: Path | None = PrivateAttr(default=None)
-    # No field, since fields are what a scene.toml holds and what digests of scenes are made of; for type
-    # checkers it is one, so that they know it among the arguments.
+    # No field: fields are what a scene.toml holds and what digests of scenes are made of. Type checkers are
+    # told that it is one, so that they know it among the arguments.
     if TYPE_CHECKING:
         folder: Path | None = None
     else:
 
         def __init__(self, *, folder: str | Path | None = None, **values: Any) -> None:
             super().__init__(**values)
-            if not isinstance(folder, str | Path | None):
-                raise InputError(f"Scene: 'folder': expected a path, got {shown_value(folder)}")
             self._folder = None if folder is None else Path(folder)
 
         __init__.__pydantic_base_init__ = True
@@ -131,9 +104,7 @@ class Scene(Strict):
             return self._folder
 
     title: Title
-    """One line."""
     description: Annotated[str, Field(max_length=10_000)] = ""
-    """What it is for."""
     objects: Annotated[tuple[SceneObject, ...], Field(max_length=MOST_OBJECTS)] = ()
     """What truth and scores know by name; none makes an empty scene."""
     lights: Annotated[tuple[Light, ...], Field(max_length=MOST_LIGHTS)] = ()
@@ -158,20 +129,16 @@ class Scene(Strict):
     @field_validator("objects")
     @classmethod
     def _names_differ(cls, objects: tuple[SceneObject, ...]) -> tuple[SceneObject, ...]:
-        times = Counter(thing.name for thing in objects)
-        twice = sorted(name for name, count in times.items() if count > 1)
-        if twice:
-            raise ValueError(f"two objects are named '{twice[0]}'; give each its own name")
+        for name, count in Counter(thing.name for thing in objects).items():
+            if count > 1:
+                raise ValueError(f"two objects are named '{name}'; give each its own name")
         return objects
 
     @model_validator(mode="after")
     def _is_lit(self) -> Self:
         shines = any(thing.material.emission for thing in self.objects) or self.mitsuba is not None
         if not self.lights and not shines:
-            raise ValueError(
-                "'lights': nothing shines; give a light, such as { type = \"uniform\", luminance_cd_m2 = "
-                "100.0 }, or an object a material.emission"
-            )
+            raise ValueError("'lights': nothing shines; give a light, or an object a material.emission")
         return self
 
     @model_serializer(mode="wrap")
@@ -188,9 +155,8 @@ class Scene(Strict):
         for thing in self.objects:
             if thing.name == name:
                 return thing
-        shown = shorten(repr(name), LONGEST_PART)
         known = suggestion(str(name), [thing.name for thing in self.objects])
-        raise InputError(f"scene: there is no object {shown}{known}")
+        raise InputError(f"scene: there is no object {shorten(repr(name), LONGEST_PART)}{known}")
 
     def change(self, **fields: Any) -> Self:
         """A scene with other values of these fields, such as `lights`, `title` or `folder`."""
@@ -213,35 +179,36 @@ class Scene(Strict):
         >>> scene = scene.replace("ball", shape=Sphere(radius_mm=20), name="marble")       # doctest: +SKIP
         """
         old = self.object(name)
-        if (thing is None) == (not fields):
-            raise InputError("replace: give either another object or fields of the one that is there")
-        new = thing or old.change(**fields)
+        new = (thing or old).change(**fields)
         return self.change(objects=tuple(new if each is old else each for each in self.objects))
 
     def move(
         self,
         name: str,
         *,
-        by_mm: Sequence[float] | None = None,
+        by_mm: Sequence[float] = (0.0, 0.0, 0.0),
         to_mm: Sequence[float] | None = None,
         rotation_deg: Sequence[float] | None = None,
     ) -> Self:
-        """A scene in which an object stands further along X, Y, Z or elsewhere, or is turned otherwise.
+        """A scene in which an object stands elsewhere or further along X, Y, Z, or is turned otherwise.
 
         `rotation_deg` takes the place of the rotation that it has.
         """
         old = self.object(name)
-        move = validate(_Move, {"by_mm": by_mm, "to_mm": to_mm, "rotation_deg": rotation_deg}, "move")
-        place = move.to_mm or tuple(
-            a + b for a, b in zip(old.position_mm, move.by_mm or (0, 0, 0), strict=True)
-        )
-        return self.replace(name, position_mm=place, rotation_deg=move.rotation_deg or old.rotation_deg)
+        values = {
+            "by_mm": by_mm,
+            "to_mm": old.position_mm if to_mm is None else to_mm,
+            "rotation_deg": old.rotation_deg if rotation_deg is None else rotation_deg,
+        }
+        move = validate(_Move, values, "move")
+        place = tuple(a + b for a, b in zip(move.to_mm, move.by_mm, strict=True))
+        return self.replace(name, position_mm=place, rotation_deg=move.rotation_deg)
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
         """Write `folder`/scene.toml, whose path is returned, and beside it the files that the scene names.
 
-        What else is in the folder stays. A file that is there with other content is refused with `InputError`
-        before anything is written, unless it may be overwritten.
+        What else is in the folder stays. Raises `InputError`, before anything is written, if a file is there
+        with other content, unless it may be overwritten.
         """
         out, text = Path(folder), toml_text(self).encode()
         entries(out, "scene")  # refuses a file
@@ -265,35 +232,28 @@ def scene_of(values: Mapping[str, Any], folder: Path | None, source: str) -> Sce
 def checked_folder(scene: Scene, source: str = "scene") -> Path:
     """The folder of a scene's files, all of which are there; the working directory if it has and needs none.
 
-    Raises `InputError`, beginning with `source`, that tells each file that is missing.
+    Raises `InputError`, beginning with `source`, for a file that is missing.
     """
-    faults: list[str] = []
     for where, name in scene_files(scene):
-        try:
-            if scene.folder is None:
-                raise InputError(f"{where}: {name!r} is looked for in the scene's folder; give folder=")
-            asset(scene.folder, name, where)
-        except InputError as fault:
-            faults.append(str(fault))
-    if faults:
-        raise faults_of(source, faults)
+        if scene.folder is None:
+            raise InputError(f"{source}: {where}: {name!r} is looked for in the scene's folder; give folder=")
+        asset(scene.folder, name, f"{source}: {where}")
     return scene.folder or Path()
 
 
-def names_of_objects(names: Sequence[str], taken: set[str] | None = None) -> list[str]:
+def names_of_objects(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
     """Names like these of a file, as objects have them, each different and none of those `taken`."""
     unique: list[str] = []
-    used = Counter[str]() if taken is None else Counter(taken)
+    used = set(taken)
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "object"
-        plain = plain if plain[0].isalpha() else f"object-{plain}"
-        short, number = plain[: LONGEST_NAME - 6], 1
-        wanted = short
-        while used[wanted]:
+        stem = (plain if plain[0].isalpha() else f"object-{plain}")[: LONGEST_NAME - 6]
+        candidate, number = stem, 1
+        while candidate in used:
             number += 1
-            wanted = f"{short}-{number}"
-        used[wanted] += 1
-        unique.append(wanted)
+            candidate = f"{stem}-{number}"
+        used.add(candidate)
+        unique.append(candidate)
     return unique
 
 

@@ -12,6 +12,7 @@ import importlib
 import inspect
 import runpy
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 
@@ -36,7 +37,7 @@ def load_scene(
     """
     file = find_scene(name_or_path, recipe_folder)
     if file is None:
-        return _draw(name_or_path, recipe_folder, _checked_number(number, name_or_path))
+        return _draw(name_or_path, recipe_folder or Path(), number)
     if number is not None:
         raise InputError(f"scene_number: {file} is one scene, of which there are no draws; leave it out")
     return scene_of(read_toml(file), file.parent, str(file)), file.parent
@@ -57,17 +58,13 @@ def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | N
 
     Raises `InputError` with a suggestion if there is neither.
     """
-    given = Path(name_or_path)
-    beside = [] if recipe_folder is None else [recipe_folder / given, recipe_folder / given / "scene.toml"]
-    try:
-        for candidate in (*beside, given, given / "scene.toml"):
+    paths = [folder / name_or_path for folder in (recipe_folder, Path()) if folder is not None]
+    with suppress(OSError):  # of a name that is too long for a file
+        for candidate in (file for path in paths for file in (path, path / "scene.toml")):
             if candidate.is_file():
                 return candidate
-        shipped = find(scene_roots, f"{name_or_path}/scene.toml")
-    except OSError:  # a name too long for a file
-        shipped = None
-    if shipped is not None:
-        return shipped
+        if shipped := find(scene_roots, f"{name_or_path}/scene.toml"):
+            return shipped
     known = drawn_scenes()
     if ":" in name_or_path or name_or_path in known:
         return None
@@ -95,11 +92,16 @@ def scene_names() -> list[str]:
     return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})
 
 
-def _draw(name: str, recipe_folder: Path | None, number: int) -> tuple[Scene, Path]:
+def _draw(name: str, recipe_folder: Path, number: int | None) -> tuple[Scene, Path]:
     """The scene that a function draws, its number in its title, and the folder of its files."""
+    if type(number) is not int or not 0 <= number < SEED_LIMIT:
+        raise InputError(
+            f"scene_number: {name} is drawn by number, from 0 to 2^63 - 1; say which one, such as "
+            "scene_number = 0 in a recipe or --scene 0"
+        )
     label = f"scene: {name!r}"
     try:
-        function = _function(name, recipe_folder or Path())
+        function = _function(name, recipe_folder)
         scene = function(Random(f"{function.__name__.removeprefix('drawn_')} {number}"))
     except InputError as fault:
         raise InputError(f"{label}, draw {number}: {fault}") from None
@@ -121,14 +123,3 @@ def _function(name: str, recipe_folder: Path) -> Callable[[Random], Scene]:
     if not path.is_file():
         raise InputError(f"there is no file {path}")
     return runpy.run_path(str(path))[function]
-
-
-def _checked_number(number: int | None, source: str) -> int:
-    if number is None:
-        raise InputError(
-            f"scene_number: {source} is drawn by number; say which one, such as scene_number = 0 in a recipe "
-            "or --scene 0"
-        )
-    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < SEED_LIMIT:
-        raise InputError(f"scene_number: expected a whole number from 0 to 2^63 - 1, got {number!r}")
-    return number

@@ -1,11 +1,11 @@
 """Shapes that objects of a scene can have, in millimetres about the object's position."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag
 
 from simgen.base.file_lookup import MeshName
-from simgen.base.strict_models import Length, Positive, Strict, Vector
+from simgen.base.strict_models import Length, Real, Strict
 
 
 class Sphere(Strict):
@@ -16,7 +16,6 @@ class Sphere(Strict):
 
     type: Literal["sphere"] = "sphere"
     radius_mm: Length
-    """From the middle to the surface."""
 
 
 class Card(Strict):
@@ -24,9 +23,7 @@ class Card(Strict):
 
     type: Literal["card"] = "card"
     width_mm: Length
-    """Along X."""
     height_mm: Length
-    """Along Y."""
 
 
 class Box(Strict):
@@ -38,11 +35,8 @@ class Box(Strict):
 
     type: Literal["box"] = "box"
     width_mm: Length
-    """Along X."""
     height_mm: Length
-    """Along Y."""
     depth_mm: Length
-    """Along Z."""
 
 
 class Cylinder(Strict):
@@ -54,9 +48,7 @@ class Cylinder(Strict):
 
     type: Literal["cylinder"] = "cylinder"
     radius_mm: Length
-    """From the axis to the side."""
     length_mm: Length
-    """Along Y, from end to end."""
 
 
 def _has_extent(scales: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -65,13 +57,12 @@ def _has_extent(scales: tuple[float, float, float]) -> tuple[float, float, float
     return scales
 
 
-def _one_or_three(given: Any) -> str:
-    return "number" if isinstance(given, int | float) else "three"
-
-
+LARGEST_SCALE = 1e15
+Factor = Annotated[Real, Field(ge=-LARGEST_SCALE, le=LARGEST_SCALE)]
 Scale = Annotated[
-    Annotated[Positive, Tag("number")] | Annotated[Vector, AfterValidator(_has_extent), Tag("three")],
-    Discriminator(_one_or_three),
+    Annotated[Factor, Field(gt=0), Tag("number")]
+    | Annotated[tuple[Factor, Factor, Factor], AfterValidator(_has_extent), Tag("three")],
+    Discriminator(lambda scale: "number" if isinstance(scale, int | float) else "three"),
 ]
 """One number, or three along the axes, of which negative ones mirror."""
 
@@ -79,8 +70,8 @@ Scale = Annotated[
 class Mesh(Strict):
     """A PLY or OBJ mesh in the scene's folder; its axes are the world's, about the object's position.
 
-    It is laid out by its own texture coordinates (in PLY named s, t or u, v), which begin at the
-    picture's lower left, as modelling programs write them. Without normals its faces are flat.
+    Its own texture coordinates (in PLY named s, t or u, v) begin at the picture's lower left. Without normals
+    its faces are flat.
     """
 
     type: Literal["mesh"] = "mesh"

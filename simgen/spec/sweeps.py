@@ -23,18 +23,17 @@ from simgen.spec.recipe import Recipe, override, read_recipe, recipe_file
 from simgen.spec.scene_lookup import find_scene, is_scene
 
 MOST_DATASETS = 1_000_000
-SHORT_NAMES = {"scene_number": "draw"}
-"""What folders call fields whose own names would mislead there."""
-_ORDER = {"scene": -2, "scene_number": -1, "seed": 1}
 PLAIN = r"[A-Za-z0-9][A-Za-z0-9_.+-]{0,63}"
 LONGEST_STEM = 40
-"""Letters kept before the hash of a value that is no plain name: with several fields a folder's name stays
-below the 255 bytes that file systems allow."""
+"""Letters before the hash of a value that is no plain name: with several fields a folder's name stays below
+the 255 bytes that file systems allow."""
+_SHORT_NAMES = {"scene_number": "draw"}
+_ORDER = {"scene": -2, "scene_number": -1, "seed": 1}
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A swept field, dotted, and its values; what the names of folders call it."""
+    """A swept field, dotted, and its values; `label` is what names of folders call it."""
 
     field: str
     values: Sequence[Any]
@@ -45,15 +44,14 @@ class Axis:
         parts = value if isinstance(value, list | tuple) else [value]
         text = "x".join(f"{part:.15g}" if type(part) is float else str(part) for part in parts)
         if not re.fullmatch(PLAIN, text):
-            digest = hash_json(value)[:8]
             stem = "-".join(re.findall(r"\w+", text, re.ASCII))[-LONGEST_STEM:].strip("-_")
-            text = f"{stem}-{digest}" if stem else digest
+            text = "-".join(filter(None, (stem, hash_json(value)[:8])))
         return f"{self.label}_{text}"
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A recipe as it is written, the fields that have several values, and where it is from.
+    """A recipe as it is written, its fields that have several values, and where it is from.
 
     Fields that decide the scene come first and the seed last, so that datasets made one after the other have
     much in common.
@@ -74,11 +72,11 @@ class Sweep:
 
     def values(self, number: int) -> dict[str, Any]:
         """Value of each swept field of a dataset, the last field varying fastest."""
-        found = {}
+        values = {}
         for axis in reversed(self.axes):
             number, place = divmod(number, len(axis.values))
-            found[axis.field] = axis.values[place]
-        return {axis.field: found[axis.field] for axis in self.axes}
+            values[axis.field] = axis.values[place]
+        return {field: values[field] for field in self.fields}
 
     def folder(self, number: int) -> str:
         """Name of a dataset's folder: its values, the same whatever other values there are."""
@@ -90,34 +88,28 @@ class Sweep:
         return self._recipe_with(self.values(number))
 
     def _recipe_with(self, values: Mapping[str, Any]) -> Recipe:
-        said = ", ".join(f"{field} = {json.dumps(value)}" for field, value in values.items())
-        return validate(Recipe, self._with(values), f"{self.source}{f' at {said}' * bool(said)}")
-
-    def _with(self, values: Mapping[str, Any]) -> dict[str, Any]:
         plain = deepcopy(dict(self.written))
         for field, value in values.items():
             _put(plain, field, value)
-        return plain
+        shown = ", ".join(f"{field} = {json.dumps(value)}" for field, value in values.items())
+        return validate(Recipe, plain, f"{self.source}{f' at {shown}' * bool(shown)}")
 
     @property
     def base(self) -> dict[str, Any]:
         """What all datasets have in common: the recipe with all defaults, None for the swept values."""
         resolved = self.recipe(0).model_dump(mode="json")
-        for axis in self.axes:
-            _put(resolved, axis.field, None)
+        for field in self.fields:
+            _put(resolved, field, None)
         return resolved
 
     def check(self) -> None:
-        """Raise `InputError` if a value of a swept field makes no recipe beside the others' first values.
-
-        A scene that is not there is named too, before there is any folder.
-        """
+        """Raise `InputError` for a value with which there is no recipe, or no scene."""
         first = self.values(0)
         scenes = [self._recipe_with(first).scene]
         for axis in self.axes:
-            # Of a range the ends decide: what whole numbers may be is bounded from below and above.
-            ends = isinstance(axis.values, range)
-            for value in (axis.values[0], axis.values[-1]) if ends else axis.values:
+            # Of a range the ends decide: whole numbers are bounded from below and above.
+            is_range = isinstance(axis.values, range)
+            for value in (axis.values[0], axis.values[-1]) if is_range else axis.values:
                 scenes.append(self._recipe_with(first | {axis.field: value}).scene)
         if self.axes:
             for scene in dict.fromkeys(scenes):
@@ -143,14 +135,14 @@ def load_sweep(
     for option, field, count in (("scenes", "scene_number", scenes), ("seeds", "seed", seeds)):
         if count is not None:
             first = written.get(field, 0)
-            if not isinstance(first, int) or isinstance(first, bool):
+            if type(first) is not int:
                 raise InputError(f"{option}: the recipe gives {field} several values already; leave one out")
             if count < 1:
                 raise InputError(f"{option}: expected a whole number from 1, got {count}")
             written[field] = {"range": [first, first + count]}
-    found = dict(sorted(_swept(written, Recipe, ""), key=lambda item: _ORDER.get(item[0], 0)))
-    labels = _labels(list(found))
-    axes = tuple(Axis(field, _values(field, value, source), labels[field]) for field, value in found.items())
+    swept = dict(sorted(_swept(written, Recipe, ""), key=lambda item: _ORDER.get(item[0], 0)))
+    labels = _labels(list(swept))
+    axes = tuple(Axis(field, _values(field, value, source), labels[field]) for field, value in swept.items())
     for axis in axes:
         if len({axis.name_of(value) for value in axis.values}) < len(axis.values):
             raise InputError(f"{source}: {axis.field}: gives a value twice; each makes one dataset")
@@ -203,31 +195,30 @@ def _kind(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
         return next((model for model, _ in kinds if model is not None), None), any(many for _, many in kinds)
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation, False
-    return None, origin in (tuple, list) or annotation in (tuple, list)
+    return None, tuple in (origin, annotation)
 
 
 def _values(field: str, written: Any, source: str) -> Sequence[Any]:
     values = written if isinstance(written, list) else written.get("each")
     if isinstance(written, dict) and "range" in written:
         ends = written["range"]
-        if not isinstance(ends, list) or len(ends) not in (2, 3) or not all(type(end) is int for end in ends):
+        are_whole = isinstance(ends, list) and all(type(end) is int for end in ends)
+        if not are_whole or len(ends) not in (2, 3) or ends[2:] == [0]:
             raise InputError(
                 f"{source}: {field}: range: expected [first, end] or [first, end, step], whole numbers"
             )
-        if len(ends) == 3 and ends[2] == 0:
-            raise InputError(f"{source}: {field}: range: a step of 0 never ends")
         values = range(*ends)
-        if len(values) > MOST_DATASETS:
-            raise InputError(f"{source}: {field}: range: {len(values)} values; at most {MOST_DATASETS}")
     if not isinstance(values, list | range) or not values:
         raise InputError(f"{source}: {field}: expected at least one value to sweep over")
+    if values[MOST_DATASETS:]:
+        raise InputError(f"{source}: {field}: at most {MOST_DATASETS} values can be swept over")
     return values
 
 
 def _labels(fields: Sequence[str]) -> dict[str, str]:
     """What names of folders call swept fields: the last part of the name, or all where that is not unique."""
-    short = {field: SHORT_NAMES.get(field, field.rsplit(".", 1)[-1]) for field in fields}
-    taken = list(short.values())
+    short = {field: _SHORT_NAMES.get(field, field.rsplit(".", 1)[-1]) for field in fields}
+    names = list(short.values())
     return {
-        field: name if taken.count(name) == 1 else field.replace(".", "-") for field, name in short.items()
+        field: name if names.count(name) == 1 else field.replace(".", "-") for field, name in short.items()
     }

@@ -24,23 +24,22 @@ def ply(
     vertices: str = "0 0 0\n10 0 0\n0 10 0\n",
     faces: str = "3 0 1 2\n",
     *,
-    vertex_count: int | str = 3,
-    face_count: int | str = 1,
+    vertex_count: int = 3,
+    face_count: int = 1,
     form: str = "ascii 1.0",
-    list_types: str = "uchar int",
 ) -> bytes:
-    """A PLY file whose header claims what it is told."""
+    """A PLY file with this header, whatever its numbers are."""
     return (
         f"ply\nformat {form}\nelement vertex {vertex_count}\nproperty float x\nproperty float y\n"
-        f"property float z\nelement face {face_count}\nproperty list {list_types} vertex_indices\n"
+        f"property float z\nelement face {face_count}\nproperty list uchar int vertex_indices\n"
         f"end_header\n{vertices}{faces}"
     ).encode()
 
 
-def binary_ply(*indices: int, count: int | None = None) -> bytes:
+def binary_ply(*indices: int) -> bytes:
     """A little-endian PLY of three vertices and one face with these indices."""
     body = np.array([0, 0, 0, 10, 0, 0, 0, 10, 0], "<f4").tobytes()
-    body += struct.pack("<B", len(indices) if count is None else count) + np.array(indices, "<i4").tobytes()
+    body += struct.pack("<B", len(indices)) + np.array(indices, "<i4").tobytes()
     return ply("", "", form="binary_little_endian 1.0") + body
 
 
@@ -57,10 +56,10 @@ def png(
     return png_file(width, height, bits, kind, pixels, extra)
 
 
-def picture(mode: str, form: str, **options: object) -> bytes:
+def picture(mode: str, form: str) -> bytes:
     """A small picture by Pillow."""
     file = io.BytesIO()
-    Image.new(mode, (4, 4)).save(file, form, **options)
+    Image.new(mode, (4, 4)).save(file, form)
     return file.getvalue()
 
 

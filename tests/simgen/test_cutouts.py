@@ -1,6 +1,5 @@
 """Opacity: holes that an image cuts are holes to rays, truth and photons, where the image says."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +11,12 @@ from scipy.ndimage import label
 
 from pcii.base.errors import InputError
 from simgen.assets.cutouts import cut_out
-from simgen.assets.solids import box, card_triangles, cylinder
-from simgen.assets.triangles import Triangles
-from simgen.renderer import backend
+from simgen.assets.triangles import Triangles, box, card_triangles, cylinder
 from simgen.spec.materials import Material
 from simgen.truth.first_hits import first_hits_at_centre
 
 SKY = {"type": "uniform", "luminance_cd_m2": 1.0}
 GRID = film()
-
-
-@pytest.fixture(autouse=True, scope="module")
-def variant_is_put_back() -> Iterator[None]:
-    yield
-    backend.load()
 
 
 def area(mesh: Triangles | None) -> float:
@@ -63,15 +54,18 @@ def test_what_is_kept_and_what_is_cut_are_the_whole(shape: Triangles) -> None:
 
 
 def test_beyond_its_borders_an_image_is_repeated_or_goes_on() -> None:
-    left_half = np.array([[1.0, 1.0, 0.0, 0.0]] * 4)
+    top_left = np.outer([1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0])
     wide = card_triangles(200.0, 100.0)
     assert wide.texcoords is not None
-    twice = Triangles(wide.positions, wide.faces, None, wide.texcoords * np.array([2, 1], np.float32))
-    once, again = (cut_out(twice, left_half, tiled=tiled) for tiled in (False, True))
-    assert area(once) == pytest.approx(0.25 * 200 * 100, rel=3e-3)
-    assert area(again) == pytest.approx(0.5 * 200 * 100, rel=3e-3)
+    twice = Triangles(wide.positions, wide.faces, None, 2 * wide.texcoords)
+    once, again = (cut_out(twice, top_left, tiled=tiled) for tiled in (False, True))
+    # In pixels: two columns of five rows, or two columns of one row in four places; a line across the middle
+    # of a corner's cell takes an eighth of a pixel from each corner.
+    pixel = 200 / 8 * 100 / 8
+    assert area(once) == pytest.approx((2 * 5 - 1 / 8) * pixel, rel=3e-3)
+    assert area(again) == pytest.approx(4 * (2 * 1 - 4 / 8) * pixel, rel=6e-3)
     assert once is not None
-    assert np.ptp(once.positions[:, 0]) == pytest.approx(50, rel=3e-3)
+    assert np.ptp(once.positions, axis=0) == pytest.approx([50, 62.5, 0], rel=3e-3)
 
 
 def leaf(material: dict[str, Any]) -> dict[str, Any]:
@@ -140,5 +134,5 @@ def test_what_cannot_be_cut_is_told(tmp_path: Path) -> None:
     Image.fromarray(np.full((4, 4), 100, np.uint8)).save(tmp_path / "a.png")
     with pytest.raises(InputError, match=r"object 'leaf', material.opacity: leaves nothing of the surface"):
         made([leaf({})], [SKY], folder=tmp_path)
-    with pytest.raises(ValueError, match="without holes"):
+    with pytest.raises(ValueError, match="opacity: a surface that light passes through"):
         Material.model_validate({"finish": {"type": "glass"}, "opacity": "a.png"})

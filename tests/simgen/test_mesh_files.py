@@ -1,7 +1,6 @@
 """Sound files of strangers: the same mesh in every form, pictures at their full depth."""
 
 import struct
-from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +9,8 @@ import tifffile
 from hostile_files import ply, scene_toml
 from PIL import Image, ImageOps
 from png_files import png16
-from property_settings import mostly_slow
 
-from simgen.assets.asset_files import Assets, read_assets, srgb_to_linear
-from simgen.assets.mesh_files import ply_bytes, read_mesh
+from simgen.assets.asset_files import ply_bytes, read_assets, read_mesh, srgb_to_linear
 from simgen.assets.triangles import Triangles
 from simgen.spec.scene_lookup import load_scene
 
@@ -67,10 +64,8 @@ def read(folder: Path, name: str, content: bytes) -> Triangles:
     ("name", "content"),
     [
         ("a.ply", ply_of("ascii", ("s", "t"))),
-        ("a.ply", ply_of("ascii", ("u", "v"), double=True)),
         ("a.ply", ply_of("binary_little_endian", ("s", "t"), "int")),
         ("a.ply", ply_of("binary_little_endian", ("texture_u", "texture_v"))),
-        ("a.ply", ply_of("binary_big_endian", ("u", "v"))),
         ("a.ply", ply_of("binary_big_endian", ("s", "t"), "int", double=True)),
         ("a.ply", ply_bytes(Triangles(POINTS, np.array(FACES, np.int32), NORMALS, TEXCOORDS))),
         ("a.obj", obj_of()),
@@ -104,9 +99,10 @@ def test_vertices_without_faces_do_not_count(tmp_path: Path) -> None:
     assert mesh.texcoords is None
 
 
-def worn(folder: Path, name: str) -> Assets:
+def image_of(folder: Path, name: str) -> np.ndarray:
+    """A file as the texture of a scene."""
     (folder / "scene.toml").write_text(scene_toml(material=f'texture = "{name}"'))
-    return read_assets(*load_scene(str(folder)))
+    return read_assets(*load_scene(str(folder))).image(name)
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 4])
@@ -118,7 +114,7 @@ def test_16_bits_are_kept(channels: int, tmp_path: Path) -> None:
     (tmp_path / "deep.png").write_bytes(png16(pixels))
     expected = srgb_to_linear(np.broadcast_to(colours, (5, 7, 3)) / 65535)
     # float32; with 8 bits the differences would be 1e-3.
-    np.testing.assert_allclose(worn(tmp_path, "deep.png").image("deep.png"), expected, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(image_of(tmp_path, "deep.png"), expected, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA"])
@@ -127,17 +123,13 @@ def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     image = Image.new("RGB", (3, 2), "white")
     image.putpixel((2, 1), (0, 0, 0))
     image.convert(mode).save(tmp_path / name)
-    pixels = worn(tmp_path, name).image(name)
+    pixels = image_of(tmp_path, name)
     assert pixels.dtype == np.float32
     np.testing.assert_array_equal(pixels[..., 1], [[1, 1, 1], [1, 1, 0]])
 
 
 @pytest.mark.parametrize(
-    ("name", "orientation"),
-    mostly_slow(
-        product(["a.png", "a.tif", "a.jpg"], range(1, 9)),
-        quick=[*product(["a.jpg"], range(2, 9)), ("a.png", 6), ("a.tif", 8)],
-    ),
+    ("name", "orientation"), [*(("a.jpg", number) for number in range(2, 9)), ("a.png", 6), ("a.tif", 8)]
 )
 def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tmp_path: Path) -> None:
     exif = Image.Exif()
@@ -146,28 +138,21 @@ def test_a_photograph_stands_as_its_camera_stood(name: str, orientation: int, tm
     Image.fromarray(pixels).save(tmp_path / name, exif=exif)
     with Image.open(tmp_path / name) as image:
         upright = np.asarray(ImageOps.exif_transpose(image))
-    np.testing.assert_allclose(worn(tmp_path, name).image(name), srgb_to_linear(upright), rtol=1e-6)
+    np.testing.assert_allclose(image_of(tmp_path, name), srgb_to_linear(upright), rtol=1e-6)
 
 
-BITS = {1: "bool", 4: "uint8", 8: "uint8", 12: "uint16"}
-
-
-@pytest.mark.parametrize(
-    ("bits", "dtype", "zero_is"),
-    mostly_slow(
-        ((*kind, zero) for kind, zero in product(BITS.items(), ["black", "white"])),
-        quick=[(1, "bool", "white"), (4, "uint8", "black"), (12, "uint16", "white")],
-    ),
-)
-def test_tiff_of_any_bits_is_as_bright(bits: int, dtype: str, zero_is: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("bits", "zero_is"), [(1, "white"), (4, "black"), (12, "black"), (12, "white")])
+def test_tiff_of_any_bits_is_as_bright(bits: int, zero_is: str, tmp_path: Path) -> None:
     numbers = np.arange(6).reshape(2, 3) * ((1 << bits) - 1) // 5
-    told = None if bits == 1 else bits
-    tifffile.imwrite(
-        tmp_path / "a.tif", numbers.astype(dtype), photometric=f"minis{zero_is}", bitspersample=told
-    )
+    stored = numbers.astype({1: "bool", 4: "uint8", 12: "uint16"}[bits])
+    written_bits = None if bits == 1 else bits
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric=f"minis{zero_is}", bitspersample=written_bits)
     share = numbers / ((1 << bits) - 1)
     expected = srgb_to_linear(1 - share if zero_is == "white" else share)
     half_a_step = 1e-5  # of 16 bits, where sRGB is steepest
-    np.testing.assert_allclose(
-        worn(tmp_path, "a.tif").image("a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step
-    )
+    np.testing.assert_allclose(image_of(tmp_path, "a.tif")[..., 1], expected, rtol=1e-6, atol=half_a_step)
+
+
+def test_a_picture_of_one_pixel_is_a_texture(tmp_path: Path) -> None:
+    Image.new("RGB", (1, 1), (255, 0, 0)).save(tmp_path / "a.png")
+    np.testing.assert_array_equal(image_of(tmp_path, "a.png"), [[[1, 0, 0]]])

@@ -10,10 +10,10 @@ import pytest
 from lit_views import film, made, seen, surprise, thinned
 from PIL import Image
 
-from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
+from simgen.assets.asset_files import ply_bytes
+from simgen.assets.triangles import card_triangles
 from simgen.renderer import backend
-from simgen.spec.materials import Material
 
 pytestmark = [pytest.mark.renders, pytest.mark.filterwarnings("ignore:Aligning")]
 GREY = 0.6
@@ -23,23 +23,6 @@ TILTED = np.array([0.3, 0.5, 0.0])
 TILTED[2] = np.sqrt(1 - TILTED @ TILTED)
 """To the right of the picture, up, and out of it."""
 LIGHTS_GO = [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (-1.0, 0.0, 1.0), (0.0, 1.0, 1.0), (0.0, -1.0, 1.0)]
-FLAT_PLY = """ply
-format ascii 1.0
-element vertex 4
-property float x
-property float y
-property float z
-property float u
-property float v
-element face 1
-property list uchar int vertex_indices
-end_header
--50 -50 0 0 1
-50 -50 0 1 1
-50 50 0 1 0
--50 50 0 0 0
-4 0 3 2 1
-"""
 SHAPES: dict[str, dict[str, Any]] = {
     "card": {"type": "card", "width_mm": 100.0, "height_mm": 100.0},
     "box": {"type": "box", "width_mm": 100.0, "height_mm": 100.0, "depth_mm": 20.0},
@@ -57,7 +40,7 @@ def variant_is_put_back() -> Iterator[None]:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "flat.ply").write_text(FLAT_PLY)
+    (tmp_path / "flat.ply").write_bytes(ply_bytes(card_triangles(100.0, 100.0)))
     stored = np.round((TILTED + 1) / 2 * 255).astype(np.uint8)
     Image.fromarray(np.tile(stored, (4, 4, 1))).save(tmp_path / "tilted.png")
     return tmp_path
@@ -117,12 +100,3 @@ def test_a_flat_map_changes_nothing(tmp_path: Path) -> None:
     without = seen(made([tilted("card", normal_map=None)], light), grid, 64)
     # 128 of 255 is 0.004 beside the middle.
     np.testing.assert_allclose(flat.mean(), without.mean(), rtol=0.01)
-
-
-def test_what_cannot_be_tilted_is_told(folder: Path) -> None:
-    with pytest.raises(ValueError, match="normal_map: a surface that light passes through"):
-        Material.model_validate({"finish": {"type": "glass"}, "normal_map": "tilted.png"})
-    bare = FLAT_PLY.replace("float u", "float confidence").replace("float v", "float quality")
-    (folder / "flat.ply").write_text(bare)
-    with pytest.raises(InputError, match=r"material\.normal_map: it cannot be laid on 'flat\.ply'.*leave it"):
-        made([tilted("mesh")], [parallel(LIGHTS_GO[0])], folder=folder)

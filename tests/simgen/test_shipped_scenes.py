@@ -16,14 +16,12 @@ from simgen.check.scene_probe import coarser
 from simgen.check.targets import load_target
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
-from simgen.spec.camera_grid import Grid
 from simgen.spec.lights import Light
-from simgen.spec.materials import Finish, Spectrum
-from simgen.spec.recipe import load_recipe
+from simgen.spec.materials import Finish, Spectrum, Texture
+from simgen.spec.recipe import Grid, load_recipe
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import load_scene
 from simgen.spec.shapes import Shape
-from simgen.spec.textures import Texture
 from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view
 
 ROOT = Path(__file__).resolve().parents[2]

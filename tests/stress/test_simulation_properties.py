@@ -30,8 +30,7 @@ from simgen.sensor.detector import (
     read_out,
 )
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.camera_grid import Grid, Lens
-from simgen.spec.recipe import Exposure, FullLight, Photons, Recipe, Sensor
+from simgen.spec.recipe import Exposure, FullLight, Grid, Lens, Photons, Recipe, Sensor
 
 GRID = unit_grid(2, 2, 4, 5)
 SEEDS = st.integers(0, 2**63 - 1)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera
 from simgen.renderer.radiance import covered_px, object_windows
-from simgen.spec.camera_grid import Lens
+from simgen.spec.recipe import Lens
 
 GRID = CameraGrid(rows=1, cols=1, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.2, height=150, width=200)
 WHOLE = [(slice(0, 150), slice(0, 200))]

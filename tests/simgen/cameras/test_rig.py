@@ -23,8 +23,7 @@ from simgen.renderer.mitsuba_camera import film_rays
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view
 from simgen.sensor.photon_table import PhotonTable
-from simgen.spec.camera_grid import Lens
-from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.recipe import Lens, Photons, Recipe
 from simgen.spec.scene import Scene
 from simgen.truth.first_hits import first_hits_at_centre, first_hits_of_view
 

@@ -14,7 +14,7 @@ from pcii.base.errors import InputError
 from pcii.base.srgb import linear_to_srgb, srgb_to_linear
 from pcii.core.camera_grid import CameraGrid
 from simgen.assets.asset_files import read_assets
-from simgen.assets.solids import triangles_of
+from simgen.assets.triangles import triangles_of
 from simgen.importing.scene_import import import_scene
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
@@ -42,7 +42,7 @@ def imported(draft: GltfDraft, folder: Path, **options: Any) -> tuple[Scene, tup
 def corners_mm(scene: Scene, folder: Path, name: str) -> np.ndarray:
     """Vertices (N, 3) of an object in the world."""
     thing = next(thing for thing in scene.objects if thing.name == name)
-    mesh = triangles_of(thing.shape, read_assets(scene, folder))
+    mesh = triangles_of(thing.shape, read_assets(scene, folder).meshes)
     matrix = np.array(pose_of(backend.load(), thing).matrix, dtype=np.float64)
     return mesh.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
 

@@ -13,7 +13,7 @@ from scipy import stats
 import simgen
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
-from simgen.assets.solids import globe
+from simgen.assets.triangles import globe
 from simgen.cameras.rig import Rig, as_rig
 from simgen.dataset.prepared import capture_of
 from simgen.photons import scalar_sampler, wavefront_sampler
@@ -27,8 +27,7 @@ from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.mitsuba_scene import RenderScene, build
-from simgen.spec.camera_grid import Lens
-from simgen.spec.recipe import Photons, Recipe
+from simgen.spec.recipe import Lens, Photons, Recipe
 
 COMPILED = backend.choose().kind != "scalar"
 BUDGET = 4000.0 if COMPILED else 400.0

@@ -25,8 +25,13 @@ from simgen import (
     Spectrum,
     Sphere,
 )
+from simgen.base.file_lookup import ImageName
 from simgen.base.strict_models import validate
 from simgen.spec.scene import checked_folder
+
+CHECKS = Checks(rows=1, columns=2)
+BOX: Any = Box(width_mm=1, height_mm=1, depth_mm=1)
+LAMP = AreaLight(position_mm=(0, 0, 0), target_mm=(0, 0, 1), width_mm=1, height_mm=1, luminance_cd_m2=1)
 
 
 def fault_of(make: Callable[[], Any]) -> str:
@@ -42,26 +47,40 @@ def fault_of(make: Callable[[], Any]) -> str:
     [
         (
             lambda: Sphere(radius_mm=-1),
-            "Sphere: 'radius_mm': input should be greater than or equal to 0.000001",
+            "Sphere: 'radius_mm': input should be greater than",
         ),
-        (lambda: Material(), "Material: give either 'reflectance' or 'texture'"),
         (
-            lambda: Material(finish=Glass(), texture=Checks(rows=1, columns=2)),
-            "Material: the colour of glass",
+            lambda: Material(finish=Glass(), texture=CHECKS),
+            "Material: texture: the colour of glass",
+        ),
+        (
+            lambda: Material(finish=Glass(), opacity=ImageName("a.png")),
+            "Material: opacity: a surface",
         ),
         (lambda: Spectrum(wavelength_nm=(400, 500), value=(0.5,)), "Spectrum: give as many values"),
-        (lambda: Checks(rows=0, columns=2), "Checks: 'rows': input should be greater than or equal to 1"),
         (lambda: Mesh(file=""), "Mesh: 'file': string should have at least 1 character"),
         (lambda: Level(illuminance_lux=float("nan"), z_mm=500), "Level: 'illuminance_lux': input should be"),
         (lambda: Scene(title="x", lights=()), "Scene: 'lights': nothing shines"),
         (
-            lambda: Scene(title="x", lights=(SKY,), objects=(BALL, BALL)),
-            "Scene: 'objects': two objects are named 'ball'; give each its own name",
-        ),
-        (
             lambda: setattr(BALL, "name", "b"),
             "SceneObject: 'name': instance is frozen",
         ),
+        (lambda: SKY.change(illuminant=(0, 0, 0)), "UniformLight: 'illuminant': light must not be black"),
+        (
+            lambda: LAMP.change(target_mm=LAMP.position_mm),
+            "AreaLight: target_mm: a lamp must face",
+        ),
+        (lambda: SCENE.add(BALL), "Scene: 'objects': two objects are named 'ball'"),
+        (lambda: SCENE.add(BOX), "Scene: 'lights[1].type': there is no 'box'; known are area"),
+        (lambda: SCENE.replace("ball", BOX), "Scene: 'objects[0]"),
+        (lambda: SCENE.replace("ball", radius_mm=3), "SceneObject: unknown key 'radius_mm'"),
+        (lambda: SCENE.move("ball", by_mm=(1, 1)), "move: 'by_mm[2]' is missing"),
+        (
+            lambda: SCENE.move("ball", by_mm=(1e6, 0, 0)),
+            "SceneObject: 'position_mm[0]': input should",
+        ),
+        (lambda: SCENE.move("bell"), "scene: there is no object 'bell'; did you mean 'ball'?"),
+        (lambda: SCENE.remove("x"), "scene: there is no object 'x'; known are ball, card"),
     ],
 )
 def test_a_fault_in_python_is_one_sentence(make: Callable[[], Any], expected: str) -> None:
@@ -94,23 +113,6 @@ def test_a_fault_deep_in_a_table_keeps_its_place() -> None:
     assert fault_of(lambda: Scene(**values)) == f"Scene: {told}"
 
 
-def test_lists_and_whole_numbers_are_taken_where_tuples_and_floats_are_kept() -> None:
-    values: dict[str, Any] = {
-        "title": "Two things",
-        "objects": [BALL, CARD],
-        "lights": [SKY],
-        "planes_mm": [540],
-    }
-    assert Scene(**values) == SCENE
-    assert isinstance(Scene(**values).planes_mm[0], float)
-
-
-def test_objects_are_found_by_name() -> None:
-    assert SCENE.object("card") is CARD
-    assert fault_of(lambda: SCENE.object("bal")) == "scene: there is no object 'bal'; did you mean 'ball'?"
-    assert fault_of(lambda: SCENE.remove("x")) == "scene: there is no object 'x'; known are ball, card"
-
-
 def test_each_change_is_a_new_checked_scene() -> None:
     lamp = PointLight(position_mm=(0, -300, 300), intensity_cd=5)
     more = SCENE.add(BALL.change(name="other"), lamp)
@@ -128,49 +130,9 @@ def test_each_change_is_a_new_checked_scene() -> None:
 def test_an_object_is_moved_along_each_axis_and_turned() -> None:
     assert SCENE.move("ball", by_mm=(1, -2, 3)).object("ball").position_mm == (11, -2, 543)
     assert SCENE.move("ball", to_mm=(0, 0, 500)).object("ball").position_mm == (0, 0, 500)
-    turned = SCENE.move("card", by_mm=(0, 0, 0), rotation_deg=(0, 15, 0)).move(
-        "card", rotation_deg=(0, 20, 0)
-    )
+    turned = SCENE.move("card", rotation_deg=(0, 15, 0)).move("card", rotation_deg=(0, 20, 0))
     assert turned == SCENE.replace("card", rotation_deg=(0, 20, 0))
     assert SCENE.move("card", rotation_deg=(0, 0, 9)).move("card", rotation_deg=(0, 0, 0)) == SCENE
-
-
-@pytest.mark.parametrize(
-    ("change", "expected"),
-    [
-        (lambda: SCENE.add(BALL), "Scene: 'objects': two objects are named 'ball'"),
-        (
-            lambda: SCENE.add(Sphere(radius_mm=1)),  # type: ignore[arg-type]
-            "Scene: 'lights[1].type': there is no 'sphere'; known are area",
-        ),
-        (lambda: SCENE.replace("ball", radius_mm=3), "SceneObject: unknown key 'radius_mm'"),
-        (lambda: SCENE.replace("ball"), "replace: give either another object or fields"),
-        (lambda: SCENE.replace("ball", CARD, name="x"), "replace: give either another object or fields"),
-        (lambda: SCENE.replace("ball", CARD), "Scene: 'objects': two objects are named 'card'"),
-        (lambda: SCENE.replace("ball", Box(width_mm=1, height_mm=1, depth_mm=1)), "Scene: 'objects[0]"),  # type: ignore[arg-type]
-        (lambda: SCENE.move("ball"), "move: give by_mm, to_mm or rotation_deg"),
-        (lambda: SCENE.move("ball", by_mm=(1, 1, 1), to_mm=(1, 1, 1)), "move: give by_mm or to_mm, not both"),
-        (lambda: SCENE.move("ball", by_mm=(1, 1)), "move: 'by_mm[2]' is missing"),
-        (
-            lambda: SCENE.move("ball", by_mm=(1e6, 0, 0)),
-            "SceneObject: 'position_mm[0]': input should be less",
-        ),
-        (
-            lambda: SCENE.move("bell", by_mm=(1, 1, 1)),
-            "scene: there is no object 'bell'; did you mean 'ball'?",
-        ),
-        (lambda: SCENE.change(folder=3), "Scene: 'folder': expected a path, got 3"),
-        (lambda: SKY.change(luminance_cd_m2=0), "UniformLight: 'luminance_cd_m2': input should be greater"),
-        (
-            lambda: AreaLight(
-                position_mm=(0, 0, 0), target_mm=(0, 0, 0), width_mm=1, height_mm=1, luminance_cd_m2=1
-            ),
-            "AreaLight: target_mm: an area light must face something else",
-        ),
-    ],
-)
-def test_a_change_that_makes_no_scene_is_told(change: Callable[[], Any], expected: str) -> None:
-    assert fault_of(change).startswith(expected)
 
 
 def test_the_folder_goes_with_a_scene_and_is_no_part_of_its_value(tmp_path: Path) -> None:

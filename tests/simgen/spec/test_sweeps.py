@@ -55,14 +55,11 @@ def test_the_seed_varies_fastest_and_the_scene_slowest(recipe_file: str) -> None
     assert len({sweep.folder(number) for number in range(12)}) == 12
 
 
-def test_ranges_end_before_their_end(recipe_file: str) -> None:
-    plain = ["photons.budget=100"]
-    assert load_sweep(recipe_file, [*plain, "seed={range=[3, 6]}"]).axes[0].values == range(3, 6)
-    assert load_sweep(recipe_file, [*plain, "seed={range=[3, 8, 2]}"]).axes[0].values == range(3, 8, 2)
-
-
 def test_draws_of_a_scene_and_seeds_are_counted_from_the_recipes_own(recipe_file: str) -> None:
-    sweep = load_sweep(recipe_file, ["photons.budget=100", "scene_number=20"], seeds=2, scenes=2)
+    """A range ends before its end."""
+    plain = ["photons.budget=100"]
+    assert load_sweep(recipe_file, [*plain, "seed={range=[3, 8, 2]}"]).axes[0].values == range(3, 8, 2)
+    sweep = load_sweep(recipe_file, [*plain, "scene_number=20"], seeds=2, scenes=2)
     assert [sweep.folder(number) for number in range(4)] == [
         "draw_20_seed_7", "draw_20_seed_8", "draw_21_seed_7", "draw_21_seed_8",
     ]  # fmt: skip
@@ -90,35 +87,25 @@ def test_folders_are_named_by_the_scene_and_told_apart_by_a_hash_where_it_is_no_
     assert len(set(names)) == len(values)
 
 
-def test_a_scene_that_is_not_there_is_named_before_anything_is_made(recipe_file: str) -> None:
-    with pytest.raises(InputError, match="there is no scene 'overlapp'; did you mean 'overlap'"):
-        load_sweep(recipe_file, ['scene=["two_objects", "overlapp"]'])
-
-
 @pytest.mark.parametrize(
-    ("override", "told"),
+    ("override", "message"),
     [
         ("photons.budget=[]", "photons.budget: expected at least one value"),
         ("photons.budget={each=3}", "photons.budget: expected at least one value"),
         ("photons.budget=[100, 100.0]", "photons.budget: gives a value twice"),
-        (
-            "photons.budget=[100, -1]",
-            r"at photons.budget = -1, .*greater than 0|photons.budget.*greater than 0",
-        ),
-        ('photons.budget=[100, "many", 300]', "photons.budget"),
-        ("grid.rows=[2, 2.5, 4]", "grid.rows"),
-        ("seed={range=[1]}", r"seed: range: expected \[first, end\]"),
+        ("photons.budget=[100, -1]", r"at photons.budget = -1: 'photons.budget': .*greater than 0"),
         ("seed={range=[1, 2.5]}", r"seed: range: expected \[first, end\]"),
-        ("seed={range=[1, 9, 0]}", "a step of 0 never ends"),
+        ("seed={range=[1, 9, 0]}", r"seed: range: expected \[first, end\]"),
         ("seed={range=[5, 5]}", "seed: expected at least one value"),
-        ("seed={range=[0, 10000000]}", "seed: range: 10000000 values"),
+        ("seed={range=[0, 100000000000000000000]}", "seed: at most 1000000 values"),
         ("seed={range=[0, 600000]}", "1200000 datasets; at most 1000000"),
-        ("seed={range=[9223372036854775806, 9223372036854775809]}", "seed"),
-        ("photons.budgets=[1, 2]", "budgets"),
+        ("seed={range=[9223372036854775806, 9223372036854775809]}", "'seed': input should be less than"),
+        ("photons.budgets=[1, 2]", "unknown key 'photons.budgets'"),
+        ('scene=["two_objects", "overlapp"]', "there is no scene 'overlapp'; did you mean 'overlap'"),
     ],
 )
-def test_sweeps_that_make_no_recipes_are_refused(recipe_file: str, override: str, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_sweeps_that_make_no_recipes_are_refused(recipe_file: str, override: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         load_sweep(recipe_file, [override])
 
 
