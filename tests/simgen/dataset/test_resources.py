@@ -79,7 +79,7 @@ def test_commands_refuse_before_any_work(capsys: pytest.CaptureFixture[str], tmp
     setting, out = "sensor.dark_counts=1e6", tmp_path / "out"
     assert command_line.run(cli.app, ["check", "paper", "--set", setting]) == 1
     sentence = "sensor.dark_counts: takes some 21000 TB of memory, and this machine has"
-    assert f"bad   memory       {sentence}" in capsys.readouterr().out
+    assert f"bad   memory      {sentence}" in capsys.readouterr().out
     assert command_line.run(cli.app, ["generate", "paper", "--set", setting, "-o", str(out)]) == 2
     error = capsys.readouterr().err
     assert error.startswith(f"error: {sentence}")

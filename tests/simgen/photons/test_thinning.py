@@ -464,7 +464,7 @@ def test_where_all_of_the_film_is_lit_bounds_hold_and_planted_holes_are_met(
         majorant.entry_of[listed[::20]] = -1
         return majorant
 
-    monkeypatch.setattr("simgen.photons.pilot.fit", with_holes)
+    monkeypatch.setattr("simgen.photons.exploration.fit", with_holes)
     assert above_bound(scene) > 2 * held
 
 
