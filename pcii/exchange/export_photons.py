@@ -132,7 +132,7 @@ def _write_frames(
         position, bit = position[order], (128 >> (j[order] % 8)).astype(np.uint8)
         block_starts = np.flatnonzero(np.diff(position // BLOCK_BYTES, prepend=-1)).tolist()
         for low, high in itertools.pairwise([*block_starts, position.size]):
-            start = max(position[low] // BLOCK_BYTES * BLOCK_BYTES, begin)
+            start = max(int(position[low]) // BLOCK_BYTES * BLOCK_BYTES, begin)
             block = np.zeros(BLOCK_BYTES - start % BLOCK_BYTES, np.uint8)
             np.bitwise_or.at(block, position[low:high] - start, bit[low:high])
             file.seek(start)
