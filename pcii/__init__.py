@@ -17,7 +17,7 @@ from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
-from pcii.exporting.export_formats import export_dataset
+from pcii.exchange.export_formats import export_dataset
 from pcii.importing.array_files import import_arrays
 from pcii.importing.camera_order import Optics, ViewOrder
 from pcii.importing.count_frames import import_counts

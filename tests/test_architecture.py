@@ -25,6 +25,7 @@ ROOMS = {
         "frames",
         "sections",
         "exporting",
+        "exchange",
         "evidence",
         "depth",
         "importing",
@@ -57,7 +58,7 @@ ROOMS = {
 # What simgen may share with pcii: store of files, image tools, types, masks, file formats and how commands
 # behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
 # mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "store", "imaging", "pictures", "figures", "core", "io", "exporting"}
+SHARED_ROOMS = {"base", "store", "imaging", "pictures", "figures", "core", "io", "exporting", "exchange"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",

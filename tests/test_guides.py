@@ -111,9 +111,9 @@ def check_exchange(names: dict[str, Any]) -> None:
     dataset = pcii.open_dataset("out/small")
     stack = np.array([[dataset.counts.view(k, l) for l in range(3)] for k in range(2)])
     np.testing.assert_array_equal(names["dense"], stack)
-    np.testing.assert_array_equal(names["photons"], stack[0, 1])
     assert dataset.truth is not None
-    np.testing.assert_array_equal(names["depth"], dataset.truth.z_mm)
+    np.testing.assert_array_equal(names["photons"]["truth_z_mm"], dataset.truth.z_mm)
+    np.testing.assert_array_equal(names["truth"].z_mm, dataset.truth.z_mm)
     assert sys.modules["napari"].viewer.shown[0].shape == (2, 64, 60, 3)
 
 

@@ -16,14 +16,13 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import OPTIONAL_MAPS, PhotonTruth, Truth
-from pcii.exporting.event_archive import ARCHIVE as EVENTS
-from pcii.exporting.exr_parts import CENTRE
-from pcii.exporting.exr_parts import FILE as PARTS
+from pcii.exchange.export_photons import ARCHIVE as EVENTS
 from pcii.importing.array_files import check_archive, opened_array
 from pcii.io.dataset_writer import check_budget, check_depth_range
 from pcii.pictures.exr_files import exr_channels, exr_headers, window_size
 from pcii.pictures.picture_files import check_unpacked
 
+PARTS, CENTRE = "views.exr", "virtual_centre"
 GRID = tuple(field.name for field in fields(CameraGrid))
 
 

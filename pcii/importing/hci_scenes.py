@@ -17,7 +17,7 @@ from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
 from pcii.core.images import Views
 from pcii.core.truth import Truth
-from pcii.exporting.hci_layout import INFINITY_M
+from pcii.exchange.export_hci import INFINITY_M
 from pcii.importing.camera_order import Optics
 from pcii.importing.image_folders import import_images
 from pcii.importing.light_encoding import Encoding

@@ -16,7 +16,7 @@ from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
-from pcii.exporting.view_pictures import photon_numbers
+from pcii.exchange.export_pictures import photon_numbers
 from pcii.importing.array_files import opened_array
 from pcii.importing.image_folders import check_size, headers_of, radiance_of
 from pcii.importing.light_encoding import Encoding

@@ -215,17 +215,16 @@ def sheet(dataset: Path, *, out: Out) -> None:
 def export(
     dataset: Path,
     *,
-    format: Literal["hci", "saii", "nerfstudio", "photoncube", "events", "exr"],
+    format: Literal["hci", "nerfstudio", "photoncube", "events"],
     out: Out,
     budget: float | None = None,
 ) -> None:
     """Write a dataset in a format that other tools read: into a new folder, as a whole or not at all.
 
-    hci: the layout of the HCI 4D light field benchmark. saii: a PNG for each view and the cameras as JSON.
-    nerfstudio: a PNG for each view and transforms.json with the poses of the cameras, as neural
-    reconstruction reads them. photoncube: the binary frames of each view as packed bits, with poses. events:
-    a NumPy archive of photons, cameras and truth. exr: OpenEXR with a part for each view. Of a collection
-    each dataset is written to a folder in the new one, named as its own.
+    hci: the layout of the HCI 4D light field benchmark. nerfstudio: a PNG for each view and transforms.json
+    with the poses of the cameras, as neural reconstruction reads them. photoncube: the binary frames of each
+    view as packed bits, with poses. events: a NumPy archive of photons, cameras and truth. Each dataset of a
+    collection is written to a folder in the new one that has its name.
 
     Examples of use:
 
@@ -242,7 +241,7 @@ def export(
     budget
         Export the photons of this smaller, nested budget of the recipe.
     """
-    from pcii.exporting.export_formats import export_dataset
+    from pcii.exchange.export_formats import export_dataset
 
     with Stages() as report:
         folder = export_dataset(dataset, format, out, budget=budget, report=report)

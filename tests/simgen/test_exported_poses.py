@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.exporting.export_formats import export_dataset
+from pcii.exchange.export_formats import export_dataset
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe
 

@@ -14,7 +14,7 @@ from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
 from pcii.core.camera_grid import CameraGrid
-from pcii.exporting.export_formats import export_dataset
+from pcii.exchange.export_formats import export_dataset
 from pcii.importing.camera_order import ViewOrder
 from pcii.importing.count_frames import import_counts
 from pcii.io.dataset import open_dataset

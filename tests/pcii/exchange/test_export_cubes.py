@@ -5,45 +5,40 @@ import shutil
 import subprocess
 from pathlib import Path
 
-import imageio.v3
 import numpy as np
 import pytest
-from photon_cubes import FRAMES, bits_of, counts_of, packed, write_cubes
-from stored_datasets import make_dataset, one_sentence
+from photon_cubes import FRAMES, bits_of, packed, write_cubes
+from PIL import Image
+from stored_datasets import one_sentence
 
 import pcii
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
-from pcii.exporting.photon_cubes import BLOCK_BYTES
 
-GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=11, width=13)
-SHEARED = CameraGrid(
+BLOCK_BYTES = 4096
+GRID = pcii.CameraGrid(rows=2, cols=3, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=11, width=13)
+SHEARED = pcii.CameraGrid(
     rows=2, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=6, width=16, shear_px=(1.5, -2)
 )
 
 
+def one_camera(height: int, width: int) -> pcii.CameraGrid:
+    return pcii.CameraGrid(
+        rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=height, width=width
+    )
+
+
 @pytest.mark.parametrize("grid", [GRID, SHEARED])
-def test_cubes_are_the_packed_frames_of_every_view(tmp_path: Path, grid: CameraGrid) -> None:
+def test_cubes_are_the_packed_frames_of_every_view(tmp_path: Path, grid: pcii.CameraGrid) -> None:
     bits = bits_of(grid)
     out = write_cubes(tmp_path, bits, grid, "GRBG")
     K, L, H, W = grid.shape_KLHW
-    told = json.loads((out / "transforms.json").read_text())
-    assert [told[name] for name in ("bitpack", "bitpack_dim", "num_frames", "cfa")] == [
-        True,
-        2,
-        FRAMES,
-        "GRBG",
-    ]
-    assert told["photon_budget"] == 90
-    assert told["camera_grid"]["pitch_mm"] == [5, 7]
-    for (k, l), frame in zip(np.ndindex(K, L), told["frames"], strict=True):
+    top = json.loads((out / "transforms.json").read_text())
+    packing = {"c": 1, "bitpack": True, "bitpack_dim": 2, "cfa": "GRBG"}
+    assert top.items() >= (packing | {"num_frames": FRAMES, "photon_budget": 90}).items()
+    for (k, l), frame in zip(np.ndindex(K, L), top["frames"], strict=True):
         assert frame["file_path"] == f"0{k}_0{l}/frames.npy"
         np.testing.assert_array_equal(np.load(out / frame["file_path"]), packed(bits[k, l]))
         view = json.loads((out / f"0{k}_0{l}" / "transforms.json").read_text())
-        assert {name: view[name] for name in ("w", "h", "c", "bitpack", "bitpack_dim", "file_path")} == {
-            **{"w": W, "h": H, "c": 1, "bitpack": True, "bitpack_dim": 2},
-            "file_path": "frames.npy",
-        }
+        assert view.items() >= (packing | {"w": W, "h": H, "file_path": "frames.npy"}).items()
         assert view["frames"] == [{"transform_matrix": frame["transform_matrix"]}] * FRAMES
         # A camera further right is at a larger X, one further down at a smaller Y, in metres.
         x, y = np.array(frame["transform_matrix"])[:2, 3]
@@ -53,37 +48,33 @@ def test_cubes_are_the_packed_frames_of_every_view(tmp_path: Path, grid: CameraG
 
 
 def test_blocks_without_photons_take_no_room(tmp_path: Path) -> None:
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=256, width=256)
+    grid = one_camera(256, 256)
     frame, i, j = np.array([[0, 0, 150, 299], [0, 3, 100, 255], [0, 9, 50, 255]])
     zero, one = np.zeros(4, int), np.ones(4, int)
-    counts = PhotonCounts.from_events(zero, zero, i, j, one, grid, frames=300, bits=1, frame=frame)
+    counts = pcii.PhotonCounts.from_events(zero, zero, i, j, one, grid, frames=300, bits=1, frame=frame)
     data = pcii.save_dataset(tmp_path / "data", counts)
     path = pcii.export_dataset(data, "photoncube", tmp_path / "out") / "00_00" / "frames.npy"
     assert path.stat().st_size > 300 * 256 * 32
     assert path.stat().st_blocks * 512 <= 8 * BLOCK_BYTES
-    found = np.argwhere(np.unpackbits(np.load(path), axis=2))
-    np.testing.assert_array_equal(found, np.stack([frame, i, j], axis=1))
+    indices = np.argwhere(np.unpackbits(np.load(path), axis=2))
+    np.testing.assert_array_equal(indices, np.stack([frame, i, j], axis=1))
 
 
-def test_many_bits_of_a_block_and_none_at_all(tmp_path: Path) -> None:
-    grid = CameraGrid(rows=1, cols=1, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=64, width=72)
-    for name, share in (("full", 1.0), ("dense", 0.5), ("empty", -1.0)):
-        bits = bits_of(grid, 200, share)  # 115 200 bytes: 28 blocks
-        (tmp_path / name).mkdir()
-        out = write_cubes(tmp_path / name, bits, grid)
-        np.testing.assert_array_equal(np.load(out / "00_00" / "frames.npy"), packed(bits[0, 0]))
+@pytest.mark.parametrize("share", [1.0, 0.5, -1.0], ids=["full", "dense", "empty"])
+def test_many_bits_of_a_block_and_none_at_all(tmp_path: Path, share: float) -> None:
+    grid = one_camera(64, 72)
+    bits = bits_of(grid, 200, share)  # 115 200 bytes: 28 blocks and a part of one
+    out = write_cubes(tmp_path, bits, grid)
+    np.testing.assert_array_equal(np.load(out / "00_00" / "frames.npy"), packed(bits[0, 0]))
 
 
 def test_other_counts_are_refused_in_a_sentence(tmp_path: Path) -> None:
     bits = bits_of(GRID)
-    dense, kept = bits.sum(axis=2), counts_of(bits, GRID)
+    dense = bits.sum(axis=2)
     wrong = {
-        "have no limit": PhotonCounts.from_dense(dense, GRID),
-        "are of 2 bits": PhotonCounts.from_dense(dense, GRID, frames=FRAMES, bits=2),
-        "generate it with products.frames = true": PhotonCounts.from_dense(
-            dense, GRID, frames=FRAMES, bits=1
-        ),
-        "lists a pose for each": PhotonCounts.from_dense(dense, GRID, frames=1 << 17, bits=1),
+        "have no limit": pcii.PhotonCounts.from_dense(dense, GRID),
+        "have 2 bits a frame": pcii.PhotonCounts.from_dense(dense, GRID, frames=FRAMES, bits=2),
+        "products.frames = true": pcii.PhotonCounts.from_dense(dense, GRID, frames=FRAMES, bits=1),
     }
     for number, (words, counts) in enumerate(wrong.items()):
         data = pcii.save_dataset(tmp_path / str(number), counts)
@@ -91,17 +82,11 @@ def test_other_counts_are_refused_in_a_sentence(tmp_path: Path) -> None:
             lambda data=data: pcii.export_dataset(data, "photoncube", tmp_path / "out"), data.path
         )
         assert words in message
-    views = pcii.save_dataset(
-        tmp_path / "views", pcii.Views(np.ones((*GRID.shape_KLHW, 1), np.float32), GRID)
-    )
-    assert "has no photon counts" in one_sentence(
-        lambda: pcii.export_dataset(views, "photoncube", tmp_path / "out"), views.path
-    )
-    one = PhotonCounts.from_dense(bits[:, :, 0].astype(int), GRID, bits=1)  # one frame is always known
     assert not (tmp_path / "out").exists()
-    out = pcii.export_dataset(pcii.save_dataset(tmp_path / "one", one), "photoncube", tmp_path / "out")
+    single_frame = pcii.PhotonCounts.from_dense(bits[:, :, 0].astype(int), GRID, bits=1)
+    data = pcii.save_dataset(tmp_path / "single", single_frame)
+    out = pcii.export_dataset(data, "photoncube", tmp_path / "out")
     np.testing.assert_array_equal(np.load(out / "01_02" / "frames.npy"), packed(bits[1, 2, :1]))
-    assert kept.frame_events is not None
 
 
 def test_visionsim_reads_the_frames(tmp_path: Path) -> None:
@@ -117,7 +102,7 @@ def test_visionsim_reads_the_frames(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(shutil.which("photoncube") is None, reason="needs the photoncube command line")
 def test_the_photoncube_program_sees_the_mean_of_the_frames(tmp_path: Path) -> None:
-    grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=16, width=24)
+    grid = pcii.CameraGrid(rows=1, cols=2, pitch_mm=(5, 7), focal_mm=50, pixel_mm=0.05, height=16, width=24)
     bits = bits_of(grid, share=0.4)
     out = write_cubes(tmp_path, bits, grid)
     pictures = tmp_path / "pictures"
@@ -125,14 +110,6 @@ def test_the_photoncube_program_sees_the_mean_of_the_frames(tmp_path: Path) -> N
     command = ["photoncube", "preview", "-i", str(out / "00_01" / "frames.npy"), "-d", str(pictures)]
     subprocess.run([*command, "--burst-size", str(FRAMES)], check=True, capture_output=True)
     (path,) = pictures.glob("*.png")
-    picture = imageio.v3.imread(path)
+    picture = np.array(Image.open(path))
     grey = picture if picture.ndim == 2 else picture[..., 0]
     np.testing.assert_allclose(grey / 255, bits[0, 1].mean(axis=0), atol=1.001 / 255)
-
-
-def test_all_formats_take_counts_with_frames(tmp_path: Path) -> None:
-    data = make_dataset(tmp_path / "data", frames=8)
-    cube = np.load(pcii.export_dataset(data, "photoncube", tmp_path / "out") / "01_02" / "frames.npy")
-    np.testing.assert_array_equal(
-        np.unpackbits(cube, axis=2, count=5).sum(axis=0), pcii.open_dataset(data).counts.view(1, 2)
-    )
