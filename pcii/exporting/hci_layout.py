@@ -23,10 +23,10 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.core.camera_grid import CameraGrid
+from pcii.exchange.written_pixels import write_pfm, write_png
 from pcii.exporting.view_names import number_width
 from pcii.exporting.view_pictures import pictures_of
 from pcii.io.dataset import Dataset
-from pcii.pictures.written_pixels import write_pfm, write_png
 
 PARAMETERS = "parameters.cfg"
 README = "README.txt"

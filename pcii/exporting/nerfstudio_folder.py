@@ -2,7 +2,7 @@
 
     images/03_04.png   8-bit RGB of the camera of row 3, column 4
     depth/03_04.npy    its planar depth in mm, float32, 0 where nothing is hit; if the dataset has view_z_mm
-    transforms.json    intrinsics and poses: see `pcii.transforms`
+    transforms.json    intrinsics and poses: see `written_poses`
 
 nerfstudio multiplies depths by 0.001, leaves out those that are 0, and takes them along the camera's axis
 (nerfstudio_dataparser.py, data_utils.py and losses.py of release 1.1). PNG would hold whole mm.
@@ -12,14 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
+from pcii.exchange.written_pixels import write_png
+from pcii.exchange.written_poses import (
+    DEPTH_UNIT,
+    DEPTH_UNIT_M,
+    TRANSFORMS,
+    depths_ahead_mm,
+    frames_of,
+    intrinsics_of,
+)
 from pcii.exporting.view_names import row_and_column
 from pcii.exporting.view_pictures import pictures_of
 from pcii.io.dataset import Dataset
-from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import json_bytes
-from pcii.transforms.camera_poses import depths_ahead_mm
-from pcii.transforms.transforms_file import DEPTH_UNIT, DEPTH_UNIT_M, TRANSFORMS
-from pcii.transforms.written_members import frames_of, intrinsics_of
 
 
 def write_nerfstudio(dataset: Dataset, folder: Path) -> None:

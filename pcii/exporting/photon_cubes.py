@@ -2,7 +2,7 @@
 
     03_04/frames.npy        uint8 (T, H, ceil(W / 8)) of the camera of row 3, column 4
     03_04/transforms.json   the same as a dataset of visionsim (NPY): a pose for each of the T frames
-    transforms.json         all cameras, and the grid: see `pcii.transforms`
+    transforms.json         all cameras, and the grid: see `written_poses`
 
 Bits are packed along the width, the first pixel in the highest bit, as numpy.packbits does; bits beyond the
 last pixel are 0. Blocks of a file without a set bit are not written: they are holes, which read as zeros and
@@ -18,12 +18,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.photon_events import FrameEvents
+from pcii.exchange.written_poses import MOST_POSES, TRANSFORMS, frames_of, intrinsics_of, principal_points_px
 from pcii.exporting.view_names import row_and_column
 from pcii.io.dataset import Dataset
 from pcii.store.safe_files import json_bytes
-from pcii.transforms.camera_poses import principal_points_px
-from pcii.transforms.transforms_file import MOST_POSES, TRANSFORMS
-from pcii.transforms.written_members import frames_of, intrinsics_of
 
 FRAMES = "frames.npy"
 BLOCK_BYTES = 4096

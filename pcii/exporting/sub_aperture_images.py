@@ -18,9 +18,9 @@ from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.exchange.written_pixels import write_png
 from pcii.exporting.view_names import row_and_column
 from pcii.io.dataset import Dataset
-from pcii.pictures.written_pixels import write_png
 from pcii.store.safe_files import json_bytes
 
 CAMERA = "camera.json"

@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from pcii.pictures.picture_files import decode, kind_of, picture_of
+from pcii.exchange.pixel_files import decode, kind_of, picture_of
 from simgen.assets.mesh_files import read_mesh
 from simgen.assets.triangles import Triangles
 from simgen.base.asset_names import EnvironmentName, ImageName, MeshName, asset, named_files

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.pictures.written_pixels import write_png
+from pcii.exchange.written_pixels import write_png
 from pcii.store.safe_files import new_folder_safely
 from simgen.assets.mesh_files import ply_bytes
 from simgen.assets.triangles import Triangles

@@ -16,11 +16,11 @@ from twins import unit_grid
 
 import pcii
 from pcii.core.array_labels import COUNTS_LABELS
+from pcii.exchange.written_pixels import write_png
 from pcii.exporting.export_formats import WRITERS, export_dataset
 from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
 from pcii.io.dataset_layout import COUNTS, MANIFEST, RADIANCE, TRUTH, read_manifest, write_manifest
 from pcii.io.zarr_groups import write_arrays_safely
-from pcii.pictures.written_pixels import write_png
 from pcii.store.file_list import list_files
 
 

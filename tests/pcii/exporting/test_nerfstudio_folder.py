@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 from PIL import Image
 from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
-from stored_datasets import make_dataset, one_sentence
+from stored_datasets import one_sentence
 
 import pcii
-from pcii.app.commands import app
-from pcii.base import command_line
 from pcii.core.array_labels import TRUTH_LABELS
 from pcii.core.camera_grid import CameraGrid
+from pcii.exchange.posed_views import find_grid, import_posed_pictures
+from pcii.exchange.transforms_file import read_transforms
 from pcii.exporting.export_formats import export_dataset
-from pcii.importing.posed_pictures import import_posed_pictures
 from pcii.io.dataset_layout import TRUTH, read_manifest, write_manifest
 from pcii.io.zarr_groups import write_arrays_safely
 from pcii.store.file_list import list_files
-from pcii.transforms.transforms_file import read_transforms
 
 
 def grid_of(rows: int, cols: int, **changes: Any) -> CameraGrid:
@@ -134,65 +132,16 @@ def test_nerfstudio_takes_centres_of_frames_only_where_there_is_none_at_the_top(
     assert [frame["cx"] for frame in sheared.frames] == [23.5, 24.5]
 
 
-def files(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
-@pytest.mark.parametrize(
-    ("grid", "cfa"),
-    [
-        (grid_of(3, 3), None),
-        (grid_of(2, 3, shear_px=(1.5, -0.75)), None),
-        (grid_of(1, 3, pixel_mm=0.1 / 3), "GRBG"),
-        (grid_of(1, 1), None),
-    ],
-    ids=["plain", "sheared", "mosaic", "single"],
-)
-def test_exported_again_every_byte_is_the_same(tmp_path: Path, grid, cfa) -> None:
-    planes = write_planes(tmp_path / "planes", grid, cfa, view_truth=True, radiance_unit="cd/m^2")
-    first = exported(planes, "first")
-    assert command_line.run(app, ["import", str(first.folder), "-o", str(tmp_path / "again")]) == 0
-    assert pcii.open_dataset(tmp_path / "again").grid == grid
-    second = exported(tmp_path / "again", "second")
-    assert files(second.folder) == files(first.folder)
-    assert first.top["unit"] == "cd/m^2"
-    assert len(files(first.folder)) == 2 * grid.view_count + 1
-
-
-@pytest.mark.parametrize("white", [0.0, 1e-20, 1e20])
-def test_the_darkest_and_the_brightest_light_comes_back(tmp_path: Path, white: float) -> None:
-    grid = grid_of(1, 3, height=4, width=5)
-    light = white * np.linspace(0, 1, 3 * 4 * 5 * 3).reshape(*grid.shape_KLHW, 3)
-    pcii.save_dataset(tmp_path / "data", pcii.Views(light.astype(np.float32), grid))
-    first = exported(tmp_path / "data", "first")
-    assert command_line.run(app, ["import", str(first.folder), "-o", str(tmp_path / "again")]) == 0
-    assert files(exported(tmp_path / "again", "second").folder) == files(first.folder)
-
-
-def test_photons_come_back_each(tmp_path: Path) -> None:
-    kept = pcii.open_dataset(make_dataset(tmp_path / "data"))
-    dark = {name: entry for name, entry in kept.manifest["files"].items() if not name.startswith("radiance")}
-    data = make_dataset(tmp_path / "photons", files=dark)
-    first = exported(data, "first")
-    assert (first.top["quantity"], first.top["cfa"]) == ("photons", "GRBG")
-    assert command_line.run(app, ["import", str(first.folder), "-o", str(tmp_path / "again")]) == 0
-    again = pcii.open_dataset(tmp_path / "again")
-    assert again.counts.cfa == "GRBG"
-    np.testing.assert_array_equal(again.counts.to_numpy(), kept.counts.to_numpy())
-    assert files(exported(tmp_path / "again", "second").folder) == files(first.folder)
-
-
-def test_more_photons_than_8_bits_hold_come_back_as_radiance(tmp_path: Path, capsys) -> None:
-    grid = grid_of(1, 2, height=2, width=3)
-    dense = np.arange(12).reshape(grid.shape_KLHW) * 100
-    pcii.save_dataset(tmp_path / "data", pcii.PhotonCounts.from_dense(dense, grid, cfa="GRBG"))
-    found = exported(tmp_path / "data")
-    assert command_line.run(app, ["import", str(found.folder), "-o", str(tmp_path / "again")]) == 0
-    assert "do not keep every photon" in capsys.readouterr().out
-    views = pcii.open_dataset(tmp_path / "again").views
-    assert views is not None
-    assert views.cfa == "GRBG"
-    np.testing.assert_allclose(np.asarray(views.radiance)[..., 0], dense, atol=1100 / 510 + 1e-3)
+@pytest.mark.parametrize("shear_px", [(0.0, 0.0), (1.5, -0.75)], ids=["plain", "sheared"])
+def test_poses_and_depths_come_back(tmp_path: Path, shear_px) -> None:
+    grid = grid_of(2, 3, shear_px=shear_px)
+    found = exported(write_planes(tmp_path / "planes", grid, view_truth=True))
+    file = read_transforms(found.folder / "transforms.json", tell=[].append)
+    posed = import_posed_pictures(file, focal_mm=25, tell=[].append)
+    assert posed.views.grid == grid
+    assert posed.view_z_mm is not None
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_allclose(posed.view_z_mm[k, l], plane_z_mm(grid, k, l), rtol=1e-6)
 
 
 def test_true_cameras_are_told_and_depth_is_along_their_axes(tmp_path: Path) -> None:
@@ -219,7 +168,7 @@ def test_true_cameras_are_told_and_depth_is_along_their_axes(tmp_path: Path) -> 
     for number in range(2):
         np.testing.assert_allclose(found.points_m(number)[..., 2], -0.6, rtol=1e-6)
     told = one_sentence(
-        lambda: import_posed_pictures(read_transforms(found.folder / "transforms.json")),
+        lambda: find_grid(read_transforms(found.folder / "transforms.json")),
         found.folder / "transforms.json",
     )
     assert "degrees from the common orientation" in told

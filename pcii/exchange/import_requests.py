@@ -1,0 +1,344 @@
+"""Requests to import: a reader for each kind of source, whose parameters are the options that go with it.
+
+The options of a group stand as one parameter, a dataclass. An option that the reader of a source does not
+take is refused.
+"""
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.progress import Report
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.exchange.count_arrays import import_arrays, import_counts
+from pcii.exchange.hci_scenes import PARAMETERS, import_hci
+from pcii.exchange.image_folders import Optics, Tell, ViewOrder, import_images, is_picture
+from pcii.exchange.lens_arrays import LensArray, import_lens_array
+from pcii.exchange.photon_cubes import import_packed_frames
+from pcii.exchange.pixel_files import Encoding, check_encoding
+from pcii.exchange.posed_views import import_cubes, import_posed_pictures
+from pcii.exchange.transforms_file import read_transforms, transforms_in
+
+WholePair = tuple[int, int] | None
+Pair = tuple[float, float] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cameras:
+    """Where cameras stand and how they see."""
+
+    pitch_mm: Pair = None
+    """Distance between neighbouring cameras, x and y. Of a lens array: its lens pitch in pixels, by
+    default."""
+    focal_mm: float | None = None
+    """Focal length: from the pinhole to the sensor."""
+    sensor_mm: float | None = None
+    """Width of the sensor that a whole picture shows."""
+    pixel_mm: float | None = None
+    """Side of a pixel, instead of --sensor-mm."""
+    shear_px: Pair = None
+    """Disparity, x and y, that was taken out of the pictures of a converging grid."""
+
+    def optics(self) -> Optics:
+        """The cameras' optics; `InputError` if a length is missing."""
+        size = self.sensor_mm if self.pixel_mm is None else self.pixel_mm
+        lengths = {
+            "--pitch-mm": self.pitch_mm,
+            "--focal-mm": self.focal_mm,
+            "--sensor-mm or --pixel-mm": size,
+        }
+        missing = [name for name, value in lengths.items() if value is None]
+        if self.pitch_mm is None or self.focal_mm is None or size is None:
+            raise InputError(
+                f"{', '.join(missing)}: missing; cameras need pitch, focal length and pixel size"
+            )
+        return Optics(
+            pitch_mm=self.pitch_mm,
+            focal_mm=self.focal_mm,
+            sensor_mm=self.sensor_mm,
+            pixel_mm=self.pixel_mm,
+            shear_px=self.shear_px or (0.0, 0.0),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film:
+    """The one length of the cameras of a transforms.json that tells the others."""
+
+    focal_mm: float | None = None
+    sensor_mm: float | None = None
+    pixel_mm: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lenses:
+    """Where lenses are in a picture of a lens array."""
+
+    lens_array: WholePair = None
+    """Rows and columns of lenses whose images one picture holds side by side."""
+    lens_pitch_px: Pair = None
+    """Distance from lens to lens in the picture, x and y; need not be whole."""
+    lens_offset_px: Pair = None
+    """Left upper corner of the first lens image, x and y. Default: 0 0."""
+    inverted: bool = False
+    """Each lens image is upside down, as a sensor right behind the lenses sees it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Light:
+    """How numbers stand for light."""
+
+    srgb: bool = False
+    """Numbers are sRGB: the default for whole numbers in pictures."""
+    linear: bool = False
+    """Numbers are proportional to light: the default for floats."""
+    gamma: float | None = None
+    """Light is the number (from 0 to 1) to the power of this."""
+
+    def encoding(self) -> Encoding | None:
+        """How numbers stand for light; None for the usual way. `InputError` for two ways."""
+        if self.srgb + self.linear + (self.gamma is not None) > 1:
+            raise InputError("--srgb, --linear, --gamma: give one of them")
+        check_encoding(self.gamma)
+        return "srgb" if self.srgb else "linear" if self.linear else self.gamma
+
+
+@dataclass(frozen=True, kw_only=True)
+class CountOptions(Cameras, ViewOrder):
+    """What goes with all photon counts."""
+
+    counts: bool = False
+    cfa: str | None = None
+
+    def keywords(self) -> dict[str, Any]:
+        """The arguments of a reader of counts."""
+        return {"optics": self.optics(), "order": _part(ViewOrder, self), "cfa": self.cfa}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LightOptions(Cameras, ViewOrder, Light):
+    """What goes with all radiance whose cameras the source does not state."""
+
+    cfa: str | None = None
+
+    def keywords(self) -> dict[str, Any]:
+        """The arguments of a reader of radiance."""
+        order = _part(ViewOrder, self)
+        return {"optics": self.optics(), "order": order, "encoding": self.encoding(), "cfa": self.cfa}
+
+
+def values_of(group: Any) -> dict[str, Any]:
+    """The options of a group by name."""
+    return {field.name: getattr(group, field.name) for field in fields(group)}
+
+
+def _part(kind: type[Any], options: Any) -> Any:
+    """The options that a group has in common with others."""
+    return kind(**{field.name: getattr(options, field.name) for field in fields(kind)})
+
+
+@dataclass(frozen=True, eq=False)
+class Imported:
+    """Images as they were read, with what the source says of them."""
+
+    images: Views | PhotonCounts
+    origin: str
+    truth: Truth | None = None
+    view_z_mm: np.ndarray | None = None
+    z_range_mm: Pair = None
+    states_cameras: bool = False
+    """Whether the source itself states the cameras, which are then not questioned."""
+    counted: bool = False
+    """Whether views are counted one by one, not stored by row and column."""
+
+
+def read_pictures(
+    source: Path, report: Report, tell: Tell, *, pattern: str | None, grid: WholePair, light: LightOptions
+) -> Imported:
+    """Pictures of a folder by --pattern, or pages of a TIFF file."""
+    views = import_images(source, pattern, grid=grid, **light.keywords(), report=report, tell=tell)
+    what = "pages" if pattern is None else "pictures"
+    origin = f"{views.grid.view_count} {what} of {source.resolve().name}{_curve(light)}"
+    return Imported(views, origin, counted=pattern is None or "{index" in pattern)
+
+
+def read_lens_array(
+    source: Path, report: Report, tell: Tell, *, lenses: Lenses, light: LightOptions
+) -> Imported:
+    """One picture of a lens array."""
+    if lenses.lens_array is None or lenses.lens_pitch_px is None:
+        raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
+    (x, y), pixel_mm = lenses.lens_pitch_px, light.pixel_mm
+    if light.pitch_mm is None and pixel_mm is not None:
+        light = replace(light, pitch_mm=(x * pixel_mm, y * pixel_mm))
+    array = LensArray(
+        rows=lenses.lens_array[0],
+        cols=lenses.lens_array[1],
+        pitch_px=(x, y),
+        offset_px=lenses.lens_offset_px or (0.0, 0.0),
+        inverted=lenses.inverted,
+    )
+    views = import_lens_array(source, array, **light.keywords())
+    return Imported(views, f"{source.name}, a picture of {array.rows} x {array.cols} lenses{_curve(light)}")
+
+
+def read_array(
+    source: Path, report: Report, tell: Tell, *, array: str | None, grid: WholePair, light: LightOptions
+) -> Imported:
+    """An array of light in a .npy or .npz file."""
+    views = import_arrays(source, array=array, grid=grid, **light.keywords())
+    return Imported(views, f"array of {source.name}{_curve(light)}", counted=grid is not None)
+
+
+def read_count_files(
+    source: Path,
+    report: Report,
+    tell: Tell,
+    *,
+    pattern: str | None,
+    grid: WholePair,
+    frames: WholePair,
+    photons: CountOptions,
+) -> Imported:
+    """Photon counts in files by --pattern, or in pages of a TIFF file."""
+    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "frames": frames, **photons.keywords()}
+    counts = import_counts(source, **options, report=report, tell=tell)
+    origin = f"photon counts of {source.resolve().name}"
+    return Imported(counts, origin, counted=pattern is None or "{index" in pattern)
+
+
+def read_count_array(
+    source: Path,
+    report: Report,
+    tell: Tell,
+    *,
+    array: str | None,
+    grid: WholePair,
+    frames: WholePair,
+    photons: CountOptions,
+) -> Imported:
+    """An array of photon counts in a .npy or .npz file."""
+    options: dict[str, Any] = {"array": array, "grid": grid, "frames": frames, **photons.keywords()}
+    counts = import_counts(source, **options, report=report, tell=tell)
+    return Imported(counts, f"photon counts of {source.name}", counted=grid is not None)
+
+
+def read_packed_frames(
+    source: Path,
+    report: Report,
+    tell: Tell,
+    *,
+    bitpack: bool,
+    pattern: str | None,
+    grid: WholePair,
+    width: int | None,
+    frames: WholePair,
+    photons: CountOptions,
+) -> Imported:
+    """Frames of packed bits in .npy files."""
+    options: dict[str, Any] = {"grid": grid, "width": width, "frames": frames, **photons.keywords()}
+    counts = import_packed_frames(source, pattern=pattern, **options, report=report, tell=tell)
+    is_counted = grid is not None if pattern is None else "{index" in pattern
+    return Imported(counts, f"photon counts of {source.resolve().name}", counted=is_counted)
+
+
+def read_hci(source: Path, report: Report, tell: Tell, *, light: Light, cfa: str | None) -> Imported:
+    """A folder of the HCI 4D light field benchmark, which states its cameras."""
+    scene = import_hci(source, encoding=light.encoding(), cfa=cfa, report=report, tell=tell)
+    origin = f"{source.resolve().name}, in the format of the HCI 4D light field benchmark"
+    return Imported(scene.views, origin, scene.truth, z_range_mm=scene.z_range_mm, states_cameras=True)
+
+
+def read_posed_pictures(
+    source: Path, report: Report, tell: Tell, *, film: Film, light: Light, cfa: str | None
+) -> Imported:
+    """Pictures that a transforms.json places."""
+    file = read_transforms(transforms_in(source) or source, tell=tell)
+    options: dict[str, Any] = {**values_of(film), "encoding": light.encoding(), "cfa": cfa}
+    posed = import_posed_pictures(file, **options, report=report, tell=tell)
+    count, folder = posed.views.grid.view_count, file.path.resolve().parent.name
+    origin = f"{count} pictures of {folder}, placed by {file.path.name}"
+    return Imported(posed.views, origin, posed.truth, posed.view_z_mm, states_cameras=True)
+
+
+def read_cubes(
+    source: Path,
+    report: Report,
+    tell: Tell,
+    *,
+    counts: bool,
+    bitpack: bool,
+    frames: WholePair,
+    film: Film,
+    cfa: str | None,
+) -> Imported:
+    """Photon cubes that a transforms.json places."""
+    file = read_transforms(transforms_in(source) or source, tell=tell)
+    images = import_cubes(file, **values_of(film), cfa=cfa, frames=frames, report=report, tell=tell)
+    return Imported(images, f"photon cubes of {file.path.resolve().parent.name}", states_cameras=True)
+
+
+def _curve(light: Light) -> str:
+    """How numbers were decoded, for the origin of a dataset."""
+    encoding = light.encoding()
+    return f", decoded by {encoding}" if encoding is not None else ""
+
+
+def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Imported]:
+    """The reader of a source; `InputError` for a source that is not there, or a folder without a pattern."""
+    if not source.exists():
+        raise InputError(f"{source}: there is no such file or folder")
+    pattern, counts = options["pattern"], options["counts"]
+    if pattern is None and options["lens_array"] is None:
+        transforms = transforms_in(source)
+        if transforms is not None:
+            is_packed = read_transforms(transforms, tell=lambda sentence: None).is_bitpacked
+            return read_cubes if is_packed else read_posed_pictures
+        if (source / PARAMETERS).is_file():
+            return read_hci
+    if source.is_dir() and pattern is None:
+        raise InputError(f'{source}: say how files are named with --pattern, such as "{{col}}_{{row}}.png"')
+    if not source.is_dir() and pattern is not None:
+        raise InputError(f"{source}: --pattern is for a folder, and this is a file")
+    if options["bitpack"]:
+        return read_packed_frames
+    if options["lens_array"] is not None:
+        return read_lens_array
+    if source.is_dir() or is_picture(source):
+        return read_count_files if counts else read_pictures
+    return read_count_array if counts else read_array
+
+
+def read(source: Path, options: Mapping[str, Any], report: Report, tell: Tell) -> Imported:
+    """Read a source with the reader that it asks for.
+
+    `options` are the values of all options by name, None or False where they were not given. Raises
+    `InputError` for one that does not go with the source.
+    """
+    reader = choose_reader(source, options)
+    values: dict[str, Any] = {}
+    taken: set[str] = set()
+    for name, parameter in list(inspect.signature(reader).parameters.items())[3:]:
+        group = parameter.annotation
+        if not is_dataclass(group):
+            values[name] = options[name]
+            taken.add(name)
+            continue
+        names = [field.name for field in fields(group)]
+        kind: Any = group
+        values[name] = kind(**{n: options[n] for n in names})
+        taken.update(names)
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    others = [name for name in given if name not in taken]
+    if others:
+        flags = ", ".join(f"--{name.replace('_', '-')}" for name in others)
+        what = f"{reader.__doc__}".rstrip(".").lower()
+        raise InputError(f"{flags}: not for {source}, which is read as: {what}")
+    return reader(source, report, tell, **values)
