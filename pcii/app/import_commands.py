@@ -16,7 +16,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import check_photons, limit_photons
 from pcii.exchange.camera_fit import CameraFit, check_grid
 from pcii.exchange.image_folders import ViewOrder
-from pcii.exchange.import_requests import Cameras, Lenses, Light, Pair, WholePair, read, values_of
+from pcii.exchange.import_requests import Cameras, Lenses, Light, Pair, Source, WholePair, read, values_of
 from pcii.io.dataset_writer import check_depth_range, held_dataset, save_dataset
 
 FLAT = Parameter(name="*")
@@ -134,7 +134,7 @@ def import_dataset(
     held_dataset(out, None, content=False)
     notes: list[str] = []
     with Stages() as report:
-        imported = read(source, options, report, notes.append)
+        imported = read(Source(source, report, notes.append), options)
         images: list[Views | PhotonCounts] = [imported.images]
         drawn = ""
         if photons is not None:
@@ -188,6 +188,8 @@ def _advice(fit: CameraFit, images: Views | PhotonCounts, order: ViewOrder, lens
         words = [f"with {' '.join(flags[True])}"] * bool(flags[True])
         words += [f"without {' '.join(flags[False])}"] * bool(flags[False])
         sentences.append(f"the views fit together far better {' and '.join(words)}")
+        if set(changed) == {"flip_rows", "flip_cols"}:
+            sentences.append("or, if pictures were shifted so that something stands still, with --shear-px")
     if fit.shear_px is not None:
         x, y = fit.shear_px
         sentences.append(
@@ -214,8 +216,8 @@ def _say_depths(fit: CameraFit, images: Views | PhotonCounts) -> None:
         why = "if photons are not too few" if is_counts else "if there is texture"
         say(
             f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; {why}, correct "
-            "the order of views, --pitch-mm, --focal-mm or the size of pixels, else name depths to `pcii run` "
-            "by --z-mm"
+            "the order of views, --pitch-mm, --focal-mm or the size of pixels, else name depths to `pcii "
+            "run` by --z-mm"
         )
 
 

@@ -93,51 +93,45 @@ def check_grid(
         ends = total_disparity_px(grid, np.array(z_range_mm)) - _still_px(grid)
         reach = min(reach, max(RANGE_FACTOR * float(np.abs(ends).max()), FEWEST_CELLS / 2 * side))
     shifts_px = side * np.arange(-np.ceil(reach / side), np.ceil(reach / side) + 1)
-    cells = _cells_of(images, side)
-    table = np.arange(grid.view_count).reshape(grid.rows, grid.cols)
+    cells, table = _cells_of(images, side), np.arange(grid.view_count).reshape(grid.rows, grid.cols)
     variance, best_order, best_grid = _sweep(cells, table, grid, shifts_px, side), order, grid
     limit = BETTER * _remaining(variance)
     for other, other_table in _other_orders(grid, order, counted):
         other_grid = replace(grid, rows=other_table.shape[0], cols=other_table.shape[1])
-        found = _sweep(cells, other_table, other_grid, shifts_px, side)
-        if _remaining(found) < limit:
-            variance, best_order, best_grid, limit = found, other, other_grid, _remaining(found)
-    total_px = shifts_px + _still_px(best_grid)
-    nearest = float(depth_of_total_disparity_mm(grid, total_px[-1]))
-    mass = _mass(variance)
+        other_variance = _sweep(cells, other_table, other_grid, shifts_px, side)
+        if _remaining(other_variance) < limit:
+            variance, best_order, best_grid = other_variance, other, other_grid
+            limit = _remaining(variance)
     rng, by_chance = np.random.default_rng(0), []
     for _ in range(RANDOM_ORDERS):
         shuffled = rng.permutation(grid.view_count).reshape(table.shape)
         by_chance.append(_remaining(_sweep(cells, shuffled, grid, shifts_px, side)))
+    mass, total_px = _mass(variance), shifts_px + _still_px(best_grid)
+    nearest_px = np.maximum(total_px[-1], side)
+    fit = CameraFit(nearest_mm=float(depth_of_total_disparity_mm(grid, nearest_px)))
     if not mass.any() or _remaining(variance) > BETTER * np.mean(by_chance):
-        return CameraFit(nearest_mm=nearest)
-    is_behind = total_px < -side
-    if mass[is_behind].sum() > BEHIND_SHARE:
-        turned_px = 2 * _still_px(best_grid) - total_px
-        is_behind_turned = turned_px < -side
-        if mass[is_behind_turned].sum() <= BEHIND_SHARE and not is_behind_turned[_peaks(mass)].any():
+        return fit
+    fit = replace(fit, order=None if best_order == order else best_order)
+    if mass[total_px < -side].sum() > BEHIND_SHARE:
+        turned_px = _still_px(best_grid) - shifts_px
+        is_behind = turned_px < -side
+        if mass[is_behind].sum() <= BEHIND_SHARE and not is_behind[_peaks(mass)].any():
             flips = best_order.flip_rows ^ (best_grid.rows > 1), best_order.flip_cols ^ (best_grid.cols > 1)
-            turned = replace(best_order, flip_rows=flips[0], flip_cols=flips[1])
-            return CameraFit(nearest_mm=nearest, order=turned)
+            return replace(fit, order=replace(best_order, flip_rows=flips[0], flip_cols=flips[1]))
         least_px = float(shifts_px[np.searchsorted(mass.cumsum(), 0.02)])
-        shear = _shear_of(best_grid, 2 * max(-least_px, 0.0))  # as far in front as it was behind
-        return CameraFit(
-            nearest_mm=nearest, order=None if best_order == order else best_order, shear_px=shear
-        )
-    if best_order != order:
-        return CameraFit(nearest_mm=nearest, order=best_order)
-    inside = total_px > 0
+        x, y = 2 * max(-least_px, 0.0) * _per_total(best_grid)  # as far in front as it was behind
+        return replace(fit, shear_px=(float(f"{x:.2g}"), float(f"{y:.2g}")))
+    if fit.order is not None:
+        return fit
+    near_px, far_px = np.inf, 0.0
     if z_range_mm is not None:
-        far_px, near_px = (float(total_disparity_px(grid, z)) for z in z_range_mm[::-1])
-        # A plane more on either side belongs to the range: it may be nearest to one that does.
-        inside = (total_px >= far_px - side) & (total_px <= near_px + side)
-        if mass[~inside].sum() > 0.5:
-            outside = depth_of_total_disparity_mm(
-                grid, total_px[np.where(inside | is_behind, 0, mass).argmax()]
-            )
-            return CameraFit(nearest_mm=nearest, outside_mm=float(outside))
-    z_mm = _refined_depths(images, variance, np.where(inside, mass, 0), total_px, side)
-    return CameraFit(z_mm, nearest)
+        near_px, far_px = total_disparity_px(grid, np.array(z_range_mm)).tolist()
+    # A plane more on either side belongs to the range: it may be nearest to one that does.
+    inside = np.where((total_px >= far_px - side) & (total_px <= near_px + side) & (total_px > 0), mass, 0)
+    if z_range_mm is not None and inside.sum() < 0.5:
+        outside_px = total_px[np.where((inside == 0) & (total_px > 0), mass, 0).argmax()]
+        return replace(fit, outside_mm=float(depth_of_total_disparity_mm(grid, outside_px)))
+    return replace(fit, z_mm=_refined_depths(images, variance, inside, total_px, side))
 
 
 def _other_orders(
@@ -203,11 +197,6 @@ def _per_total(grid: CameraGrid) -> np.ndarray:
 def _still_px(grid: CameraGrid) -> float:
     """Total parallax of what stands still in all views, because they are shifted by the shear."""
     return float(np.mean(np.array(grid.shear_px) / _per_total(grid)))
-
-
-def _shear_of(grid: CameraGrid, still_px: float) -> tuple[float, float]:
-    x, y = (still_px * _per_total(grid)).tolist()
-    return float(f"{x:.2g}"), float(f"{y:.2g}")
 
 
 def _sweep(

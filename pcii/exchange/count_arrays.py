@@ -3,10 +3,9 @@
 Frames of one bit are read by `photon_cubes`, which keeps the frame of each count.
 """
 
-import math
 import zipfile
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +29,7 @@ from pcii.exchange.image_folders import (
     views_of,
     warn,
 )
-from pcii.exchange.photon_cubes import BitFrames, binary_counts, frames_of_files, map_array, span_of_frames
+from pcii.exchange.photon_cubes import FrameStack, binary_counts, frames_of_files, map_array, span_of_frames
 from pcii.exchange.pixel_files import LARGEST_BYTES, Encoding, Picture, check_encoding, decode, to_radiance
 
 NUMPY = ".npy"
@@ -105,32 +104,34 @@ def import_counts(
     `tell` takes sentences on what is left out or looks wrong. Raises `InputError` for counts that are
     negative or fractional in any frame.
     """
-    if pattern is not None and not isinstance(source, np.ndarray):
-        folder = Path(source)
-        paths = order.arrange(files_by_camera(folder, pattern, grid, order, tell))
-        if all(path.suffix == NUMPY for path in paths.flat):
-            stacks = frames_of_files(paths, packed=False)
-        else:
-            return _added_up(_of_files(folder, paths, frames, tell), optics, cfa, report)
-    elif not isinstance(source, np.ndarray) and is_picture(Path(source)):
-        return _added_up(_of_pages(Path(source), grid, order, frames), optics, cfa, report)
-    else:
+    if isinstance(source, np.ndarray) or (pattern is None and not is_picture(Path(source))):
         stacks = _of_array(source, array, grid, order)
-    first: BitFrames = stacks[0, 0]
+    elif pattern is None:
+        stacks = _of_pages(Path(source), grid, order)
+    else:
+        paths = order.arrange(files_by_camera(Path(source), pattern, grid, order, tell))
+        is_numpy = all(path.suffix == NUMPY for path in paths.flat)
+        stacks = frames_of_files(paths, packed=False) if is_numpy else _of_pictures(paths, tell)
+    first: FrameStack = stacks[0, 0]
     span = span_of_frames(frames, first.frames, first.name)
+    cameras = optics.grid((*stacks.shape, first.height, first.row))
+    check_size(Path(first.name), cameras.shape_KLHW)
     if first.dtype == np.bool_:
-        cameras = optics.grid((*stacks.shape, first.height, first.row))
         return binary_counts(stacks, cameras, span, cfa=cfa, report=report, tell=tell)
-    views = (
-        (camera, ((stack.name, frame) for piece in stack.pieces(*span) for frame in piece))
-        for camera, stack in np.ndenumerate(stacks)
-    )
-    shape = (*stacks.shape, first.height, first.row)
     if first.dtype == np.uint8 and first.frames > 1:
         _warn_of_packed_bits(first, tell)
-    return _added_up(
-        _Stack(Path(first.name), shape, first.dtype, span[1] - span[0], views), optics, cfa, report
-    )
+    # The smallest unsigned type that holds every sum; each number is at most 2^40, and so is a sum.
+    is_whole = first.dtype.kind in "iu"
+    most = min(np.iinfo(first.dtype).max, LARGEST_COUNT) if is_whole else LARGEST_COUNT
+    dtype = np.min_scalar_type(min(int(most) * (span[1] - span[0]), 2 * LARGEST_COUNT))
+    sums = np.zeros(cameras.shape_KLHW, dtype)
+    for done, (camera, stack) in enumerate(np.ndenumerate(stacks), start=1):
+        for frame in (frame for piece in stack.pieces(*span) for frame in piece):
+            sums[camera] += whole_counts(stack.name, frame).astype(dtype, copy=False)
+            if sums[camera].max(initial=0) > LARGEST_COUNT:
+                raise InputError(f"{stack.name}: more than 2^40 photons in a pixel cannot be summed exactly")
+        report("views", done, stacks.size)
+    return PhotonCounts.from_dense(sums, cameras, cfa=cfa, frames=span[1] - span[0])
 
 
 def open_array(source: str | Path | np.ndarray, array: str | None = None) -> tuple[np.ndarray, str]:
@@ -173,71 +174,35 @@ def _by_camera(
     return numbers.reshape(*order.table_of(name, numbers.shape[0], grid), *numbers.shape[1:])
 
 
-Frames = Iterable[tuple[str, np.ndarray]]
-"""Name and counts (H, W) of each frame of a view."""
+def _of_pictures(files: np.ndarray, tell: Tell) -> np.ndarray:
+    """The pages of pictures, one for each view, as (K, L) of `FrameStack`."""
+    stacks = np.empty(files.shape, object)
+    for camera, picture in np.ndenumerate(headers_of(files, pages=True, tell=tell)):
+        load = partial(lambda one: np.stack([page[..., 0] for page in decode(one)]), picture)
+        stacks[camera] = _stack_of(picture, load, picture.pages)
+    return stacks
 
 
-@dataclass(frozen=True, eq=False)
-class _Stack:
-    """Frames of views of the shape (K, L, H, W), of numbers of a `dtype`."""
-
-    name: Path
-    shape: tuple[int, ...]
-    dtype: np.dtype
-    frames: int
-    views: Iterator[tuple[tuple[int, ...], Frames]]
-    """For each camera (k, l) the frames that are added up."""
-
-
-def _added_up(stack: _Stack, optics: Optics, cfa: str | None, report: Report) -> PhotonCounts:
-    most = {"b": 1, "f": LARGEST_COUNT}.get(stack.dtype.kind)
-    if most is None:
-        most = min(np.iinfo(stack.dtype).max, LARGEST_COUNT) if stack.dtype.kind in "iu" else LARGEST_COUNT
-    # The smallest unsigned type that holds every sum; each number is at most 2^40, and so is a sum.
-    dtype = np.min_scalar_type(min(int(most) * stack.frames, 2 * LARGEST_COUNT))
-    check_size(stack.name, stack.shape)
-    counts = np.zeros(stack.shape, dtype)
-    for done, (camera, frames) in enumerate(stack.views, start=1):
-        for name, frame in frames:
-            counts[camera] += whole_counts(name, frame).astype(dtype, copy=False)
-            if counts[camera].max(initial=0) > LARGEST_COUNT:
-                raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
-        report("views", done, math.prod(stack.shape[:2]))
-    bits = 1 if stack.dtype.kind == "b" else None
-    return PhotonCounts.from_dense(counts, optics.grid(stack.shape), cfa=cfa, frames=stack.frames, bits=bits)
-
-
-def _of_files(folder: Path, files: np.ndarray, frames: tuple[int, int] | None, tell: Tell) -> _Stack:
-    pictures = headers_of(files, pages=True, tell=tell)
-    first = pictures[0, 0]
-    _check_grey(first)
-    start, stop = span_of_frames(frames, first.pages, str(first.path))
-    views = (
-        (camera, ((str(picture.path), page[..., 0]) for page in [*decode(picture)][start:stop]))
-        for camera, picture in np.ndenumerate(pictures)
-    )
-    return _Stack(folder, (*files.shape, *first.shape[:2]), first.dtype, stop - start, views)
-
-
-def _of_pages(
-    path: Path, grid: tuple[int, int] | None, order: ViewOrder, frames: tuple[int, int] | None
-) -> _Stack:
-    span_of_frames(frames, 1, str(path))
+def _of_pages(path: Path, grid: tuple[int, int] | None, order: ViewOrder) -> np.ndarray:
+    """The pages of a file, of which each is a view, as (K, L) of `FrameStack`."""
     picture, size, pages = pages_of(path, grid, order)
-    _check_grey(picture)
-    views = ((camera, [(str(path), pixels[..., 0])]) for camera, pixels in pages)
-    return _Stack(path, (*size, *picture.shape[:2]), picture.dtype, 1, views)
+    stacks = np.empty(size, object)
+    for camera, pixels in pages:
+        stacks[camera] = _stack_of(picture, partial(np.transpose, pixels, (2, 0, 1)), 1)
+    return stacks
 
 
-def _check_grey(picture: Picture) -> None:
-    if picture.shape[2] != 1:
-        raise InputError(f"{picture.path}: has {picture.shape[2]} channels; photon counts have one")
+def _stack_of(picture: Picture, load: Callable[[], np.ndarray], frames: int) -> FrameStack:
+    height, width, channels = picture.shape
+    if channels != 1:
+        raise InputError(f"{picture.path}: has {channels} channels; photon counts have one")
+    return FrameStack(str(picture.path), load, picture.dtype, frames, height, width, packed=False)
 
 
 def _of_array(
     source: str | Path | np.ndarray, array: str | None, grid: tuple[int, int] | None, order: ViewOrder
 ) -> np.ndarray:
-    """The frames of each view of an array, (K, L) of `BitFrames`."""
+    """The frames of each view of an array, (K, L) of `FrameStack`."""
     numbers, name = open_array(source, array)
     views = _by_camera(numbers, name, grid, order, "H, W) or (N, T, H, W")
     views = views[:, :, None] if views.ndim == 4 else views
@@ -248,11 +213,11 @@ def _of_array(
     views = order.arrange(views)
     stacks = np.empty(views.shape[:2], object)
     for camera in np.ndindex(*stacks.shape):
-        stacks[camera] = BitFrames.of(name, lambda camera=camera: views[camera], packed=False)
+        stacks[camera] = FrameStack.of(name, partial(views.__getitem__, camera), packed=False)
     return stacks
 
 
-def _warn_of_packed_bits(stack: BitFrames, tell: Tell) -> None:
+def _warn_of_packed_bits(stack: FrameStack, tell: Tell) -> None:
     """Warn of numbers that look like eight pixels in a byte: single bits, high ones as often as low ones."""
     piece = next(stack.pieces(0, stack.frames))
     histogram = np.bincount(piece.ravel(), minlength=256)

@@ -8,7 +8,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -144,6 +144,25 @@ def _part(kind: type[Any], options: Any) -> Any:
     return kind(**{field.name: getattr(options, field.name) for field in fields(kind)})
 
 
+@dataclass(frozen=True)
+class Source:
+    """Where images are, who is told of progress, and who of what is left out."""
+
+    path: Path
+    report: Report
+    tell: Tell
+
+    @property
+    def name(self) -> str:
+        """The name of the file or folder, for the origin of a dataset."""
+        return self.path.resolve().name
+
+    @property
+    def listeners(self) -> dict[str, Any]:
+        """Arguments that all readers of several files take."""
+        return {"report": self.report, "tell": self.tell}
+
+
 @dataclass(frozen=True, eq=False)
 class Imported:
     """Images as they were read, with what the source says of them."""
@@ -159,81 +178,53 @@ class Imported:
     """Whether views are counted one by one, not stored by row and column."""
 
 
-def read_pictures(
-    source: Path, report: Report, tell: Tell, *, pattern: str | None, grid: WholePair, light: LightOptions
-) -> Imported:
+def read_pictures(source: Source, *, pattern: str | None, grid: WholePair, light: LightOptions) -> Imported:
     """Pictures of a folder by --pattern, or pages of a TIFF file."""
-    views = import_images(source, pattern, grid=grid, **light.keywords(), report=report, tell=tell)
+    views = import_images(source.path, pattern, grid=grid, **light.keywords(), **source.listeners)
     what = "pages" if pattern is None else "pictures"
-    origin = f"{views.grid.view_count} {what} of {source.resolve().name}{_curve(light)}"
-    return Imported(views, origin, counted=pattern is None or "{index" in pattern)
+    origin = f"{views.grid.view_count} {what} of {source.name}{_curve(light)}"
+    return Imported(views, origin, counted=_is_counted(pattern, True))
 
 
-def read_lens_array(
-    source: Path, report: Report, tell: Tell, *, lenses: Lenses, light: LightOptions
-) -> Imported:
+def read_lens_array(source: Source, *, lenses: Lenses, light: LightOptions) -> Imported:
     """One picture of a lens array."""
     if lenses.lens_array is None or lenses.lens_pitch_px is None:
         raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
     (x, y), pixel_mm = lenses.lens_pitch_px, light.pixel_mm
     if light.pitch_mm is None and pixel_mm is not None:
         light = replace(light, pitch_mm=(x * pixel_mm, y * pixel_mm))
-    array = LensArray(
-        rows=lenses.lens_array[0],
-        cols=lenses.lens_array[1],
-        pitch_px=(x, y),
-        offset_px=lenses.lens_offset_px or (0.0, 0.0),
-        inverted=lenses.inverted,
-    )
-    views = import_lens_array(source, array, **light.keywords())
-    return Imported(views, f"{source.name}, a picture of {array.rows} x {array.cols} lenses{_curve(light)}")
+    (rows, cols), offset = lenses.lens_array, lenses.lens_offset_px or (0.0, 0.0)
+    array = LensArray(rows=rows, cols=cols, pitch_px=(x, y), offset_px=offset, inverted=lenses.inverted)
+    views = import_lens_array(source.path, array, **light.keywords())
+    return Imported(views, f"{source.name}, a picture of {rows} x {cols} lenses{_curve(light)}")
 
 
-def read_array(
-    source: Path, report: Report, tell: Tell, *, array: str | None, grid: WholePair, light: LightOptions
-) -> Imported:
+def read_array(source: Source, *, array: str | None, grid: WholePair, light: LightOptions) -> Imported:
     """An array of light in a .npy or .npz file."""
-    views = import_arrays(source, array=array, grid=grid, **light.keywords())
+    views = import_arrays(source.path, array=array, grid=grid, **light.keywords())
     return Imported(views, f"array of {source.name}{_curve(light)}", counted=grid is not None)
 
 
 def read_count_files(
-    source: Path,
-    report: Report,
-    tell: Tell,
-    *,
-    pattern: str | None,
-    grid: WholePair,
-    frames: WholePair,
-    photons: CountOptions,
+    source: Source, *, pattern: str | None, grid: WholePair, frames: WholePair, photons: CountOptions
 ) -> Imported:
     """Photon counts in files by --pattern, or in pages of a TIFF file."""
     options: dict[str, Any] = {"pattern": pattern, "grid": grid, "frames": frames, **photons.keywords()}
-    counts = import_counts(source, **options, report=report, tell=tell)
-    origin = f"photon counts of {source.resolve().name}"
-    return Imported(counts, origin, counted=pattern is None or "{index" in pattern)
+    counts = import_counts(source.path, **options, **source.listeners)
+    return Imported(counts, f"photon counts of {source.name}", counted=_is_counted(pattern, True))
 
 
 def read_count_array(
-    source: Path,
-    report: Report,
-    tell: Tell,
-    *,
-    array: str | None,
-    grid: WholePair,
-    frames: WholePair,
-    photons: CountOptions,
+    source: Source, *, array: str | None, grid: WholePair, frames: WholePair, photons: CountOptions
 ) -> Imported:
     """An array of photon counts in a .npy or .npz file."""
     options: dict[str, Any] = {"array": array, "grid": grid, "frames": frames, **photons.keywords()}
-    counts = import_counts(source, **options, report=report, tell=tell)
+    counts = import_counts(source.path, **options, **source.listeners)
     return Imported(counts, f"photon counts of {source.name}", counted=grid is not None)
 
 
 def read_packed_frames(
-    source: Path,
-    report: Report,
-    tell: Tell,
+    source: Source,
     *,
     bitpack: bool,
     pattern: str | None,
@@ -244,45 +235,40 @@ def read_packed_frames(
 ) -> Imported:
     """Frames of packed bits in .npy files."""
     options: dict[str, Any] = {"grid": grid, "width": width, "frames": frames, **photons.keywords()}
-    counts = import_packed_frames(source, pattern=pattern, **options, report=report, tell=tell)
-    is_counted = grid is not None if pattern is None else "{index" in pattern
-    return Imported(counts, f"photon counts of {source.resolve().name}", counted=is_counted)
+    counts = import_packed_frames(source.path, pattern=pattern, **options, **source.listeners)
+    is_counted = _is_counted(pattern, grid is not None)
+    return Imported(counts, f"photon counts of {source.name}", counted=is_counted)
 
 
-def read_hci(source: Path, report: Report, tell: Tell, *, light: Light, cfa: str | None) -> Imported:
+def read_hci(source: Source, *, light: Light, cfa: str | None) -> Imported:
     """A folder of the HCI 4D light field benchmark, which states its cameras."""
-    scene = import_hci(source, encoding=light.encoding(), cfa=cfa, report=report, tell=tell)
-    origin = f"{source.resolve().name}, in the format of the HCI 4D light field benchmark"
+    scene = import_hci(source.path, encoding=light.encoding(), cfa=cfa, **source.listeners)
+    origin = f"{source.name}, in the format of the HCI 4D light field benchmark"
     return Imported(scene.views, origin, scene.truth, z_range_mm=scene.z_range_mm, states_cameras=True)
 
 
-def read_posed_pictures(
-    source: Path, report: Report, tell: Tell, *, film: Film, light: Light, cfa: str | None
-) -> Imported:
+def read_posed_pictures(source: Source, *, film: Film, light: Light, cfa: str | None) -> Imported:
     """Pictures that a transforms.json places."""
-    file = read_transforms(transforms_in(source) or source, tell=tell)
+    file = read_transforms(transforms_in(source.path) or source.path, tell=source.tell)
     options: dict[str, Any] = {**values_of(film), "encoding": light.encoding(), "cfa": cfa}
-    posed = import_posed_pictures(file, **options, report=report, tell=tell)
+    posed = import_posed_pictures(file, **options, **source.listeners)
     count, folder = posed.views.grid.view_count, file.path.resolve().parent.name
     origin = f"{count} pictures of {folder}, placed by {file.path.name}"
     return Imported(posed.views, origin, posed.truth, posed.view_z_mm, states_cameras=True)
 
 
 def read_cubes(
-    source: Path,
-    report: Report,
-    tell: Tell,
-    *,
-    counts: bool,
-    bitpack: bool,
-    frames: WholePair,
-    film: Film,
-    cfa: str | None,
+    source: Source, *, counts: bool, bitpack: bool, frames: WholePair, film: Film, cfa: str | None
 ) -> Imported:
     """Photon cubes that a transforms.json places."""
-    file = read_transforms(transforms_in(source) or source, tell=tell)
-    images = import_cubes(file, **values_of(film), cfa=cfa, frames=frames, report=report, tell=tell)
+    file = read_transforms(transforms_in(source.path) or source.path, tell=source.tell)
+    images = import_cubes(file, **values_of(film), cfa=cfa, frames=frames, **source.listeners)
     return Imported(images, f"photon cubes of {file.path.resolve().parent.name}", states_cameras=True)
+
+
+def _is_counted(pattern: str | None, otherwise: bool) -> bool:
+    """Whether views are counted one by one."""
+    return otherwise if pattern is None else "{index" in pattern
 
 
 def _curve(light: Light) -> str:
@@ -316,29 +302,24 @@ def choose_reader(source: Path, options: Mapping[str, Any]) -> Callable[..., Imp
     return read_count_array if counts else read_array
 
 
-def read(source: Path, options: Mapping[str, Any], report: Report, tell: Tell) -> Imported:
+def read(source: Source, options: Mapping[str, Any]) -> Imported:
     """Read a source with the reader that it asks for.
 
     `options` are the values of all options by name, None or False where they were not given. Raises
     `InputError` for one that does not go with the source.
     """
-    reader = choose_reader(source, options)
+    reader = choose_reader(source.path, options)
     values: dict[str, Any] = {}
-    taken: set[str] = set()
-    for name, parameter in list(inspect.signature(reader).parameters.items())[3:]:
-        group = parameter.annotation
-        if not is_dataclass(group):
-            values[name] = options[name]
-            taken.add(name)
-            continue
-        names = [field.name for field in fields(group)]
-        kind: Any = group
-        values[name] = kind(**{n: options[n] for n in names})
-        taken.update(names)
-    given = [name for name, value in options.items() if value is not None and value is not False]
-    others = [name for name in given if name not in taken]
+    accepted: set[str] = set()
+    for name, parameter in list(inspect.signature(reader).parameters.items())[1:]:
+        group: Any = parameter.annotation
+        names = [field.name for field in fields(group)] if is_dataclass(group) else [name]
+        part = {one: options[one] for one in names}
+        values[name] = cast(Any, group)(**part) if is_dataclass(group) else options[name]
+        accepted.update(names)
+    names = [name for name, value in options.items() if value is not None and value is not False]
+    others = ", ".join(f"--{name.replace('_', '-')}" for name in names if name not in accepted)
     if others:
-        flags = ", ".join(f"--{name.replace('_', '-')}" for name in others)
         what = f"{reader.__doc__}".rstrip(".").lower()
-        raise InputError(f"{flags}: not for {source}, which is read as: {what}")
-    return reader(source, report, tell, **values)
+        raise InputError(f"{others}: not for {source.path}, which is read as: {what}")
+    return reader(source, **values)

@@ -37,11 +37,11 @@ FEWEST_PER_COLUMN = 10
 
 
 @dataclass(frozen=True, eq=False)
-class BitFrames:
+class FrameStack:
     """T frames of a view, each of H rows of so many numbers: pixels, or bytes of eight pixels if `packed`.
 
-    `load` returns the array (T, H, row) in memory or on disk; it is called for each piece, so that what was
-    read of a memory map leaves memory.
+    `load` returns the array (T, H, row), in memory or mapped from a file; a map is made anew for each piece,
+    so that what was read leaves memory.
     """
 
     name: str
@@ -53,7 +53,7 @@ class BitFrames:
     packed: bool
 
     @classmethod
-    def of(cls, name: str, load: Callable[[], np.ndarray], *, packed: bool) -> "BitFrames":
+    def of(cls, name: str, load: Callable[[], np.ndarray], *, packed: bool) -> "FrameStack":
         """The frames that `load` returns; raises `InputError` for another shape or type."""
         array = load()
         if array.ndim != 3 or 0 in array.shape:
@@ -72,12 +72,15 @@ class BitFrames:
     def pieces(self, first: int, stop: int) -> Iterator[np.ndarray]:
         """Frames `first` .. `stop` - 1 some at a time, (n, H, row)."""
         most = max(PIECE_BYTES // (self.height * self.row * self.dtype.itemsize), 1)
+        array = self.load()
         for begin in range(first, stop, most):
-            yield np.array(self.load()[begin : min(begin + most, stop)])
+            yield np.array(array[begin : min(begin + most, stop)])
+            if isinstance(array, np.memmap):
+                array = self.load()
 
 
 def frames_of_files(paths: np.ndarray, *, packed: bool) -> np.ndarray:
-    """Of a .npy file for each view, paths (K, L), their frames: (K, L) of `BitFrames`.
+    """Of a .npy file for each view, paths (K, L), their frames: (K, L) of `FrameStack`.
 
     A last axis of 1, the channel, may follow those of the frames. Raises `InputError`, naming a file, for any
     other, and for one that differs from the first.
@@ -89,8 +92,8 @@ def frames_of_files(paths: np.ndarray, *, packed: bool) -> np.ndarray:
             numbers = map_array(path)
             return numbers[..., 0] if numbers.ndim == 4 and numbers.shape[3] == 1 else numbers
 
-        stacks[camera] = stack = BitFrames.of(str(path), load, packed=packed)
-        first: BitFrames = stacks[0, 0]
+        stacks[camera] = stack = FrameStack.of(str(path), load, packed=packed)
+        first: FrameStack = stacks[0, 0]
         if stack.layout() != first.layout():
             raise InputError(f"{path}: has {stack.layout()}, where {first.name} has {first.layout()}")
     return stacks
@@ -151,7 +154,7 @@ def import_packed_frames(
         stacks = frames_of_files(paths, packed=True)
     else:
         stacks = order.arrange(_frames_of_file(Path(source), grid, order))
-    first: BitFrames = stacks[0, 0]
+    first: FrameStack = stacks[0, 0]
     width = 8 * first.row if width is None else width
     check_width(first, width, "--width")
     span = span_of_frames(frames, first.frames, first.name)
@@ -160,7 +163,7 @@ def import_packed_frames(
 
 
 def _frames_of_file(path: Path, grid: tuple[int, int] | None, order: ViewOrder) -> np.ndarray:
-    """The frames of each view of one file, (A, B) of `BitFrames`, in the table of the file."""
+    """The frames of each view of one file, (A, B) of `FrameStack`, in the table of the file."""
     numbers = map_array(path)
     table = numbers.shape[:2] if grid is None else order.table_of(path, numbers.shape[0], grid)
     if numbers.ndim != 3 + len(table) - (grid is not None):
@@ -169,11 +172,11 @@ def _frames_of_file(path: Path, grid: tuple[int, int] | None, order: ViewOrder) 
     stacks = np.empty(table, object)
     for number, camera in enumerate(np.ndindex(*table)):
         place = camera if grid is None else (number,)
-        stacks[camera] = BitFrames.of(str(path), lambda place=place: map_array(path)[place], packed=True)
+        stacks[camera] = FrameStack.of(str(path), lambda place=place: map_array(path)[place], packed=True)
     return stacks
 
 
-def check_width(stack: BitFrames, width: int, whence: str) -> None:
+def check_width(stack: FrameStack, width: int, whence: str) -> None:
     """Raise `InputError` unless rows of packed frames have as many bytes as so many pixels need."""
     if width < 1 or -(-width // 8) != stack.row:
         raise InputError(
@@ -191,7 +194,7 @@ def binary_counts(
     report: Report = silent,
     tell: Tell = warn,
 ) -> PhotonCounts:
-    """Sums of the frames `span`, first and stop, of (K, L) `BitFrames` whose pixels are of one bit.
+    """Sums of the frames `span`, first and stop, of (K, L) `FrameStack` whose pixels are of one bit.
 
     The frame of each single count is kept up to `MOST_KEPT` counts in all. `tell` takes what is left out.
     Raises `InputError`, naming a file, for bits that are set beyond the width of the grid.

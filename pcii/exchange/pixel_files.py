@@ -221,9 +221,9 @@ def _pillow_header(path: Path) -> dict[str, Any]:
         if image.mode not in PILLOW_MODES:
             raise InputError(f"a {image.mode} picture; save it as RGB or grey")
         channels, dtype = PILLOW_MODES[image.mode]
-        header: dict[str, Any] = {"alpha": image.has_transparency_data}
-        if count != 1:
-            header["unused"] = f"{count - 1} more pictures in the file"
+        further = f"{count - 1} more pictures in the file" if count != 1 else ""
+        unused = further or _profile(image.info.get("icc_profile"))
+        header: dict[str, Any] = {"alpha": image.has_transparency_data, "unused": unused}
         if image.format == "PNG":  # of 16 bits Pillow keeps 8, and takes grey with alpha for colours
             stored = str(image.tile[0].args)
             channels = 1 if stored[0] in "L1I" else channels
@@ -277,7 +277,13 @@ def _tiff_header(path: Path) -> dict[str, Any]:
             "bits": page.bitspersample if fewer else None,
             "alpha": alpha,
             "orientation": page.tags.valueof(274, default=UPRIGHT),
+            "unused": _profile(page.tags.valueof(34675)),
         }
+
+
+def _profile(content: bytes | None) -> str:
+    """What is said of an ICC profile: nothing of that of sRGB."""
+    return "" if not content or b"sRGB" in content.replace(b"\0", b"") else "the colour profile"
 
 
 def _frame_axes(series: Any) -> tuple[int, int, int]:

@@ -138,13 +138,13 @@ def import_cubes(
     first and the last to add up; `cfa` is the Bayer pattern where the file says none. Raises `InputError`,
     naming file and member, for cameras that are no grid, and cubes that do not fit what the file says.
     """
-    said = file.document
-    if said.bitpack_dim != 2 or said.c not in (None, 1):
+    document = file.document
+    if document.bitpack_dim != 2 or document.c not in (None, 1):
         raise InputError(
             f"{file.path}: bitpack_dim, c: expected 2 and 1: one channel, packed along the width"
         )
-    if said.cfa not in (None, "none", cfa) and cfa is not None:
-        raise InputError(f"{file.path}: cfa: is {said.cfa}; leave out --cfa")
+    if document.cfa not in (None, "none", cfa) and cfa is not None:
+        raise InputError(f"{file.path}: cfa: is {document.cfa}; leave out --cfa")
     cameras = file
     if file.is_stack:
         if np.ptp(file.poses, axis=0).max() + np.ptp(file.centres_px, axis=0).max() > ROUNDING:
@@ -162,11 +162,11 @@ def import_cubes(
             f"{first.name}: is {first.height} px high, where {file.path.name} says {grid.height}"
         )
     check_width(first, grid.width, file.path.name)
-    for number in (said.num_frames, len(file.poses) if file.is_stack else None):
+    for number in (document.num_frames, len(file.poses) if file.is_stack else None):
         if number not in (None, first.frames):
             raise InputError(f"{file.path}: frames: says {number}, and {first.name} has {first.frames}")
     span = span_of_frames(frames, first.frames, first.name)
-    pattern = cfa if said.cfa in (None, "none") else said.cfa
+    pattern = cfa if document.cfa in (None, "none") else document.cfa
     return binary_counts(stacks, grid, span, cfa=pattern, report=report, tell=tell)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tifffile
 from picture_folders import OPTICS, H, W, make_folder, numbers, write
-from PIL import Image
+from PIL import Image, ImageCms
 from png_files import compressed, png_file
 
 from pcii import InputError, Optics, ViewOrder, Views, import_images
@@ -166,11 +166,20 @@ def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> No
         file.write(str(tmp_path / "0_0.exr"))
     with pytest.warns(UserWarning, match=r"not used: the channels Z in 0_0\.exr"):
         import_images(tmp_path, PATTERN % "exr", OPTICS)
+    (tmp_path / "0_0.exr").unlink()
     first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
     first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
     with pytest.warns(UserWarning, match=r"not used: 1 more pictures in the file in 0_0\.jpg"):
         views = import_images(tmp_path, PATTERN % "jpg", OPTICS, tell=warnings.warn)
     np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
+    spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
+    for name, profile in spaces:
+        content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes()
+        first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
+    told: list[str] = []
+    for profile in ("srgb", "other"):
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
+    assert [one for one in told if "profile" in one] == ["not used: the colour profile in 0_0.other.png"]
 
 
 def test_numbers_that_count_the_other_way(tmp_path: Path) -> None:

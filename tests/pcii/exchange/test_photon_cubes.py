@@ -16,7 +16,7 @@ from picture_folders import OPTICS
 from pcii import CameraGrid, ViewOrder, import_counts, open_dataset
 from pcii.core.photon_counts import PhotonCounts
 from pcii.exchange import photon_cubes
-from pcii.exchange.photon_cubes import BitFrames, binary_counts, import_packed_frames, places_of_bits
+from pcii.exchange.photon_cubes import FrameStack, binary_counts, import_packed_frames, places_of_bits
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
 PACKED = ["--counts", "--bitpack", "--pattern", "{row}_{col}.npy", *CAMERAS]
@@ -52,7 +52,7 @@ def counts_of_bits(bits: np.ndarray, grid: CameraGrid, span: tuple[int, int]) ->
     """Counts of packed frames in memory."""
     stacks = np.empty(bits.shape[:2], object)
     for camera in np.ndindex(*stacks.shape):
-        stacks[camera] = BitFrames.of("frames", lambda c=camera: packed(bits[c]), packed=True)
+        stacks[camera] = FrameStack.of("frames", lambda c=camera: packed(bits[c]), packed=True)
     return binary_counts(stacks, grid, span, tell=[].append)
 
 
@@ -276,12 +276,6 @@ def archive(root: Path) -> Path:
     folder = files_of(root / "views", BITS)
     with (folder / "0_2.npy").open("wb") as file:
         np.savez(file, frames=CUBE)
-    return folder
-
-
-def no_array(root: Path) -> Path:
-    folder = files_of(root / "views", BITS)
-    (folder / "0_2.npy").write_bytes(b"\x93NUMPY\x01\x00\x10\x00{'shape': (-1,,) ")
     return folder
 
 
