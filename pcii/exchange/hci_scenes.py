@@ -27,6 +27,8 @@ DEPTH, DISPARITY = "gt_depth_lowres.pfm", "gt_disp_lowres.pfm"
 LARGEST_PARAMETERS_BYTES = 1 << 16
 INFINITY_M = 1e9
 """A focus distance from which on the cameras are not sheared; other tools divide by it."""
+LEAST_MM = 1e-6
+"""Of lengths that divide others."""
 PLAUSIBLE_M = (1e-4, 1e5)
 """Depths beyond are of a map whose byte order is wrong."""
 
@@ -57,14 +59,16 @@ def import_hci(
     """
     root = Path(folder)
     known = _Parameters(root / PARAMETERS)
-    rows, cols = known.whole("extrinsics", "num_cams_y"), known.whole("extrinsics", "num_cams_x")
-    width = known.whole("intrinsics", "image_resolution_x_px")
-    height = known.whole("intrinsics", "image_resolution_y_px")
-    focal_mm = known.above_zero("intrinsics", "focal_length_mm")
-    baseline_mm = known.above_zero("extrinsics", "baseline_mm")
-    pixel_mm = known.above_zero("intrinsics", "sensor_size_mm") / max(width, height)
-    focus_m = known.number("extrinsics", "focus_distance_m")
-    disparities = known.number("meta", "disp_min", math.nan), known.number("meta", "disp_max", math.nan)
+    rows, cols = known.count("num_cams_y"), known.count("num_cams_x")
+    height, width = known.count("image_resolution_y_px"), known.count("image_resolution_x_px")
+    focal_mm, baseline_mm = (known.number(name, LEAST_MM) for name in ("focal_length_mm", "baseline_mm"))
+    pixel_mm = known.number("sensor_size_mm", LEAST_MM) / max(width, height)
+    focus_m = known.number("focus_distance_m")
+    # A missing end, or nan as exports have it where no depths are known, says nothing.
+    disparities = [
+        math.nan if known.texts.get(name, "nan").lower() == "nan" else known.number(name, -math.inf)
+        for name in ("disp_min", "disp_max")
+    ]
     parallax_px_mm = focal_mm * baseline_mm / pixel_mm
     shear = parallax_px_mm / (1000 * focus_m) if 0 < focus_m < INFINITY_M else 0.0
     optics = Optics(
@@ -104,8 +108,9 @@ def import_hci(
     unused = sorted(files - {PARAMETERS, *maps[:1]})
     if unused:
         tell(f"not used: {listed_names(unused)}")
-    if known.unused():
-        tell(f"not used of {PARAMETERS}: {listed_names(known.unused())}")
+    names = [name for name in known.texts if name not in ("disp_min", "disp_max")]
+    if names:
+        tell(f"not used of {PARAMETERS}: {listed_names(names)}")
     return HciScene(views, truth, z_range)
 
 
@@ -128,45 +133,33 @@ def _map(path: Path, shape: tuple[int, int]) -> np.ndarray:
 
 
 class _Parameters:
-    """The numbers of a parameters.cfg, and which of them were read."""
+    """The numbers of a parameters.cfg; `texts` are those by name that were not read."""
 
     def __init__(self, path: Path) -> None:
-        text = read_small(path, LARGEST_PARAMETERS_BYTES, "the benchmark's folders have it")
-        self.path = path
-        self.parser = configparser.ConfigParser(interpolation=None, strict=False)
-        self.read_names: set[tuple[str, str]] = set()
+        content = read_small(path, LARGEST_PARAMETERS_BYTES, "the benchmark's folders have it")
+        parser = configparser.ConfigParser(interpolation=None, strict=False)
         try:
-            self.parser.read_string(text.decode("utf-8-sig"))
+            parser.read_string(content.decode("utf-8-sig"))
         except (configparser.Error, UnicodeDecodeError) as fault:
             sentence = visible(" ".join(str(fault).split()))
             raise InputError(f"{path}: not a file of parameters ({sentence})") from None
+        self.path = path
+        self.texts = {name: text for section in parser.sections() for name, text in parser[section].items()}
 
-    def number(self, section: str, name: str, default: float | None = None) -> float:
-        self.read_names.add((section, name))
-        value = self.parser.get(section, name, fallback=None)
-        if value is None and default is not None:
-            return default
+    def number(self, name: str, least: float = 0.0, *, is_whole: bool = False) -> float:
+        """A number of at least `least`."""
+        text = self.texts.pop(name, "nothing")
         try:
-            number = float(value or "")
+            number = float(text)
         except ValueError:
             number = math.nan
-        if not math.isfinite(number) and default is None:
-            raise InputError(f"{self.path}: [{section}] {name}: expected a number, got {visible(str(value))}")
+        if not least <= number < math.inf or (is_whole and number != int(number)):
+            kind = "whole number" if is_whole else "number"
+            raise InputError(
+                f"{self.path}: {name}: expected a {kind} of at least {least:g}, got {visible(text)}"
+            )
         return number
 
-    def above_zero(self, section: str, name: str) -> float:
-        number = self.number(section, name)
-        if number <= 0:
-            raise InputError(f"{self.path}: [{section}] {name}: expected a number above 0, got {number:g}")
-        return number
-
-    def whole(self, section: str, name: str) -> int:
-        number = self.above_zero(section, name)
-        if number != int(number):
-            raise InputError(f"{self.path}: [{section}] {name}: expected a whole number, got {number:g}")
-        return int(number)
-
-    def unused(self) -> list[str]:
-        """Names of parameters that were not read."""
-        names = [(section, name) for section in self.parser.sections() for name in self.parser[section]]
-        return [name for section, name in names if (section, name) not in self.read_names]
+    def count(self, name: str) -> int:
+        """A whole number of at least 1."""
+        return int(self.number(name, 1, is_whole=True))

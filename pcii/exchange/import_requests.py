@@ -48,24 +48,15 @@ class Cameras:
 
     def optics(self) -> Optics:
         """The cameras' optics; `InputError` if a length is missing."""
-        size = self.sensor_mm if self.pixel_mm is None else self.pixel_mm
-        lengths = {
-            "--pitch-mm": self.pitch_mm,
-            "--focal-mm": self.focal_mm,
-            "--sensor-mm or --pixel-mm": size,
-        }
-        missing = [name for name, value in lengths.items() if value is None]
-        if self.pitch_mm is None or self.focal_mm is None or size is None:
-            raise InputError(
-                f"{', '.join(missing)}: missing; cameras need pitch, focal length and pixel size"
-            )
-        return Optics(
-            pitch_mm=self.pitch_mm,
-            focal_mm=self.focal_mm,
-            sensor_mm=self.sensor_mm,
-            pixel_mm=self.pixel_mm,
-            shear_px=self.shear_px or (0.0, 0.0),
-        )
+        options = values_of(_part(Cameras, self))
+        lengths = {name: value for name, value in options.items() if value is not None}
+        sides = lengths.keys() & {"sensor_mm", "pixel_mm"}
+        missing = [f"--{name.replace('_', '-')}" for name in ("pitch_mm", "focal_mm") if name not in lengths]
+        missing += ["--sensor-mm or --pixel-mm"] * (not sides)
+        if missing:
+            names = ", ".join(missing)
+            raise InputError(f"{names}: missing; cameras need pitch, focal length and pixel size")
+        return Optics(**lengths)
 
 
 @dataclass(frozen=True, kw_only=True)
