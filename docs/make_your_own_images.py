@@ -82,13 +82,13 @@ def main(folder: Path) -> None:
     write_png(folder / "lenses.png", np.vstack([np.hstack(row) for row in tiles]))
 
     views = pcii.import_images(folder / "photos", "{col}_{row}.png", optics)
-    z_mm = pcii.check_grid(lambda k, l: views.view(k, l).mean(axis=2), views.grid, (30, 200)).z_mm
+    z_mm = pcii.check_grid(views, (30, 200)).z_mm
     counts = pcii.limit_photons(views, 1000, seed=1, cfa="GRBG")
     focus = pcii.segment(counts, z_mm)
     array = pcii.LensArray(rows=12, cols=12, pitch_px=(60, 60), inverted=True)
     close = pcii.Optics(pitch_mm=(0.6, 0.6), focal_mm=0.8, pixel_mm=0.01)
     lenses = pcii.import_lens_array(folder / "lenses.png", array, close)
-    z_near = pcii.check_grid(lambda k, l: lenses.view(k, l).mean(axis=2), lenses.grid, (7, 60)).z_mm[:2]
+    z_near = pcii.check_grid(lenses, (7, 60)).z_mm[:2]
     part = plt.imread(folder / "lenses.png")[300:420, 300:420]
     shown = [(f"photographs, {z:.3g} mm", image) for z, image in sections(views, z_mm)]
     shown += [(f"1000 photons each, {z:.3g} mm", image) for z, image in sections(counts, z_mm, 8)]

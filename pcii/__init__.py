@@ -17,15 +17,12 @@ from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
+from pcii.exchange.camera_fit import check_grid
+from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.export_formats import export_dataset
-from pcii.importing.array_files import import_arrays
-from pcii.importing.camera_order import Optics, ViewOrder
-from pcii.importing.count_frames import import_counts
-from pcii.importing.exported_files import import_exported
-from pcii.importing.grid_check import check_grid
-from pcii.importing.hci_scenes import import_hci
-from pcii.importing.image_folders import import_images
-from pcii.importing.lens_arrays import LensArray, import_lens_array
+from pcii.exchange.hci_scenes import import_hci
+from pcii.exchange.image_folders import Optics, ViewOrder, import_images
+from pcii.exchange.lens_arrays import LensArray, import_lens_array
 from pcii.io.collection import Collection, open_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.io.dataset_writer import save_dataset
@@ -62,7 +59,6 @@ __all__ = [
     "export_dataset",
     "import_arrays",
     "import_counts",
-    "import_exported",
     "import_hci",
     "import_images",
     "import_lens_array",

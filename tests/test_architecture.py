@@ -17,18 +17,13 @@ ROOMS = {
         "base",
         "store",
         "imaging",
-        "pictures",
         "figures",
         "core",
         "io",
-        "transforms",
-        "frames",
         "sections",
-        "exporting",
         "exchange",
         "evidence",
         "depth",
-        "importing",
         "removal.three_step",
         "removal.likelihood",
         "removal",
@@ -58,12 +53,13 @@ ROOMS = {
 # What simgen may share with pcii: store of files, image tools, types, masks, file formats and how commands
 # behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
 # mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "store", "imaging", "pictures", "figures", "core", "io", "exporting", "exchange"}
+SHARED_ROOMS = {"base", "store", "imaging", "figures", "core", "io", "exchange"}
 NOT_SHARED = {
     "pcii.core.estimates",
     "pcii.core.focal_planes",
     "pcii.core.geometry",
     "pcii.core.section_stack",
+    "pcii.exchange.camera_fit",
     "pcii.io.suggested_depths",
 }
 MOST_FILES, FEWEST_FILES = 14, 2

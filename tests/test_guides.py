@@ -16,7 +16,7 @@ from tiny import TINY_RECIPE
 
 import pcii
 import simgen
-from pcii.exporting.dataset_card import Terms, write_card
+from pcii.exchange.dataset_card import Terms, write_card
 from pcii.figures.pictures import write_png
 from pcii.io.sample_dataset import copy_sample
 from simgen.spec.recipe import Recipe, override

@@ -1,8 +1,8 @@
-"""The command `pcii import`: images made by others become a dataset; and its options."""
+"""The command `pcii import`: images made by others become a dataset."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -14,138 +14,19 @@ from pcii.core.arrays import check_z_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_limit import check_photons, limit_photons
-from pcii.importing.camera_order import Optics
-from pcii.importing.import_advice import checked
-from pcii.importing.import_requests import Imported, Request, ViewOptions, WholePair, read
-from pcii.importing.lens_arrays import LensArray
-from pcii.importing.light_encoding import Encoding, check_encoding
-from pcii.io.dataset import Dataset
+from pcii.exchange.camera_fit import CameraFit, check_grid
+from pcii.exchange.image_folders import ViewOrder
+from pcii.exchange.import_requests import Cameras, Lenses, Light, Pair, Source, WholePair, read, values_of
 from pcii.io.dataset_writer import check_depth_range, held_dataset, save_dataset
-from pcii.transforms.film_sizes import FilmSize
-from pcii.transforms.transforms_file import TRANSFORMS
 
-Pair = tuple[float, float] | None
+FLAT = Parameter(name="*")
+CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), Light()
 
 
-@Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class LensOptions:
-    """Where lenses are in a picture of a lens array."""
-
-    lens_array: WholePair = None
-    """Rows and columns of lenses whose images one picture holds side by side."""
-    lens_pitch_px: Pair = None
-    """Distance from lens to lens in the picture, x and y; need not be whole."""
-    lens_offset_px: Pair = None
-    """Left upper corner of the first lens image, x and y. Default: 0 0."""
-    inverted: bool = False
-    """Each lens image is upside down, as a sensor right behind the lenses sees it."""
-
-    def lenses(self) -> LensArray | None:
-        """The lens array; None if there is none. `InputError` if only a part of it is said."""
-        if self.lens_array is None:
-            if self != LensOptions():
-                raise InputError("--lens-pitch-px, --lens-offset-px, --inverted: are for --lens-array")
-            return None
-        if self.lens_pitch_px is None:
-            raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
-        return LensArray(
-            rows=self.lens_array[0],
-            cols=self.lens_array[1],
-            pitch_px=self.lens_pitch_px,
-            offset_px=self.lens_offset_px or (0.0, 0.0),
-            inverted=self.inverted,
-        )
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class CameraOptions:
-    """Where cameras stand and how they see."""
-
-    pitch_mm: Pair = None
-    """Distance between neighbouring cameras, x and y. Of a lens array: its lens pitch in pixels, by
-    default."""
-    focal_mm: float | None = None
-    """Focal length: from the pinhole to the sensor."""
-    sensor_mm: float | None = None
-    """Width of the sensor that a whole picture shows."""
-    pixel_mm: float | None = None
-    """Side of a pixel, instead of --sensor-mm."""
-    shear_px: Pair = None
-    """Disparity, x and y, that was taken out of the pictures of a converging grid."""
-
-    def film(self) -> FilmSize | None:
-        """The one length that is said beside a transforms.json; `InputError` for what that tells itself."""
-        if self.pitch_mm is not None or self.shear_px is not None:
-            raise InputError(
-                f"--pitch-mm, --shear-px: {TRANSFORMS} tells where cameras are; leave them out, or give "
-                "--pattern"
-            )
-        if self.focal_mm is None and self.sensor_mm is None and self.pixel_mm is None:
-            return None
-        return FilmSize(focal_mm=self.focal_mm, sensor_mm=self.sensor_mm, pixel_mm=self.pixel_mm)
-
-    def optics(self, lenses: LensArray | None) -> Optics | None:
-        """The cameras' optics; None if nothing is said of them. `InputError` if only a part is."""
-        pitch_mm, pixel_mm = self.pitch_mm, self.pixel_mm
-        if lenses is not None and pitch_mm is None and pixel_mm is not None:
-            pitch_mm = lenses.pitch_px[0] * pixel_mm, lenses.pitch_px[1] * pixel_mm
-        size = self.sensor_mm if pixel_mm is None else pixel_mm
-        needed = {"--pitch-mm": pitch_mm, "--focal-mm": self.focal_mm, "--sensor-mm or --pixel-mm": size}
-        missing = [name for name, value in needed.items() if value is None]
-        if len(missing) == len(needed) and self.shear_px is None:
-            return None
-        if missing or pitch_mm is None or self.focal_mm is None:
-            raise InputError(
-                f"{', '.join(missing)}: missing; cameras need pitch, focal length and pixel size"
-            )
-        return Optics(
-            pitch_mm=pitch_mm,
-            focal_mm=self.focal_mm,
-            sensor_mm=self.sensor_mm,
-            pixel_mm=pixel_mm,
-            shear_px=self.shear_px or (0.0, 0.0),
-        )
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class LightOptions:
-    """How numbers tell light, and how many photons are drawn."""
-
-    srgb: bool = False
-    """Numbers are sRGB: the default for whole numbers in pictures."""
-    linear: bool = False
-    """Numbers are proportional to light: the default for floats."""
-    gamma: float | None = None
-    """Light is the number (from 0 to 1) to the power of this."""
-    cfa: str | None = None
-    """Bayer pattern: GRBG, RGGB, BGGR or GBRG. Of RGB pictures each pixel keeps one colour; grey ones are
-    mosaics already."""
-    photons: float | None = None
-    """Draw photon counts with so many expected in each view."""
-    seed: int = 1
-    """Seed of these counts."""
-
-    def encoding(self) -> Encoding | None:
-        """How numbers tell light; None for the usual way. `InputError` if two ways are said."""
-        if self.srgb + self.linear + (self.gamma is not None) > 1:
-            raise InputError("--srgb, --linear, --gamma: give one of them")
-        check_encoding(self.gamma)
-        return "srgb" if self.srgb else "linear" if self.linear else self.gamma
-
-
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class DatasetOptions:
+class Texts:
     """What the dataset says of itself."""
 
-    z_mm: Depths = ()
-    """Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: where
-    things are sharpest."""
-    z_range_mm: Pair = None
-    """Nearest and farthest depth of the scene in mm, kept as a suggestion."""
     title: str | None = None
     """Title of reports."""
     licence: str | None = None
@@ -154,33 +35,35 @@ class DatasetOptions:
     """Whom to cite for the images."""
 
 
-@Parameter(name="*")
-@dataclass(frozen=True, kw_only=True)
-class ImportOptions:
-    """All that can be said of images made by others."""
-
-    views: Annotated[ViewOptions, Parameter(name="*")] = field(default_factory=ViewOptions)
-    cameras: CameraOptions = CameraOptions()
-    lenses: LensOptions = LensOptions()
-    light: LightOptions = LightOptions()
-    dataset: DatasetOptions = DatasetOptions()
-
-    def request(self, source: Path) -> Request:
-        """What is asked of a source; raises `InputError` for what is said by half."""
-        lenses, light = self.lenses.lenses(), self.light
-        asked = Request(source, self.views, None, lenses, light.encoding(), light.cfa)
-        if asked.transforms is not None:
-            return replace(asked, film=self.cameras.film())
-        return replace(asked, optics=self.cameras.optics(lenses))
+TEXTS = Texts()
 
 
-NOTHING_SAID = ImportOptions()
-
-
-def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_SAID) -> None:
+def import_dataset(
+    source: Path,
+    *,
+    out: Out,
+    pattern: str | None = None,
+    grid: WholePair = None,
+    array: str | None = None,
+    counts: bool = False,
+    bitpack: bool = False,
+    width: int | None = None,
+    frames: WholePair = None,
+    cameras: Annotated[Cameras, FLAT] = CAMERAS,
+    order: Annotated[ViewOrder, FLAT] = ORDER,
+    lenses: Annotated[Lenses, FLAT] = LENSES,
+    light: Annotated[Light, FLAT] = LIGHT,
+    cfa: str | None = None,
+    photons: float | None = None,
+    seed: int = 1,
+    z_mm: Depths = (),
+    z_range_mm: Pair = None,
+    texts: Annotated[Texts, FLAT] = TEXTS,
+) -> None:
     """Make a dataset of images that others made: pictures, arrays, lens arrays, photon counts.
 
-    Says at which depths things are sharpest, and warns if the views fit together better in another order.
+    Says at which depths things are sharpest, and warns if the views fit together better in another order or
+    with a shift.
 
     Examples of use:
 
@@ -199,66 +82,145 @@ def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_S
     source
         A folder of pictures, a TIFF file with a page for each view, a folder of the HCI 4D light field
         benchmark, pictures or photon cubes with a transforms.json, a picture of a lens array, an array in a
-        .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W); or events.npz or
-        views.exr of `simgen export`, which need no options.
+        .npy or .npz file: (K, L, H, W), (K, L, H, W, C), or with --counts (K, L, N, H, W).
     out
         Folder for the dataset: new or empty.
+    pattern
+        Names of the files of a folder, with {row} and {col}, or with {index} that counts along the rows; *
+        stands for any text.
+    grid
+        Rows and columns of cameras, for {index}, for pages, and for arrays whose first axis counts the views.
+        Default: square.
+    array
+        Name of the array in an .npz file that has several.
+    counts
+        The files hold photon counts; pages of the TIFF file of a view are frames, which are added up.
+    bitpack
+        Frames in .npy files are of bits, packed along the width as numpy.packbits does.
+    width
+        Pixels in a row of packed frames. Default: all bits.
+    frames
+        First and last frame to add up, counted from 0. Default: all.
+    cfa
+        Bayer pattern: GRBG, RGGB, BGGR or GBRG; none for a sensor without colours. Of RGB pictures each pixel
+        keeps one colour; grey ones are mosaics already.
+    photons
+        Draw photon counts with so many expected in each view.
+    seed
+        Seed of these counts.
+    z_mm
+        Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: where
+        things are sharpest.
+    z_range_mm
+        Nearest and farthest depth of the scene in mm, kept as a suggestion.
     """
-    asked, photons, said = options.request(source), options.light.photons, options.dataset
-    depths = check_z_mm(said.z_mm).tolist() if said.z_mm else None
-    if said.z_range_mm is not None:
-        check_depth_range(said.z_range_mm)
+    depths = check_z_mm(z_mm).tolist() if z_mm else None
+    if z_range_mm is not None:
+        check_depth_range(z_range_mm)
     if photons is not None:
         check_photons(photons)
-        if asked.views.counts:
-            raise InputError("--photons: is for pictures; these are photon counts already")
+    options: dict[str, Any] = {
+        "pattern": pattern,
+        "grid": grid,
+        "array": array,
+        "counts": counts,
+        "bitpack": bitpack,
+        "width": width,
+        "frames": frames,
+        "cfa": None if cfa is not None and cfa.lower() == "none" else cfa,
+    }
+    for group in (cameras, order, lenses, light):
+        options |= values_of(group)
     held_dataset(out, None, content=False)
+    notes: list[str] = []
     with Stages() as report:
-        imported = read(asked, report)
-        given, drawn = _with_photons(source, imported, photons, options.light.seed)
-        z_range = said.z_range_mm or imported.z_range_mm
-        sharp, warning = checked(imported, asked, z_range)
+        imported = read(Source(source, report, notes.append), options)
+        images: list[Views | PhotonCounts] = [imported.images]
+        drawn = ""
+        if photons is not None:
+            if isinstance(imported.images, PhotonCounts):
+                raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
+            images.append(limit_photons(imported.images, photons, seed=seed))
+            drawn = f"; {photons:g} photons expected in each view, seed {seed}"
+        z_range = z_range_mm or imported.z_range_mm
+        fit = check_grid(imported.images, z_range, order=order, counted=imported.counted)
         dataset = save_dataset(
             out,
-            given,
+            images,
             imported.truth,
             view_z_mm=imported.view_z_mm,
-            z_mm=depths or imported.z_mm or [float(f"{z:.3g}") for z in sharp] or None,
+            z_mm=depths or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
-            photon_budget=photons or imported.photon_budget,
-            radiance_unit=imported.radiance_unit,
-            title=said.title or source.resolve().name,
-            licence=said.licence,
-            citation=said.citation,
+            photon_budget=photons,
+            title=texts.title or source.resolve().name,
+            licence=texts.licence,
+            citation=texts.citation,
             origin=imported.origin + drawn,
         )
-    _say_what_came_in(dataset, imported, drawn, sharp)
-    if warning is not None:
-        answer(f"warning: {warning}; then delete {out} and import again")
-    else:
-        if not sharp and not imported.z_mm:
-            say("nothing is clearly sharp at any depth that was looked at")
-        say_next("pcii", "run", out, "-o", results_folder(out))
-
-
-def _with_photons(
-    source: Path, imported: Imported, photons: float | None, seed: int
-) -> tuple[list[Views | PhotonCounts], str]:
-    """Images and those beside them, with photon counts drawn of views if asked for, and a note of that."""
-    given = [imported.images, *imported.beside]
-    if photons is None:
-        return given, ""
-    if any(isinstance(one, PhotonCounts) for one in given):
-        raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
-    counts = [limit_photons(one, photons, seed=seed) for one in given if isinstance(one, Views)]
-    return [*given, *counts], f"; {photons:g} photons expected in each view, seed {seed}"
-
-
-def _say_what_came_in(dataset: Dataset, imported: Imported, drawn: str, sharp: tuple[float, ...]) -> None:
     K, L, H, W = dataset.grid.shape_KLHW
-    pattern = dataset.cfa or "no"
-    say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {pattern} Bayer pattern; {imported.origin}{drawn}")
-    for note in imported.notes:
-        say(note)
-    if sharp:
-        say(f"sharpest at {', '.join(f'{z:.3g}' for z in sharp)} mm")
+    bayer = dataset.cfa or "no"
+    say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {bayer} Bayer pattern; {imported.origin}{drawn}")
+    for note in notes:
+        (answer if note.startswith("warning") else say)(note)
+    advice = None if imported.states_cameras else _advice(fit, imported.images, order, lenses)
+    if advice is not None:
+        answer(f"warning: {advice}; then delete {out} and import again")
+        return
+    _say_depths(fit, imported.images)
+    say_next("pcii", "run", out, "-o", results_folder(out))
+
+
+def _advice(fit: CameraFit, images: Views | PhotonCounts, order: ViewOrder, lenses: Lenses) -> str | None:
+    """What would make the views fit the cameras, in words of options; None if they do."""
+    sentences = []
+    if fit.order is not None:
+        changed = {n: value for n, value in values_of(fit.order).items() if value != getattr(order, n)}
+        if (
+            lenses.lens_array is not None
+            and set(changed) == {"flip_rows", "flip_cols"}
+            and order == ViewOrder()
+        ):
+            changed = {"inverted": not lenses.inverted}
+        flags = {
+            value: [f"--{n.replace('_', '-')}" for n, v in changed.items() if v is value]
+            for value in (True, False)
+        }
+        words = [f"with {' '.join(flags[True])}"] * bool(flags[True])
+        words += [f"without {' '.join(flags[False])}"] * bool(flags[False])
+        sentences.append(f"the views fit together far better {' and '.join(words)}")
+        if set(changed) == {"flip_rows", "flip_cols"}:
+            sentences.append("or, if pictures were shifted so that something stands still, with --shear-px")
+    if fit.shear_px is not None:
+        x, y = fit.shear_px
+        sentences.append(
+            "things are sharp at disparities below 0, as of pictures that were shifted so that something "
+            f"stands still: give that shift as --shear-px; {x:g} {y:g} or more brings all in front"
+        )
+    if fit.outside_mm is not None:
+        sentences.append(
+            f"most is sharp at about {_three_digits(fit.outside_mm)} mm, outside of --z-range-mm; correct "
+            "--pitch-mm, --focal-mm or the size of pixels, or the range"
+        )
+    return "; ".join(sentences) or None
+
+
+def _say_depths(fit: CameraFit, images: Views | PhotonCounts) -> None:
+    """Say where things are sharp; where nothing is, what was looked at and the next step."""
+    is_counts = isinstance(images, PhotonCounts)
+    if fit.z_mm:
+        say(f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm")
+    elif fit.nearest_mm is None:
+        why = "photons are too few" if is_counts else "there is one view, or views are too small"
+        say(f"cannot judge whether views fit their cameras: {why}; name depths to `pcii run` by --z-mm")
+    else:
+        why = "if photons are not too few" if is_counts else "if there is texture"
+        say(
+            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; {why}, correct "
+            "the order of views, --pitch-mm, --focal-mm or the size of pixels, else name depths to `pcii "
+            "run` by --z-mm"
+        )
+
+
+def _three_digits(z_mm: float) -> str:
+    """A depth without an exponent: 1870, not 1.87e+03."""
+    return f"{float(f'{z_mm:.3g}'):g}"

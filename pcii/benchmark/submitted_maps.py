@@ -17,9 +17,9 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.core.estimates import DepthMap
+from pcii.exchange.pixel_files import decode, picture_of
 from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
 from pcii.io.suggested_depths import planes_of
-from pcii.pictures.picture_files import decode, picture_of
 
 DEPTH_FILES = ("depth.npz", "depth.pfm", "depth.exr")
 CONFIDENCE_FILES = ("confidence.pfm", "confidence.exr")

@@ -1,27 +1,48 @@
-"""The formats that datasets can be written in, by name, and the folder that is written."""
+"""The formats that datasets are written in, by name; and those of single photons: events and photon cubes.
 
+    03_04/frames.npy        uint8 (T, H, ceil(W / 8)) of the camera of row 3, column 4
+    03_04/transforms.json   the same as a dataset of visionsim (NPY): a pose for each of the T frames
+    transforms.json         all cameras, and the grid: see `export_pictures`
+
+Bits of a photon cube are packed along the width, the first pixel in the highest bit, as numpy.packbits does;
+bits beyond the last pixel are 0. Blocks of a file without a set bit are not written: they are holes, which
+read as zeros and take no room on the disk.
+"""
+
+import itertools
+import json
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+
+import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
+from pcii.core.photon_events import FrameEvents
+from pcii.core.truth import OPTIONAL_MAPS, Truth
 from pcii.exchange.export_hci import write_hci
-from pcii.exchange.export_photons import write_events, write_photon_cubes
-from pcii.exchange.export_pictures import write_nerfstudio
+from pcii.exchange.export_pictures import (
+    TRANSFORMS,
+    frames_of,
+    intrinsics_of,
+    principal_points_px,
+    view_name,
+    write_nerfstudio,
+)
 from pcii.io.collection import Collection, open_collection
 from pcii.io.collection_layout import is_collection
 from pcii.io.dataset import Dataset, open_dataset
 from pcii.store.folder_kind import check_free
-from pcii.store.safe_files import named_in_errors, new_folder_safely
+from pcii.store.safe_files import json_bytes, named_in_errors, new_folder_safely
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events"]
-WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
-    "hci": write_hci,
-    "nerfstudio": write_nerfstudio,
-    "photoncube": write_photon_cubes,
-    "events": write_events,
-}
+ARCHIVE = "events.npz"
+FRAMES = "frames.npy"
+BLOCK_BYTES = 4096
+"""Size of the blocks of a file system, which take room as a whole. A larger one would fill holes with zeros,
+a smaller one would only write more often."""
 
 
 def export_dataset(
@@ -68,3 +89,117 @@ def export_dataset(
             write(one, place)
             report("datasets", number, len(dataset))
     return folder
+
+
+def write_events(dataset: Dataset, folder: Path) -> None:
+    """Write `events.npz`, whose arrays need no pickle.
+
+    `k`, `l`, `i`, `j`, `n` (events,); `frames`, `bits` and `frame` (photons,) of a camera that has frames, if
+    they are known; each field of the `CameraGrid` by its name; `cfa`, "" for monochrome.
+    Where known, `analysis_z_mm` (planes,), `analysis_z_range_mm` (near, far) and `photon_budget`; and
+    `truth_...` (H, W) maps of the virtual centre with `object_keys` and `object_names`, and
+    `photon_object_id`, `photon_z_mm` (photons,), photon by photon in the events' order.
+    """
+    counts = dataset.counts
+    values = {name: getattr(counts.events, name) for name in "klijn"}
+    values |= asdict(dataset.grid) | {"cfa": dataset.cfa or ""}
+    if not counts.readout.is_plain:
+        values |= asdict(counts.readout)
+    values["frame"] = counts.frame
+    for name in ("z_mm", "z_range_mm"):
+        values[f"analysis_{name}"] = dataset.analysis.get(name) or None
+    values["photon_budget"] = dataset.photon_budget or None
+    if dataset.truth is not None:
+        values |= _truth_arrays(dataset.truth)
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in values.items() if value is not None}
+    np.savez_compressed(folder / ARCHIVE, **arrays)
+
+
+def _truth_arrays(truth: Truth) -> dict[str, np.ndarray | None]:
+    arrays = {f"truth_{name}": getattr(truth, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
+    arrays["object_keys"] = np.array(list(truth.names), dtype=np.int64)
+    arrays["object_names"] = np.array(list(truth.names.values()), dtype=np.str_)
+    if truth.photons is not None:
+        arrays["photon_object_id"] = truth.photons.object_id
+        arrays["photon_z_mm"] = truth.photons.z_mm
+    return arrays
+
+
+def write_photon_cubes(dataset: Dataset, folder: Path) -> None:
+    """Write a folder for each view, and what all have in common; memory grows with the photons alone.
+
+    Raises `InputError` for counts that are not of one bit, and for frames that the dataset did not keep.
+    """
+    events, frame_count = _binary_frames(dataset)
+    grid = dataset.grid
+    intrinsics, poses = intrinsics_of(dataset), frames_of(dataset)
+    principal_points = principal_points_px(dataset).reshape(-1, 2).tolist()
+    lens = {name: intrinsics[name] for name in ("fl_x", "fl_y", "w", "h")}
+    packing = {"c": 1, "cfa": dataset.cfa, "bitpack": True, "bitpack_dim": 2}
+    shape = (frame_count, grid.height, grid.width)
+    camera = events.k.astype(np.int64) * grid.cols + events.l
+    starts = np.searchsorted(camera, np.arange(grid.view_count + 1))
+    frames = []
+    for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
+        view = folder / view_name(grid, k, l)
+        view.mkdir()
+        photons = slice(starts[number], starts[number + 1])
+        _write_frames(view / FRAMES, shape, events.frame[photons], events.i[photons], events.j[photons])
+        x, y = principal_points[number]
+        pose = {"transform_matrix": poses[number]["transform_matrix"]}
+        alone = lens | {"cx": x, "cy": y} | packing | {"file_path": FRAMES, "frames": [pose] * frame_count}
+        (view / TRANSFORMS).write_text(json.dumps(alone, allow_nan=False) + "\n")
+        frames.append({"file_path": f"{view.name}/{FRAMES}"} | poses[number])
+    document = intrinsics | packing | {"num_frames": frame_count}
+    if dataset.photon_budget is not None:
+        document["photon_budget"] = float(dataset.photon_budget)
+    (folder / TRANSFORMS).write_bytes(json_bytes(document | {"frames": frames}))
+
+
+def _binary_frames(dataset: Dataset) -> tuple[FrameEvents, int]:
+    """The single counts in the order of the views, and the number of frames."""
+    readout = dataset.counts.readout
+    if readout.bits != 1:
+        limit = "no limit" if readout.bits is None else f"{readout.bits} bits a frame"
+        raise InputError(f"{dataset.path}: its counts have {limit}, and a photon cube has frames of one bit")
+    events = dataset.counts.frame_events
+    if events is None:
+        raise InputError(
+            f"{dataset.path}: has sums of {readout.frames} frames, which were not kept; generate it with "
+            "products.frames = true"
+        )
+    return events, readout.frames
+
+
+def _write_frames(
+    path: Path, shape: tuple[int, int, int], frame: np.ndarray, i: np.ndarray, j: np.ndarray
+) -> None:
+    """Write frames (T, H, W) in which the pixels (i, j) of `frame` are set, block by block.
+
+    Not through a memory map, in which a full disk ends the process without a word.
+    """
+    frame_count, height, width = shape
+    row_bytes = -(-width // 8)
+    with path.open("wb") as file:
+        header = {"descr": "|u1", "fortran_order": False, "shape": (frame_count, height, row_bytes)}
+        np.lib.format.write_array_header_1_0(file, header)
+        begin = file.tell()
+        position = begin + (frame.astype(np.int64) * height + i) * row_bytes + j // 8
+        order = np.argsort(position, kind="stable")
+        position, bit = position[order], (128 >> (j[order] % 8)).astype(np.uint8)
+        block_starts = np.flatnonzero(np.diff(position // BLOCK_BYTES, prepend=-1)).tolist()
+        for low, high in itertools.pairwise([*block_starts, position.size]):
+            start = max(int(position[low]) // BLOCK_BYTES * BLOCK_BYTES, begin)
+            block = np.zeros(BLOCK_BYTES - start % BLOCK_BYTES, np.uint8)
+            np.bitwise_or.at(block, position[low:high] - start, bit[low:high])
+            file.seek(start)
+            file.write(block.data)
+        file.truncate(begin + frame_count * height * row_bytes)
+
+
+WRITERS: dict[Format, Callable[[Dataset, Path], None]] = {
+    "hci": write_hci,
+    "nerfstudio": write_nerfstudio,
+    "photoncube": write_photon_cubes,
+    "events": write_events,
+}

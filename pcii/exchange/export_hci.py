@@ -22,9 +22,8 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
-from pcii.exchange.export_pictures import pictures_of
+from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
 from pcii.io.dataset import Dataset
-from pcii.pictures.written_pixels import write_pfm, write_png
 
 PARAMETERS = "parameters.cfg"
 README = "README.txt"

@@ -14,7 +14,7 @@ from pydantic import BaseModel
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from pcii.pictures.picture_files import decode, kind_of, picture_of
+from pcii.exchange.pixel_files import decode, kind_of, picture_of
 from simgen.assets.triangles import Triangles, fan_all
 from simgen.base.file_lookup import EnvironmentName, ImageName, MeshName, asset, named_files
 from simgen.base.strict_models import shorten

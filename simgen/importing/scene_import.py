@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pcii.base.errors import InputError
-from pcii.pictures.written_pixels import write_png
+from pcii.exchange.export_pictures import write_png
 from pcii.store.safe_files import new_folder_safely
 from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
-from pcii.exporting.dataset_card import Terms
+from pcii.exchange.dataset_card import Terms
 from simgen.base.file_lookup import find, recipe_roots
 from simgen.base.strict_models import (
     LARGEST_MM,

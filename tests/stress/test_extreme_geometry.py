@@ -148,20 +148,17 @@ def test_numbers_of_numpy_s_small_types_do_not_overflow() -> None:
 @pytest.mark.parametrize("z_range_mm", [(0.0, 900.0), (-5.0, 900.0), (900.0, 300.0), (np.nan, 900.0)])
 def test_the_check_of_a_grid_refuses_what_is_no_range(z_range_mm: tuple[float, float]) -> None:
     with pytest.raises(pcii.InputError, match=r"^z_range_mm: "):
-        pcii.check_grid(lambda k, l: np.ones((32, 32)), grid_of(3, 3, 32, 32), z_range_mm)
+        pcii.check_grid(pcii.Views(np.ones((3, 3, 32, 32, 1)), grid_of(3, 3, 32, 32)), z_range_mm)
 
 
 @pytest.mark.parametrize("value", [0.0, 5e-324, 1e-40, 1e40, 1.7e308, -1e300])
 def test_the_check_of_a_grid_takes_light_of_any_size(value: float) -> None:
-    texture = np.random.default_rng(4).uniform(0.5, 1.0, (3, 3, 32, 32))
-    found = [
-        pcii.check_grid(lambda k, l, u=unit: texture[k, l] * u, grid_of(3, 3, 32, 32), RANGE_MM)
-        for unit in (value, 1.0)
-    ]
+    texture, grid = np.random.default_rng(4).uniform(0.5, 1.0, (3, 3, 32, 32, 1)), grid_of(3, 3, 32, 32)
+    found = [pcii.check_grid(pcii.Views(texture * unit, grid), RANGE_MM) for unit in (value, 1.0)]
     if value > 1e-300:  # a number of one bit has no texture
         assert found[0] == found[1]
-    with pytest.raises(pcii.InputError, match=r"^view: view \(0, 0\) holds NaN"):
-        pcii.check_grid(lambda k, l: np.full((32, 32), np.nan), grid_of(3, 3, 32, 32))
+    with pytest.raises(pcii.InputError, match=r"^radiance: view \(0, 0\) holds NaN"):
+        pcii.check_grid(pcii.Views(np.full((3, 3, 32, 32, 1), np.nan), grid))
 
 
 @pytest.mark.stress

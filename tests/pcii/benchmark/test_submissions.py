@@ -18,8 +18,8 @@ from pcii.benchmark.benchmark_collection import open_benchmark
 from pcii.benchmark.benchmark_page import KINDS, write_page
 from pcii.benchmark.submission_checks import SUBMISSION
 from pcii.benchmark.submission_scores import run_method, score_submission
+from pcii.exchange.export_pictures import write_pfm, write_png
 from pcii.io.verification import verify
-from pcii.pictures.written_pixels import write_pfm, write_png
 
 pytestmark = pytest.mark.renders
 HALF = "development"

@@ -1,0 +1,404 @@
+"""Pictures and photon cubes with the poses of their cameras, which have to be of one plane grid.
+
+The frames of a transforms.json may be in any order and the rig anywhere in the world: right and down are
+those of the pictures.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
+from pcii.core.camera_grid import CameraGrid
+from pcii.core.images import Views
+from pcii.core.photon_counts import PhotonCounts
+from pcii.core.truth import Truth
+from pcii.exchange.export_pictures import DEPTH_UNIT_M, MM_PER_M
+from pcii.exchange.image_folders import Tell, check_size, headers_of, views_of, warn
+from pcii.exchange.photon_cubes import (
+    binary_counts,
+    check_width,
+    frames_of_files,
+    map_array,
+    span_of_frames,
+)
+from pcii.exchange.pixel_files import Encoding, check_encoding, decode, kind_of, picture_of, radiance_of
+from pcii.exchange.transforms_file import MOST_PX, TransformsFile
+
+MOST_CAMERAS = 1000
+"""All pairs of rows, and of columns, are compared: half a million of a single row."""
+NEAREST_SHARE = 1 / 4
+"""Share of the picture's longer side by which the nearest points that matter move from camera to neighbour:
+what is nearer is seen by at most four cameras of a row. Their depth is focal length in px x pitch /
+(share x side), and a camera that is off by d in its plane moves them by d / pitch x share x side, in px. One
+that is off by d along its axis moves a point r px beside the axis by r d / depth. So a camera may be off by
+so much that this is MOST_PX. One that is turned by an angle moves points at the corners of the picture, r px
+from the axis, by up to angle x (focal length + r^2 / focal length), at any depth."""
+DIGITS = 9
+"""Of lengths that follow from poses: doubles leave more exact, so decimals come back as they were written."""
+USUAL_PIXEL_MM = 0.005
+"""Taken where nothing is known: in the middle of what sensors have, and no depth depends on it."""
+DEPTH_KINDS = ("PNG", "TIFF")
+"""Kinds of pictures of depths: whole numbers of a unit."""
+ROUNDING = 1e-9
+"""Of numbers of poses that are equal: metres, or parts of a rotation."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosedViews:
+    """Radiance of the cameras of a transforms.json, and their depths if the file has them."""
+
+    views: Views
+    view_z_mm: np.ndarray | None = None
+    """Planar depth of every view (K, L, H, W) float32, +inf where nothing is hit."""
+
+    @property
+    def truth(self) -> Truth | None:
+        """Depth of the middle view, which is the virtual centre of an odd grid."""
+        grid = self.views.grid
+        if self.view_z_mm is None or grid.rows % 2 == 0 or grid.cols % 2 == 0:
+            return None
+        middle = self.view_z_mm[grid.rows // 2, grid.cols // 2]
+        return Truth(middle, np.zeros(middle.shape, np.int16), {})
+
+
+@dataclass(frozen=True, eq=False)
+class PoseGrid:
+    """Which frame is which camera, and what poses and principal points tell of the grid.
+
+    An axis with one camera has the pitch of the other; a single camera has 1 mm.
+    """
+
+    numbers: np.ndarray
+    """Number of the frame that is camera (k, l), (K, L) int: rows from the top, columns from the left."""
+    pitch_mm: tuple[float, float]
+    shear_px: tuple[float, float]
+    offset_px: tuple[float, float]
+    """By how much further right and down than the film's middle the axes meet it, of all cameras alike."""
+
+
+def import_posed_pictures(
+    file: TransformsFile,
+    *,
+    focal_mm: float | None = None,
+    pixel_mm: float | None = None,
+    sensor_mm: float | None = None,
+    encoding: Encoding | None = None,
+    cfa: str | None = None,
+    report: Report = silent,
+    tell: Tell = warn,
+) -> PosedViews:
+    """Views, cameras and depths of a transforms.json, whose poses are of one plane grid of parallel cameras.
+
+    The file tells the ratio of focal length and pixel size: one of `focal_mm`, `pixel_mm` and `sensor_mm`
+    says how large the film is. Whole numbers are sRGB and floats linear, unless `encoding` says otherwise;
+    `cfa` is a Bayer pattern, of which grey pictures are mosaics. Raises `InputError`, naming file and member,
+    frame or picture, for what is missing, wrong, or no such grid.
+    """
+    check_encoding(encoding)
+    if file.is_stack:
+        raise InputError(
+            f"{file.path}: file_path: has the pictures of all frames; expected a file_path in each frame"
+        )
+    poses = find_grid(file)
+    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
+    pictures = headers_of(np.array(file.file_paths, object)[poses.numbers], tell=tell)
+    first = pictures[0, 0]
+    if first.shape[:2] != grid.shape_HW:
+        raise InputError(
+            f"{first.path}: is {first.shape[0]} x {first.shape[1]} px, where {file.path.name} says "
+            f"{grid.height} x {grid.width}, rows x columns"
+        )
+    radiance = np.empty((*pictures.shape, *first.shape), np.float32)
+    for done, (camera, picture) in enumerate(np.ndenumerate(pictures), start=1):
+        radiance[camera] = radiance_of(picture, next(decode(picture)), encoding)
+        report("pictures", done, pictures.size)
+    return PosedViews(views_of(radiance, grid, cfa), _depths(file, poses, tell))
+
+
+def import_cubes(
+    file: TransformsFile,
+    *,
+    focal_mm: float | None = None,
+    pixel_mm: float | None = None,
+    sensor_mm: float | None = None,
+    cfa: str | None = None,
+    frames: tuple[int, int] | None = None,
+    report: Report = silent,
+    tell: Tell = warn,
+) -> PhotonCounts:
+    """Photon counts of the photon cubes of a transforms.json that says `bitpack`.
+
+    Of a grid it has a frame for each camera, whose `file_path` is a cube (T, H, W / 8). Of one camera it is a
+    dataset of visionsim: one cube, and a pose for each of its frames, which must be alike. `frames` are the
+    first and the last to add up; `cfa` is the Bayer pattern where the file says none. Raises `InputError`,
+    naming file and member, for cameras that are no grid, and cubes that do not fit what the file says.
+    """
+    document = file.document
+    if document.bitpack_dim != 2 or document.c not in (None, 1):
+        raise InputError(
+            f"{file.path}: bitpack_dim, c: expected 2 and 1: one channel, packed along the width"
+        )
+    if document.cfa not in (None, "none", cfa) and cfa is not None:
+        raise InputError(f"{file.path}: cfa: is {document.cfa}; leave out --cfa")
+    cameras = file
+    if file.is_stack:
+        if np.ptp(file.poses, axis=0).max() + np.ptp(file.centres_px, axis=0).max() > ROUNDING:
+            raise InputError(
+                f"{file.path}: frames: the camera moves from frame to frame, and a moving camera is no grid "
+                "of cameras"
+            )
+        cameras = replace(file, poses=file.poses[:1], centres_px=file.centres_px[:1])
+    poses = find_grid(cameras)
+    grid = camera_grid_of(file, poses, focal_mm, pixel_mm, sensor_mm, tell)
+    stacks = frames_of_files(np.array(file.file_paths, object)[poses.numbers], packed=True)
+    first = stacks[0, 0]
+    if first.height != grid.height:
+        raise InputError(
+            f"{first.name}: is {first.height} px high, where {file.path.name} says {grid.height}"
+        )
+    check_width(first, grid.width, file.path.name)
+    for number in (document.num_frames, len(file.poses) if file.is_stack else None):
+        if number not in (None, first.frames):
+            raise InputError(f"{file.path}: frames: says {number}, and {first.name} has {first.frames}")
+    span = span_of_frames(frames, first.frames, first.name)
+    pattern = cfa if document.cfa in (None, "none") else document.cfa
+    return binary_counts(stacks, grid, span, cfa=pattern, report=report, tell=tell)
+
+
+def camera_grid_of(
+    file: TransformsFile,
+    poses: PoseGrid,
+    focal_mm: float | None,
+    pixel_mm: float | None,
+    sensor_mm: float | None,
+    tell: Tell = warn,
+) -> CameraGrid:
+    """The camera grid in mm: poses give pitch and shear, one length of the film the others.
+
+    Raises `InputError` for more than one length of the film.
+    """
+    lengths = [length for length in (focal_mm, pixel_mm, sensor_mm) if length is not None]
+    if len(lengths) > 1:
+        raise InputError("focal_mm, pixel_mm, sensor_mm: give one of them; the file tells their ratio")
+    if focal_mm is not None:
+        pixel_mm = focal_mm / file.focal_px
+    else:
+        pixel_mm = sensor_mm / file.width if sensor_mm is not None else pixel_mm or USUAL_PIXEL_MM
+        focal_mm = _digits(file.focal_px * pixel_mm)
+    rows, cols = poses.numbers.shape
+    check_size(file.path, (rows, cols, file.height, file.width))
+    grid = CameraGrid(
+        rows=rows,
+        cols=cols,
+        pitch_mm=poses.pitch_mm,
+        focal_mm=focal_mm,
+        pixel_mm=pixel_mm,
+        height=file.height,
+        width=file.width,
+        shear_px=poses.shear_px,
+    )
+    if not lengths:
+        tell(
+            f"focal length and pixel size are not in {file.path.name}: {focal_mm:g} and {pixel_mm:g} mm have "
+            "its ratio, and nothing else of them matters"
+        )
+    if any(poses.offset_px):
+        x, y = poses.offset_px
+        tell(
+            f"the axes of the cameras meet the pictures {x:g} px to the right of their middle and {y:g} px "
+            "below it, alike in all: sections and depth are in the frame of the pictures"
+        )
+    return grid
+
+
+def find_grid(file: TransformsFile) -> PoseGrid:
+    """The grid of the frames of a file, in whichever order they are.
+
+    Raises `InputError` with the frame and by how much it is off: a camera that is turned, or not in its
+    place; a place without a camera, or with two; a principal point that is not linear in the camera's place.
+    """
+    count = len(file.poses)
+    if count > MOST_CAMERAS:
+        raise InputError(f"{file.path}: frames: {count} cameras, and a grid has at most {MOST_CAMERAS}")
+    place_mm = _places_in_common_frame(file)
+    (x0, step_x, cols, col_of), (y0, step_y, rows, row_of) = _lattices(file, place_mm)
+    pitch = step_x or step_y or 1.0, step_y or step_x or 1.0
+    off_mm = np.stack([place_mm[0] - x0 - step_x * col_of, place_mm[1] - y0 - step_y * row_of, place_mm[2]])
+    side_px = max(file.width, file.height)
+    nearest_mm = file.focal_px * min(pitch) / (NEAREST_SHARE * side_px)
+    moved_px = (file.focal_px * np.hypot(*off_mm[:2]) + side_px / 2 * np.abs(off_mm[2])) / nearest_mm
+    worst = int(np.argmax(moved_px))
+    if count > 1 and moved_px[worst] > MOST_PX:
+        right, down, forward = np.round(off_mm[:, worst], 9) + 0.0  # no -0
+        raise InputError(
+            f"{file.path}: {file.frame_name(worst)} is {np.linalg.norm(off_mm[:, worst]):.3g} mm from its "
+            f"place in a plane grid of {rows} x {cols} cameras, {right:.3g} to the right, {down:.3g} down, "
+            f"{forward:.3g} forward; that moves near points by {moved_px[worst]:.2g} px, and {MOST_PX:g} is "
+            "allowed"
+        )
+    numbers = np.full((rows, cols), -1)
+    for number, camera in enumerate(zip(row_of.tolist(), col_of.tolist(), strict=True)):
+        if numbers[camera] >= 0:
+            first, second = file.frame_name(int(numbers[camera])), file.frame_name(number)
+            raise InputError(f"{file.path}: {first} and {second} are at the same place of the grid")
+        numbers[camera] = number
+    lacking = [(int(k), int(l)) for k, l in itertools.islice(np.argwhere(numbers < 0), 1)]
+    if lacking:
+        raise InputError(
+            f"{file.path}: frames: no camera at {lacking[0]} (row from the top, column from the left) of a "
+            f"grid of {rows} x {cols}, where {count} have one; every place of the grid needs a picture"
+        )
+    (shear_x, offset_x), (shear_y, offset_y) = _centres(file, (col_of, row_of), (cols, rows))
+    return PoseGrid(
+        numbers,
+        pitch_mm=(_digits(pitch[0]), _digits(pitch[1])),
+        shear_px=(shear_x, shear_y),
+        offset_px=(offset_x, offset_y),
+    )
+
+
+def _places_in_common_frame(file: TransformsFile) -> np.ndarray:
+    """Places (3, N) in mm to the right, down and forward in the common orientation of the cameras.
+
+    That is the rotation nearest to the median of all matrices, element by element: a few cameras that are
+    turned do not move it, so that the angle told of them is their own.
+    """
+    turns = file.poses[:, :3, :3]
+    left, _, right = np.linalg.svd(np.median(turns, axis=0))
+    common = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    # |A - B| of two rotations is 2 sqrt(2) sin(angle / 2), exact for small angles too.
+    chord = np.linalg.norm(turns - common, axis=(1, 2)) / np.sqrt(8)
+    angle = 2 * np.arcsin(np.minimum(chord, 1))
+    corner_px = np.hypot(file.width, file.height) / 2
+    moved_px = angle * (file.focal_px + corner_px**2 / file.focal_px)
+    worst = int(np.argmax(moved_px))
+    if moved_px[worst] > MOST_PX:
+        limit = np.degrees(angle[worst] * MOST_PX / moved_px[worst])
+        raise InputError(
+            f"{file.path}: {file.frame_name(worst)} is turned by {np.degrees(angle[worst]):.3g} degrees "
+            f"from the common orientation; cameras of a grid are parallel, to {limit:.2g} degrees here"
+        )
+    place_mm = MM_PER_M * (file.poses[:, :3, 3] - np.median(file.poses[:, :3, 3], axis=0))
+    place_mm = (place_mm @ common).T * np.array([[1.0], [-1.0], [-1.0]])
+    place_mm[2] -= np.median(place_mm[2])
+    return place_mm
+
+
+_Lattice = tuple[float, float, int, np.ndarray]
+"""Evenly spaced numbers: the first, the step (0 of one), how many, and which of them each value is."""
+
+
+def _lattices(file: TransformsFile, place_mm: np.ndarray) -> tuple[_Lattice, _Lattice]:
+    """The lattices of columns and of rows; `InputError` if most cameras are at the place of another one."""
+    from scipy.spatial import KDTree
+
+    if place_mm.shape[1] == 1:
+        apart = math.inf
+    else:
+        nearest_mm, _ = KDTree(place_mm[:2].T).query(place_mm[:2].T, k=2)  # the nearest is the camera itself
+        apart = float(np.median(np.asarray(nearest_mm)[:, 1])) / 4
+    if apart == 0:
+        raise InputError(f"{file.path}: frames: most cameras are at the same place as another one")
+    return _lattice_of(place_mm[0], apart), _lattice_of(place_mm[1], apart)
+
+
+def _lattice_of(values: np.ndarray, apart: float) -> _Lattice:
+    """The lattice of values (N,), of which those that are closer than `apart` are of one place.
+
+    Places with less than half as many values as the fullest one are left out of the fit, so that few values
+    that are wrong move no other.
+    """
+    ordered = np.sort(values)
+    groups = np.split(ordered, np.flatnonzero(np.diff(ordered) > apart) + 1)
+    fullest = max(map(len, groups))
+    centres = np.array([np.median(group) for group in groups if 2 * len(group) >= fullest])
+    gaps = np.diff(centres)
+    if not gaps.size:
+        return float(centres[0]), 0.0, 1, np.zeros(len(values), np.int64)
+    usual = np.quantile(gaps, 0.5, method="lower")
+    number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(gaps / usual), 1))])
+    origin, step = line_through(number, centres)
+    count = int(number[-1]) + 1
+    return origin, step, count, np.clip(np.rint((values - origin) / step), 0, count - 1).astype(np.int64)
+
+
+def line_through(x: np.ndarray, y: np.ndarray) -> tuple[float, float]:
+    """Value at x = 0 and slope of a line: medians over all pairs of points (Theil 1950, Sen 1968).
+
+    It stays as it is if less than 29 % of the points are wrong. The x, at least two, all differ.
+
+    >>> line_through(np.arange(5.0), np.array([1.0, 3.0, 5.0, 70.0, 9.0]))
+    (1.0, 2.0)
+    """
+    first, second = np.triu_indices(len(x), 1)
+    slope = float(np.median((y[second] - y[first]) / (x[second] - x[first])))
+    return float(np.median(y - slope * x)), slope
+
+
+def _centres(
+    file: TransformsFile, index: tuple[np.ndarray, np.ndarray], counts: tuple[int, int]
+) -> list[tuple[float, float]]:
+    """Shear and offset in px, each of x and of y; refuses what is not linear in the camera's place."""
+    lines, off = [], np.zeros((2, len(index[0])))
+    for axis, side in enumerate((file.width, file.height)):
+        from_middle = file.centres_px[:, axis] - side / 2
+        typical = np.array([np.median(from_middle[index[axis] == number]) for number in range(counts[axis])])
+        steps = np.arange(counts[axis]) - (counts[axis] - 1) / 2
+        offset, shear = line_through(steps, typical) if counts[axis] > 1 else (float(typical[0]), 0.0)
+        off[axis] = from_middle - (offset + shear * steps[index[axis]])
+        lines.append(tuple(0.0 if abs(v) < 1e-12 * side else _digits(v) for v in (shear, offset)))
+    off_px = np.hypot(*off)
+    worst = int(np.argmax(off_px))
+    if off_px[worst] > MOST_PX:
+        raise InputError(
+            f"{file.path}: {file.frame_name(worst)}: its principal point (cx, cy) is {off_px[worst]:.3g} px "
+            "from where those of the others put it; from camera to camera it moves by one shear"
+        )
+    return lines
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
+
+
+def _depths(file: TransformsFile, poses: PoseGrid, tell: Tell) -> np.ndarray | None:
+    """Depth of every view in mm; None, and why is told, if it is not known of all."""
+    if not any(file.depth_paths):
+        return None
+    if not all(file.depth_paths):
+        tell(f"not used: depth_file_path, which {file.frame_name(file.depth_paths.index(None))} lacks")
+        return None
+    unit_mm = MM_PER_M * (file.document.depth_unit_scale_factor or DEPTH_UNIT_M)
+    depths = np.empty((*poses.numbers.shape, file.height, file.width), np.float32)
+    for camera, path in np.ndenumerate(np.array(file.depth_paths, object)[poses.numbers]):
+        numbers = _depth_numbers(path)
+        if numbers is None:
+            tell(f"not used: depth_file_path, since {path.name} is no .npy, PNG or TIFF of one channel")
+            return None
+        if numbers.shape != depths.shape[2:]:
+            raise InputError(f"{path}: expected {file.height} x {file.width} numbers, got {numbers.shape}")
+        with np.errstate(over="ignore"):
+            z_mm = numbers.astype(np.float32) * np.float32(unit_mm)
+        if not (z_mm >= 0).all():
+            raise InputError(f"{path}: holds NaN or depths below 0")
+        depths[camera] = np.where(z_mm == 0, np.float32(np.inf), z_mm)
+    tell(f"with the true depth of every view, in units of {unit_mm:g} mm, 0 where nothing is hit")
+    return depths
+
+
+def _depth_numbers(path: Path) -> np.ndarray | None:
+    """Numbers (H, W) of a file of depth; None for a kind of file that has no unit that is agreed on."""
+    if path.suffix == ".npy":
+        numbers = map_array(path)
+        return numbers if numbers.dtype.kind in "fu" else None
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    if kind_of(path) not in DEPTH_KINDS:
+        return None
+    picture = picture_of(path, DEPTH_KINDS)
+    return next(decode(picture))[..., 0] if picture.shape[2] == 1 else None

@@ -1,0 +1,259 @@
+"""The file transforms.json of neural reconstruction (nerfstudio, Instant NGP, visionsim), read and checked.
+
+The format is that of nerfstudio (docs/quickstart/data_conventions.md of its repository) and of Instant NGP;
+visionsim's photon cubes have one file of pictures for all frames, `file_path` at the top. Cameras have the
+axes of OpenGL: X right, Y up, looking along -Z, in metres.
+"""
+
+import json
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
+from pcii.exchange.export_pictures import MOST_POSES, TRANSFORMS
+from pcii.exchange.image_folders import VIEWS, Tell, warn
+from pcii.exchange.pixel_files import picture_of
+from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, read_small
+
+MOST_PX = 0.1
+"""What cameras may be off by: sections are means of views, and a tenth of a pixel blurs none visibly."""
+MOST_SKEW = 1e-4
+"""Of a rotation, from columns of unit length at right angles: at the edge of a picture of 2000 px a length
+that is wrong by this share moves a point by 0.1 px; matrices of 6 decimals are 100 times closer."""
+PINHOLES = ("OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "PERSPECTIVE")
+"""Values of camera_model that, without distortion, are pinholes."""
+DISTORTIONS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")
+ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".exr")
+"""Endings that NeRF's own files leave out of the names of pictures."""
+
+Positive = Annotated[float, Field(ge=1e-9, le=1e9)] | None
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Pixels = Annotated[int, Field(ge=1, le=1 << 20)] | None
+
+
+class _Lens(BaseModel):
+    """Intrinsics, which a frame may have or the top of the file for all."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False)
+    w: Pixels = None
+    h: Pixels = None
+    fl_x: Positive = None
+    fl_y: Positive = None
+    cx: Number | None = None
+    cy: Number | None = None
+    camera_angle_x: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
+    camera_angle_y: Annotated[float, Field(gt=0, lt=math.pi)] | None = None
+    camera_model: str | None = None
+    is_fisheye: bool | None = None
+    k1: Number = 0
+    k2: Number = 0
+    k3: Number = 0
+    k4: Number = 0
+    k5: Number = 0
+    k6: Number = 0
+    p1: Number = 0
+    p2: Number = 0
+    distortion_params: list[Number] | None = None
+    file_path: str | None = None
+
+
+class _Frame(_Lens):
+    depth_file_path: str | None = None
+    transform_matrix: list[list[Number]]
+
+
+class _Document(_Lens):
+    frames: Annotated[list[_Frame], Field(min_length=1, max_length=MOST_POSES)]
+    applied_scale: Positive = None
+    depth_unit_scale_factor: Positive = None
+    bitpack: bool | None = None
+    bitpack_dim: int | None = None
+    c: int | None = None
+    num_frames: int | None = None
+    cfa: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class TransformsFile:
+    """What the file says of its N frames, which are in the order of the file."""
+
+    path: Path
+    document: Any
+    """The members at the top, by their names: also those of photon cubes and depths."""
+    poses: np.ndarray
+    """Camera-to-world matrices (N, 4, 4), float64: axes of OpenGL, metres; rotations are exact ones."""
+    centres_px: np.ndarray
+    """Principal points (N, 2) as (x, y), the first pixel's centre at 0.5."""
+    focal_px: float
+    width: int
+    height: int
+    file_paths: tuple[Path, ...]
+    """Picture of each frame; of a file with one for all frames, that one alone."""
+    depth_paths: tuple[Path | None, ...]
+
+    @property
+    def is_bitpacked(self) -> bool:
+        """Whether the pictures are photon cubes: eight binary pixels in a byte."""
+        return self.document.bitpack is True
+
+    @property
+    def is_stack(self) -> bool:
+        """Whether one file has the pictures of all frames, in their order."""
+        return self.document.file_path is not None
+
+    def frame_name(self, number: int) -> str:
+        """What messages call a frame: the path of its picture or, without one, its place in the list."""
+        if self.is_stack:
+            return f"frames.{number}"
+        return visible(self.file_paths[number].relative_to(self.path.parent).as_posix())
+
+
+def transforms_in(source: Path) -> Path | None:
+    """The file to read if `source` is a .json file or a folder with a transforms.json, else None."""
+    if source.suffix == ".json" and source.is_file():
+        return source
+    return source / TRANSFORMS if (source / TRANSFORMS).is_file() else None
+
+
+def read_transforms(path: str | Path, *, tell: Tell = warn) -> TransformsFile:
+    """Read a transforms.json of anybody; a picture is opened only where the file does not say its size.
+
+    Intrinsics of a frame win over those at the top; without `fl_x` an angle of view tells the focal length.
+    Places are divided by `applied_scale`. `tell` takes the names of members that are not used. Raises
+    `InputError`, naming file and member, for what is missing or wrong, pixels that are not square, lenses
+    that distort, frames of different size or focal length, matrices that are no poses, and paths that are
+    used twice or lead out of the folder.
+    """
+    file = Path(path)
+    document = _parsed(file)
+    frames = document.frames
+    if document.file_path is None:
+        paths = [_path(file, f"frames.{n}.file_path", frame.file_path) for n, frame in enumerate(frames)]
+    else:
+        paths = [_path(file, "file_path", document.file_path)]
+    depths = [
+        None if frame.depth_file_path is None else _path(file, f"frames.{n}.depth_file_path", name)
+        for n, frame in enumerate(frames)
+        for name in (frame.depth_file_path,)
+    ]
+    for name, listed in (("file_path", paths), ("depth_file_path", depths)):
+        first: dict[Path, int] = {}
+        for number, one in enumerate(listed):
+            if one is not None and first.setdefault(one, number) != number:
+                raise InputError(f"{file}: frames.{number}.{name}: is that of frames.{first[one]} too")
+    if None in (document.w or frames[0].w, document.h or frames[0].h):
+        if paths[0].suffix == ".npy":
+            raise InputError(f"{file}: w, h: missing; the size of the pictures in pixels")
+        document.h, document.w, _ = picture_of(paths[0], VIEWS).shape
+    lenses = [_lens(file, f"frames.{n}", document, frame) for n, frame in enumerate(frames)]
+    width, height, focal_px, _ = lenses[0]
+    for number, (w, h, f, _) in enumerate(lenses):
+        if (w, h) != (width, height) or abs(f - focal_px) * max(w, h) / 2 > MOST_PX * focal_px:
+            raise InputError(
+                f"{file}: frames.{number}: {h} x {w} px and a focal length of {f:g} px, where the first "
+                f"frame has {height} x {width} and {focal_px:g}; cameras of a grid are alike"
+            )
+    poses = np.stack([_pose(file, n, frame.transform_matrix) for n, frame in enumerate(frames)])
+    poses[:, :3, 3] /= document.applied_scale or 1
+    unused = {**(document.model_extra or {}), **{name: 0 for f in frames for name in f.model_extra or {}}}
+    if unused:
+        tell(f"not used of {file.name}: {visible(', '.join(unused))[:200]}")
+    return TransformsFile(
+        path=file,
+        document=document,
+        poses=poses,
+        centres_px=np.array([centre for *_, centre in lenses]),
+        focal_px=focal_px,
+        width=width,
+        height=height,
+        file_paths=tuple(paths),
+        depth_paths=tuple(depths),
+    )
+
+
+def _parsed(file: Path) -> _Document:
+    """The document of a file; `InputError` with the first member that is wrong."""
+    content = read_small(file, LARGEST_DOCUMENT_BYTES, "expected a transforms.json as nerfstudio reads it")
+    try:
+        return _Document.model_validate(json.loads(content.decode("utf-8-sig")))
+    except ValidationError as fault:
+        first = fault.errors()[0]
+        place = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"{file}: {place or 'the file'}: {visible(first['msg'])}") from None
+    except (ValueError, RecursionError) as fault:
+        raise InputError(f"{file}: damaged, it is not valid JSON ({visible(str(fault))})") from None
+
+
+def _path(file: Path, member: str, text: str | None) -> Path:
+    """The file that a member names, in the folder; without its ending if that is found."""
+    inside = PurePosixPath((text or "").replace("\\", "/"))
+    folder = file.parent.resolve()
+    is_inside = bool(inside.parts) and not inside.is_absolute() and ".." not in inside.parts
+    if not is_inside or "\0" in str(inside) or not (folder / inside).resolve().is_relative_to(folder):
+        raise InputError(f"{file}: {member}: expected a path inside the folder such as images/00_00.png")
+    path = file.parent / inside
+    endings = (path.with_name(path.name + ending) for ending in ENDINGS)
+    return path if path.exists() else next((other for other in endings if other.is_file()), path)
+
+
+def _lens(file: Path, place: str, top: _Lens, frame: _Lens) -> tuple[int, int, float, tuple[float, float]]:
+    """Width, height, focal length and principal point (x, y) of a frame, in px."""
+    own = frame.model_fields_set
+
+    def value(name: str) -> Any:
+        return getattr(frame if name in own and getattr(frame, name) is not None else top, name)
+
+    distortion = [value(name) for name in DISTORTIONS] + (value("distortion_params") or [])
+    if any(distortion) or value("is_fisheye"):
+        raise InputError(f"{file}: {place}: the lens distorts (k1, is_fisheye ...); undistort the pictures")
+    if value("camera_model") not in (None, *PINHOLES):
+        raise InputError(
+            f"{file}: camera_model: expected one of {', '.join(PINHOLES)}; pictures of other lenses are "
+            "undistorted first"
+        )
+    width, height = value("w"), value("h")
+    focal = {
+        f"fl_{axis}": value(f"fl_{axis}") or _focal_px(value(f"camera_angle_{axis}"), size)
+        for axis, size in (("x", width), ("y", height))
+    }
+    across, down = focal["fl_x"] or focal["fl_y"], focal["fl_y"] or focal["fl_x"]
+    if across is None or down is None:
+        raise InputError(f"{file}: fl_x: missing; the focal length in pixels, or camera_angle_x")
+    if abs(across - down) * max(width, height) / 2 > MOST_PX * across:
+        raise InputError(
+            f"{file}: fl_y: is {down:g} where fl_x is {across:g}; pixels that are not square are resampled"
+        )
+    x, y = (
+        size / 2 if value(name) is None else value(name) for name, size in (("cx", width), ("cy", height))
+    )
+    return width, height, across, (x, y)
+
+
+def _focal_px(angle: float | None, size: int) -> float | None:
+    """Focal length in px of an angle of view in radians."""
+    return None if angle is None else size / 2 / math.tan(angle / 2)
+
+
+def _pose(file: Path, number: int, rows: Iterable[list[float]]) -> np.ndarray:
+    """The checked matrix (4, 4) of a frame, its rotation the nearest exact one."""
+    member = f"{file}: frames.{number}.transform_matrix"
+    matrix = [list(row) for row in rows]
+    if [len(row) for row in matrix] != [4] * 4 or matrix[3] != [0, 0, 0, 1]:
+        raise InputError(f"{member}: expected four rows of four numbers, the last one 0 0 0 1")
+    pose = np.array(matrix, np.float64)
+    left, lengths, right = np.linalg.svd(pose[:3, :3])
+    exact = left @ right
+    if np.abs(lengths - 1).max() > MOST_SKEW or np.linalg.det(exact) < 0:
+        raise InputError(
+            f"{member}: is no rotation; expected columns of length 1 at right angles (they scale by "
+            f"{lengths.min():.6g} to {lengths.max():.6g}) and a determinant above 0"
+        )
+    pose[:3, :3] = exact
+    return pose

@@ -1,0 +1,255 @@
+"""Benchmark scenes, arrays, lens arrays and photon frames: each against a few numbers worked out by hand."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+from picture_folders import OPTICS, H, W, numbers, write
+from PIL import Image
+from rendered_cards import Card, render
+
+from pcii import (
+    CameraGrid,
+    InputError,
+    LensArray,
+    Optics,
+    ViewOrder,
+    Views,
+    check_grid,
+    import_arrays,
+    import_counts,
+    import_hci,
+    import_images,
+    import_lens_array,
+    limit_photons,
+    reconstruct,
+)
+from pcii.core.bayer import mosaic
+from pcii.core.geometry import disparity_px
+
+PARAMETERS = """[intrinsics]
+focal_length_mm = 100.0
+image_resolution_x_px = {width}
+image_resolution_y_px = {height}
+sensor_size_mm = 35.0
+[extrinsics]
+num_cams_x = {cols}
+num_cams_y = {rows}
+baseline_mm = 25.0
+focus_distance_m = 4.25
+[meta]
+disp_min = -1.6
+disp_max = 1.5
+"""
+
+
+def pfm(path: Path, image: np.ndarray, scale: float = -1.0) -> None:
+    head = f"Pf\n{image.shape[1]} {image.shape[0]}\n{scale:g}\n".encode()
+    path.write_bytes(head + image[::-1].astype("<f4" if scale < 0 else ">f4").tobytes())
+
+
+def hci_folder(root: Path, rows: int = 3, cols: int = 3) -> Path:
+    root.mkdir()
+    (root / "parameters.cfg").write_text(PARAMETERS.format(height=H, width=W, rows=rows, cols=cols))
+    for number in range(rows * cols):
+        write(root / f"input_Cam{number:03d}.png", numbers(*divmod(number, cols)))
+    return root
+
+
+@pytest.mark.parametrize("scale", [-1.0, 1.0])
+@pytest.mark.parametrize("name", ["gt_depth_lowres.pfm", "gt_disp_lowres.pfm"])
+def test_a_scene_of_the_hci_benchmark(tmp_path: Path, name: str, scale: float) -> None:
+    root = hci_folder(tmp_path / "scene")
+    depth_m = np.linspace(3, 6, H * W).reshape(H, W)
+    # As the benchmark's toolkit has it: baseline in m, focus distance in m, sensor and focal length in mm.
+    factor = 0.025 * 100.0 * W
+    disparity = (factor * 4.25 / depth_m - factor) / 4.25 / 35.0
+    pfm(root / name, depth_m if "depth" in name else disparity, scale)
+    scene = import_hci(root, tell=[].append)
+    grid = scene.views.grid
+    assert (grid.rows, grid.cols, grid.pitch_mm) == (3, 3, (25.0, 25.0))
+    assert scene.truth is not None
+    np.testing.assert_allclose(scene.truth.z_mm, 1000 * depth_m, rtol=1e-5)
+    across, down = disparity_px(grid, 1000 * depth_m)  # the cameras see the disparities of the benchmark
+    np.testing.assert_allclose(across, disparity, atol=1e-6)
+    np.testing.assert_allclose(down, disparity, atol=1e-6)
+    np.testing.assert_allclose(np.ravel(disparity_px(grid, 4250.0)), 0, atol=1e-12)
+    assert scene.truth.names == {}
+
+
+def test_the_depth_range_follows_from_the_disparities(tmp_path: Path) -> None:
+    scene = import_hci(hci_folder(tmp_path / "scene"))
+    assert scene.z_range_mm is None  # 8 px are so coarse that -1.6 px would be beyond infinity
+    text = PARAMETERS.format(height=512, width=512, rows=1, cols=1)
+    (tmp_path / "parameters.cfg").write_text(text)
+    write(tmp_path / "input_Cam000.png", np.zeros((512, 512, 3), np.uint8))
+    scene = import_hci(tmp_path)
+    assert scene.z_range_mm is not None
+    near, far = (float(disparity_px(scene.views.grid, z)[0]) for z in scene.z_range_mm)
+    assert (near, far) == (pytest.approx(1.5), pytest.approx(-1.6))
+
+
+def test_files_and_parameters_that_are_not_used_are_named(tmp_path: Path) -> None:
+    root = hci_folder(tmp_path / "scene")
+    text = (root / "parameters.cfg").read_text().replace("[meta]", "offset = 2\n[meta]\nscene = cotton")
+    (root / "parameters.cfg").write_text("\ufeff" + text)  # with a byte order mark
+    (root / "valid.png").write_bytes(b"")
+    told: list[str] = []
+    assert import_hci(root, tell=told.append).views.grid.rows == 3
+    assert told == ["not used: valid.png", "not used of parameters.cfg: offset, scene"]
+
+
+def test_the_map_of_an_even_grid_is_no_truth_of_the_virtual_centre(tmp_path: Path) -> None:
+    root = hci_folder(tmp_path / "scene", rows=2, cols=3)
+    pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
+    told: list[str] = []
+    scene = import_hci(root, tell=told.append)
+    assert scene.truth is None
+    assert told == ["not used: gt_depth_lowres.pfm, of a view beside the centre of an even grid, 2 x 3"]
+
+
+@pytest.mark.parametrize("kept", [".npy", ".npz", "array"])
+def test_arrays_come_in(tmp_path: Path, kept: str) -> None:
+    light = np.random.default_rng(1).random((2, 3, H, W, 3))
+    source = tmp_path / f"a{kept}"
+    if kept == ".npy":
+        np.save(source, light)
+    elif kept == ".npz":
+        np.savez_compressed(source, light=light, other=light[..., 0])
+        other = import_arrays(source, OPTICS, array="other", order=ViewOrder(flip_rows=True))
+        np.testing.assert_allclose(np.asarray(other.radiance)[1], light[0, ..., :1], rtol=1e-6)
+    views = import_arrays(
+        light if kept == "array" else source, OPTICS, array="light" if kept == ".npz" else None
+    )
+    np.testing.assert_allclose(np.asarray(views.radiance), light, rtol=1e-6)
+    flat = light.reshape(6, H, W, 3)
+    counted = import_arrays(flat, OPTICS, grid=(2, 3))
+    np.testing.assert_array_equal(np.asarray(counted.radiance), np.asarray(views.radiance))
+    down = import_arrays(flat, OPTICS, grid=(3, 2), order=ViewOrder(swap_axes=True))
+    np.testing.assert_allclose(down.view(2, 1), light[1, 2], rtol=1e-6)
+    swapped = import_arrays(light, OPTICS, order=ViewOrder(swap_axes=True))
+    assert (swapped.grid.rows, swapped.grid.cols) == (3, 2)
+    np.testing.assert_allclose(swapped.view(2, 1), light[1, 2], rtol=1e-6)
+
+
+GRID = CameraGrid(rows=4, cols=5, pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025, height=60, width=60)
+"""A lens array: 60 px are 1.5 mm. Disparity 180 px mm / z from lens to lens."""
+
+
+def lens_picture(path: Path, views: np.ndarray, *, inverted: bool, margin: int = 0) -> Path:
+    K, L, h, w, _ = views.shape
+    tiles = views[:, :, ::-1, ::-1] if inverted else views
+    whole = np.zeros((K * h + 2 * margin, L * w + 2 * margin, 3), np.float32)
+    whole[margin : margin + K * h, margin : margin + L * w] = tiles.swapaxes(1, 2).reshape(K * h, L * w, 3)
+    write(path, whole)
+    return path
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_a_lens_array_is_cut_apart_and_told_from_an_inverted_one(tmp_path: Path, inverted: bool) -> None:
+    views = render(GRID, [Card(60, seed=1), Card(25, (0.2, 0.8, 0.2, 0.6), 2)], cell=6)
+    path = lens_picture(tmp_path / "lenses.exr", views, inverted=inverted, margin=3)
+    optics = Optics(pitch_mm=(1.5, 1.5), focal_mm=3.0, pixel_mm=0.025)
+    lenses = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=inverted)
+    found = import_lens_array(path, lenses, optics)
+    assert found.grid == GRID
+    np.testing.assert_allclose(np.asarray(found.radiance), views.astype(np.float32), atol=1e-6)
+    assert check_grid(found, (15, 100)).order is None
+    mistaken = LensArray(rows=4, cols=5, pitch_px=(60, 60), offset_px=(3, 3), inverted=not inverted)
+    wrong = check_grid(import_lens_array(path, mistaken, optics), (15, 100))
+    assert wrong.order == ViewOrder(flip_rows=True, flip_cols=True)
+
+
+def test_lenses_between_pixels_keep_their_depth(tmp_path: Path) -> None:
+    """Lenses every 20.3 px over a ramp of light: each image is the ramp from its own place on."""
+    width = 5 * 21
+    ramp = np.broadcast_to(np.arange(width, dtype=np.float32)[None, :, None], (25, width, 1))
+    write(tmp_path / "ramp.exr", ramp)
+    lenses = LensArray(rows=1, cols=5, pitch_px=(20.3, 20.0), offset_px=(1.5, 0))
+    optics = Optics(pitch_mm=(1, 1), focal_mm=1, sensor_mm=105)
+    views = import_lens_array(tmp_path / "ramp.exr", lenses, optics)
+    assert views.radiance.shape == (1, 5, 20, 20, 1)
+    assert views.grid.pixel_mm == 1.0
+    for l in range(5):
+        start = 1.5 + 20.3 * l + 0.15
+        np.testing.assert_allclose(views.view(0, l)[0, :, 0], start + np.arange(20), rtol=1e-5)
+
+
+def test_a_mosaic_that_cutting_would_break_is_refused(tmp_path: Path) -> None:
+    write(tmp_path / "few.png", numbers(0, 0, channels=1))
+    even = LensArray(rows=1, cols=2, pitch_px=(4, 4))
+    assert import_lens_array(tmp_path / "few.png", even, OPTICS, cfa="GRBG").cfa == "GRBG"
+    for wrong in (replace(even, pitch_px=(3, 4)), replace(even, inverted=True)):
+        with pytest.raises(InputError, match="is a mosaic"):
+            import_lens_array(tmp_path / "few.png", wrong, OPTICS, cfa="GRBG")
+
+
+FRAMES = (np.random.default_rng(2).random((2, 3, 7, H, W)) < 0.2).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["array", "npy", "bool", "tif", "ImageJ", "shaped", "appended", "float"])
+def test_frames_of_photons_are_added_up(tmp_path: Path, kind: str) -> None:
+    pattern, source = None, tmp_path / "frames.npy"
+    # ImageJ and tifffile write one header for all frames of a large stack, or one for each of several parts.
+    options = {"tif": {}, "ImageJ": {"imagej": True, "truncate": True}, "shaped": {"truncate": True}}
+    if kind in ("tif", "ImageJ", "shaped", "appended"):
+        pattern, source = "{row}-{col}.tif", tmp_path
+        for k, l in np.ndindex(2, 3):
+            for part in np.split(FRAMES[k, l], 7) if kind == "appended" else [FRAMES[k, l]]:
+                more = options.get(kind, {"append": True})
+                tifffile.imwrite(tmp_path / f"{k}-{l}.tif", part, photometric="minisblack", **more)
+    else:
+        np.save(source, FRAMES.astype({"bool": bool, "float": np.float64}.get(kind, np.uint8)))
+    counts = import_counts(FRAMES if kind == "array" else source, OPTICS, pattern=pattern, cfa="GRBG")
+    assert counts.cfa == "GRBG"
+    np.testing.assert_array_equal(counts.dense, FRAMES.sum(axis=2))
+    assert counts.readout.frames == 7
+    assert (counts.frame is not None) == (kind == "bool")  # of one bit the frame of each count is kept
+
+
+def test_one_bit_pictures_are_counts(tmp_path: Path) -> None:
+    for k, l in np.ndindex(2, 3):
+        Image.fromarray(FRAMES[k, l, 0].astype(bool)).save(tmp_path / f"{k}-{l}.png")
+    counts = import_counts(tmp_path, OPTICS, pattern="{row}-{col}.png")
+    np.testing.assert_array_equal(counts.dense, FRAMES[:, :, 0])
+
+
+def test_frames_are_not_averaged_over_their_faults() -> None:
+    frames = FRAMES.astype(float)
+    frames[0, 0, 0, 0, 0], frames[0, 0, 1, 0, 0] = 0.5, 0.5
+    with pytest.raises(ValueError, match="whole numbers"):
+        import_counts(frames, OPTICS)
+
+
+def test_photon_limiting_keeps_the_budget_the_shape_and_the_seed() -> None:
+    grid = OPTICS.grid((2, 2, 40, 60))
+    light = np.random.default_rng(0).random((*grid.shape_KLHW, 3)).astype(np.float32)
+    views = Views(light, grid)
+    counts = limit_photons(views, 20_000, seed=3, cfa="GRBG")
+    assert counts.cfa == "GRBG"
+    raw = mosaic(light[1, 0].astype(np.float64), "GRBG")
+    rates = 20_000 * raw / raw.sum()
+    seen = counts.view(1, 0)
+    assert abs(seen.sum() - 20_000) < 4 * np.sqrt(20_000)
+    chi = ((seen - rates) ** 2 / rates).sum()  # of 2400 pixels, deviation sqrt(2 * 2400) or a little more
+    assert abs(chi - raw.size) < 5 * np.sqrt(2.2 * raw.size)
+    again = limit_photons(Views(mosaic(light, "GRBG")[..., None], grid, "GRBG"), 20_000, seed=3)
+    np.testing.assert_array_equal(again.view(1, 0), seen)
+    assert not np.array_equal(limit_photons(views, 20_000, seed=4, cfa="GRBG").view(1, 0), seen)
+    dark = limit_photons(Views(0 * light, grid), 100, seed=1)
+    assert dark.total == 0
+
+
+def test_imported_views_are_sharp_at_their_depth(tmp_path: Path) -> None:
+    """From the pictures of a plane, through files, to a section that is the plane again."""
+    grid = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 80, height=60, width=80)
+    views = render(grid, [Card(35 * 2 / (grid.pixel_mm * 4), seed=3)], cell=6)  # 4 px from view to view
+    for k, l in np.ndindex(3, 3):
+        write(tmp_path / f"{l}_{k}.tif", views[k, l].astype(np.float32))
+    found = import_images(tmp_path, "{col}_{row}.tif", OPTICS)
+    z_mm = 35 * 2 / (grid.pixel_mm * 4)
+    section = reconstruct(found, [z_mm]).estimate[0]
+    np.testing.assert_allclose(section[8:-8, 8:-8], views[1, 1, 8:-8, 8:-8], atol=1e-5)
+    np.testing.assert_allclose(section[8:-8, 8:-8], views[0, 2, 12:-4, 4:-12], atol=1e-5)

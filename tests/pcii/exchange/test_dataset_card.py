@@ -1,0 +1,108 @@
+"""Cards: short, true to the data, the same every time, harmless, and no part of the data."""
+
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+from hostile_names import NAMES
+from markdown_it import MarkdownIt
+from stored_datasets import make_dataset
+
+from pcii.base.errors import InputError
+from pcii.exchange.dataset_card import CITATION, CREATOR, LICENCE, Terms, write_card
+from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
+from pcii.io.dataset_layout import CARD, MANIFEST, read_manifest
+from pcii.io.verification import verify
+from pcii.store.sealed_json import write_sealed
+
+ROOT = Path(__file__).resolve().parents[3]
+MAX_LINES = 30
+TERMS = Terms("CC-BY-4.0", ("Ada", "Grace"), "Ada and Grace, Photons, 2026", "https://example.org/photons")
+
+
+def make_collection(root: Path) -> Path:
+    """Two datasets by hand that differ in their budget."""
+    root.mkdir()
+    rows = []
+    for budget in (10.0, 20.0):
+        folder = root / f"budget_{budget:g}"
+        recipe = {"scene": "by hand", "seed": 3, "photons": {"budget": budget}}
+        make_dataset(folder, recipe=recipe, identity=f"{budget}", photons={"total": 5})
+        values = {"photons.budget": budget}
+        rows.append(index_row(folder.name, values, read_manifest(folder), folder / MANIFEST))
+    COLLECTION_FOLDER.write(root, {"fields": ["photons.budget"], "recipe": {"scene": "by hand", "seed": 3}})
+    write_index(root, rows)
+    return root
+
+
+@pytest.mark.parametrize("make", [make_dataset, make_collection])
+def test_a_card_is_short_and_a_run_that_was_killed_leaves_none(tmp_path, make):
+    root = make(tmp_path / "data")
+    write_card(root, TERMS)
+    text = (root / CARD).read_text()
+    assert len(text.splitlines()) <= MAX_LINES
+    for words in ("CC-BY-4.0", "Ada, Grace", TERMS.citation, TERMS.url):
+        assert words in text
+    if make is make_collection:
+        assert "`photons.budget` (2 values: 10.0, 20.0)" in text
+    (root / f".{CARD}.abcd1234.tmp").write_text("# Half a ca")
+    with pytest.raises(InputError, match=r"not listed in .*, and read by nothing"):
+        verify(root)
+    write_card(root, TERMS)
+    assert verify(root)
+    assert (root / CARD).read_text() == text
+
+
+def test_a_card_follows_the_data_and_the_terms_alone(tmp_path):
+    root, other = make_dataset(tmp_path / "data"), make_dataset(tmp_path / "other")
+    write_sealed(other / MANIFEST, read_manifest(other) | {"timings_s": {"photons": 9.5}})
+    for folder in (root, other):
+        write_card(folder, Terms())
+    assert (root / CARD).read_bytes() == (other / CARD).read_bytes()
+    before = (root / MANIFEST).read_bytes()
+    write_card(root, TERMS)
+    assert (root / MANIFEST).read_bytes() == before
+    assert LICENCE not in (root / CARD).read_text()
+    root.chmod(0o500)
+    written = (root / CARD).stat().st_mtime_ns
+    write_card(root, TERMS)  # nothing to do
+    assert (root / CARD).stat().st_mtime_ns == written
+    root.chmod(0o700)
+    (root / CARD).write_text("# My own words")
+    write_card(root, TERMS)
+    assert (root / CARD).read_text() == "# My own words"
+
+
+class Shown(HTMLParser):
+    """Elements of a page, and where its links lead."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.tags, self.links = set[str](), list[str]()
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.add(tag)
+        self.links += [value for _, value in attrs]
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_names_with_markup_appear_as_plain_text_in_cards(tmp_path, name):
+    root = make_dataset(tmp_path / "data", title=name, objects={"1": name}, recipe={"scene": name})
+    for address in (name, f"https://example.org/{name}", f"javascript://{name}"):
+        write_card(root, Terms(address, (name,), name, address))
+        text = (root / CARD).read_text()
+        page = Shown(MarkdownIt("gfm-like", {"html": True, "linkify": False}).render(text))
+        assert page.tags <= {"h1", "p", "code", "pre", "a", "blockquote"}
+        assert all(str(link).startswith(("https://", "language-")) for link in page.links)
+
+
+def test_the_default_terms_are_those_of_the_project():
+    citation = (ROOT / "CITATION.cff").read_text()
+    assert f"license: {LICENCE}" in citation
+    assert f'name: "{CREATOR}"' in citation
+    title = re.search(r'^title: "(.*)"$', citation, re.MULTILINE)
+    assert title is not None
+    assert CITATION.startswith(title[1])
+    assert (ROOT / "LICENSE").read_text().startswith("BSD 3-Clause License")

@@ -1,0 +1,216 @@
+"""Pictures become radiance: formats and bits, curves, which file is which view."""
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from picture_folders import OPTICS, H, W, make_folder, numbers, write
+from PIL import Image, ImageCms
+from png_files import compressed, png_file
+
+from pcii import InputError, Optics, ViewOrder, Views, import_images
+from pcii.base.srgb import srgb_to_linear
+from pcii.exchange.pixel_files import to_radiance
+
+PATTERN = "{col}_{row}.%s"
+
+
+def by_the_standard(share: float) -> float:
+    """sRGB to linear as IEC 61966-2-1 has it, one number at a time."""
+    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("ending", "dtype"),
+    [
+        ("png", "uint8"),
+        ("png", "uint16"),
+        ("tif", "uint8"),
+        ("tif", "uint16"),
+        ("tif", "float32"),
+        ("exr", "float32"),
+    ],
+)
+def test_all_bits_of_every_format_arrive(tmp_path: Path, ending, dtype, channels) -> None:
+    folder = make_folder(tmp_path / "a", ending=ending, dtype=dtype, channels=channels)
+    views = import_images(folder, PATTERN % ending, OPTICS, encoding="linear")
+    assert views.radiance.shape == (2, 3, H, W, channels)
+    most = {"uint8": 255, "uint16": 65535}.get(dtype, 1)
+    for k, l in np.ndindex(2, 3):
+        expected = numbers(k, l, dtype, channels).astype(np.float64) / most
+        np.testing.assert_allclose(views.view(k, l), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("ending", "dtype"),
+    [("png", "uint8"), ("png", "uint16"), ("tif", "uint8"), ("tif", "uint16"), ("exr", "float32")],
+)
+def test_alpha_that_is_opaque_everywhere_is_left_out(tmp_path: Path, ending, dtype, channels) -> None:
+    image = numbers(0, 0, dtype, channels)
+    opaque = np.iinfo(dtype).max if dtype.startswith("u") else 1
+    write(tmp_path / f"0_0.{ending}", np.dstack([image, np.full((H, W), opaque, dtype)]))
+    write(tmp_path / f"1_0.{ending}", image)  # without alpha
+    views = import_images(tmp_path, PATTERN % ending, OPTICS, encoding="linear")
+    np.testing.assert_allclose(views.view(0, 0), image.astype(np.float64) / opaque, rtol=1e-6)
+    np.testing.assert_array_equal(views.view(0, 0), views.view(0, 1))
+
+
+@pytest.mark.parametrize("bits", [4, 10, 12, 14])
+def test_tiff_of_fewer_bits_than_its_numbers_is_as_bright(tmp_path: Path, bits: int) -> None:
+    share = np.linspace(0, 1, H * W).reshape(H, W)
+    stored = np.rint(share * (2**bits - 1)).astype(np.uint8 if bits < 8 else np.uint16)
+    tifffile.imwrite(tmp_path / "0_0.tif", stored, bitspersample=bits, photometric="minisblack")
+    half_a_step = 0.5 / (2**bits - 1)
+    linear = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear").view(0, 0)[..., 0]
+    np.testing.assert_allclose(linear, share, atol=1.01 * half_a_step)
+    decoded = import_images(tmp_path, PATTERN % "tif", OPTICS).view(0, 0)[..., 0]
+    expected = [by_the_standard(number / (2**bits - 1)) for number in stored.ravel().tolist()]
+    np.testing.assert_allclose(decoded.ravel(), expected, rtol=1e-6)
+
+
+def test_png_of_few_bits_and_palettes_are_as_bright(tmp_path: Path) -> None:
+    share = np.linspace(0, 1, H * W).reshape(H, W)
+    bits = np.unpackbits(np.rint(share * 15).astype(np.uint8)[..., None], axis=2)[..., 4:]
+    rows = np.packbits(bits.reshape(H, -1), axis=1)
+    four = png_file(W, H, 4, 0, compressed(rows))
+    (tmp_path / "0_0.png").write_bytes(four)
+    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)[..., 0]
+    np.testing.assert_allclose(seen, np.rint(share * 15) / 15, rtol=1e-6)
+    colours = Image.fromarray(numbers(0, 0) // 32 * 32).convert("P", palette=Image.Palette.ADAPTIVE)
+    colours.save(tmp_path / "0_0.png")
+    seen = import_images(tmp_path, PATTERN % "png", OPTICS, encoding="linear").view(0, 0)
+    np.testing.assert_allclose(seen, np.asarray(colours.convert("RGB")) / 255, rtol=1e-6)
+
+
+@pytest.mark.parametrize("compression", ["lzw", "deflate", "packbits"])
+def test_compressed_tiff(tmp_path: Path, compression: str) -> None:
+    image = numbers(0, 0, np.uint16)
+    write(tmp_path / "0_0.tif", image, compression)
+    views = import_images(tmp_path, PATTERN % "tif", OPTICS, encoding="linear")
+    np.testing.assert_array_equal(np.rint(views.view(0, 0) * 65535), image)
+
+
+def test_jpeg_is_read(tmp_path: Path) -> None:
+    Image.fromarray(np.full((H, W, 3), 188, np.uint8)).save(tmp_path / "0_0.jpg", quality=100)
+    views = import_images(tmp_path, PATTERN % "jpg", OPTICS)
+    np.testing.assert_allclose(views.view(0, 0), by_the_standard(188 / 255), rtol=0.02)
+
+
+def test_whole_numbers_are_srgb_and_floats_linear_unless_said(tmp_path: Path) -> None:
+    whole = make_folder(tmp_path / "whole")
+    share = float(numbers(1, 2)[3, 4, 1]) / 255
+    curves: list[tuple[Any, float]] = [(None, by_the_standard(share)), ("linear", share), (2.2, share**2.2)]
+    for encoding, expected in curves:
+        views = import_images(whole, PATTERN % "png", OPTICS, encoding=encoding)
+        assert views.view(1, 2)[3, 4, 1] == pytest.approx(expected, rel=1e-5)
+    floats = make_folder(tmp_path / "floats", ending="exr", dtype=np.float32)
+    curves = [(None, share), ("srgb", by_the_standard(share))]
+    for encoding, expected in curves:
+        views = import_images(floats, PATTERN % "exr", OPTICS, encoding=encoding)
+        assert views.view(1, 2)[3, 4, 1] == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_srgb_of_every_number(dtype) -> None:
+    most = np.iinfo(dtype).max
+    values = np.linspace(0, most, 300).astype(dtype)
+    expected = [by_the_standard(int(value) / most) for value in values]
+    np.testing.assert_allclose(srgb_to_linear(values), expected, rtol=1e-12)
+    np.testing.assert_allclose(to_radiance(values, None), expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("names", "pattern", "grid"),
+    [
+        (lambda k, l: f"{l}_{k}.png", "{col}_{row}.png", None),
+        (lambda k, l: f"r{k + 1:02d}c{l + 7}.png", "r{row:02d}c{col}.png", None),
+        (lambda k, l: f"input_Cam{3 * k + l:03d}.png", "input_Cam{index:03d}.png", (2, 3)),
+        (lambda k, l: f"{3 * k + l + 998}.png", "{index}.png", (2, 3)),
+        (lambda k, l: f"row {k}/[{l}].png", "row {row}/[{col}].png", None),
+        (lambda k, l: f"view_{k - 1}_{l - 1:+d}.png", "view_{row}_{col}.png", None),
+        (lambda k, l: f"out_{k:02d}_{l:02d}_{7.5 * l}_-{k}.25_.png", "out_{row}_{col}_*.png", None),
+        (lambda k, l: f"{l}_{k}.{'PNG' if l else 'png'}", "{col}_{row}.png", None),
+        (lambda k, l: f"{k}-{l}.png", "{row}-{col}.png", None),
+    ],
+)
+def test_names_say_which_view_it_is(tmp_path: Path, names, pattern, grid) -> None:
+    for k, l in np.ndindex(2, 3):
+        path = tmp_path / names(k, l)
+        path.parent.mkdir(exist_ok=True)
+        write(path, numbers(k, l))
+    views = import_images(tmp_path, pattern, OPTICS, grid=grid, encoding="linear")
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))
+    assert views.grid.pixel_mm == 36.0 / W
+    assert (views.grid.rows, views.grid.cols) == (2, 3)
+
+
+def test_files_that_do_not_fit_are_named(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "a")
+    for name in ("0-2.png", "notes.txt", ".hidden"):
+        (folder / name).write_bytes((folder / "0_0.png").read_bytes())
+    with pytest.warns(UserWarning, match=r"^not used: 0-2\.png, notes\.txt, since --pattern does not fit$"):
+        assert import_images(folder, PATTERN % "png", OPTICS).grid.rows == 2
+
+
+def test_channels_and_pictures_that_are_not_used_are_named(tmp_path: Path) -> None:
+    import OpenEXR
+
+    planes = {name: np.ones((H, W), np.float32) for name in "RGBZ"}
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, planes) as file:
+        file.write(str(tmp_path / "0_0.exr"))
+    with pytest.warns(UserWarning, match=r"not used: the channels Z in 0_0\.exr"):
+        import_images(tmp_path, PATTERN % "exr", OPTICS)
+    (tmp_path / "0_0.exr").unlink()
+    first, second = (Image.fromarray(numbers(0, l)) for l in range(2))
+    first.save(tmp_path / "0_0.jpg", "MPO", save_all=True, append_images=[second])
+    with pytest.warns(UserWarning, match=r"not used: 1 more pictures in the file in 0_0\.jpg"):
+        views = import_images(tmp_path, PATTERN % "jpg", OPTICS, tell=warnings.warn)
+    np.testing.assert_allclose(views.view(0, 0), srgb_to_linear(numbers(0, 0)), atol=0.1)
+    spaces: list[tuple[Any, str]] = [("sRGB", "srgb"), ("LAB", "other")]
+    for name, profile in spaces:
+        content = ImageCms.ImageCmsProfile(ImageCms.createProfile(name)).tobytes()
+        first.save(tmp_path / f"0_0.{profile}.png", icc_profile=content)
+    told: list[str] = []
+    for profile in ("srgb", "other"):
+        import_images(tmp_path, f"{{col}}_{{row}}.{profile}.png", OPTICS, tell=told.append)
+    assert [one for one in told if "profile" in one] == ["not used: the colour profile in 0_0.other.png"]
+
+
+def test_numbers_that_count_the_other_way(tmp_path: Path) -> None:
+    for k, l in np.ndindex(2, 3):
+        write(tmp_path / f"{2 * (2 - l) + (1 - k)}.png", numbers(k, l))  # from the right, up the columns
+    order = ViewOrder(swap_axes=True, flip_rows=True, flip_cols=True)
+    views = import_images(tmp_path, "{index}.png", OPTICS, grid=(2, 3), order=order, encoding="linear")
+    for k, l in np.ndindex(2, 3):
+        np.testing.assert_array_equal(np.rint(255 * views.view(k, l)), numbers(k, l))
+
+
+def test_grey_pictures_can_be_mosaics(tmp_path: Path) -> None:
+    folder = make_folder(tmp_path / "a", channels=1)
+    views = import_images(folder, PATTERN % "png", OPTICS, cfa="RGGB")
+    assert (views.cfa, views.channel_count) == ("RGGB", 3)
+
+
+def test_optics_take_a_sensor_or_a_pixel() -> None:
+    lengths: dict[str, Any] = {"pitch_mm": (2, 2), "focal_mm": 35}
+    assert Optics(**lengths, sensor_mm=36).grid((1, 1, 10, 720)).pixel_mm == 0.05
+    assert Optics(**lengths, pixel_mm=0.1).grid((1, 1, 10, 720)).pixel_mm == 0.1
+    both = {"sensor_mm": 36, "pixel_mm": 1}
+    wrong: list[dict[str, Any]] = [{}, both, {"sensor_mm": 0}, {"pixel_mm": -1}, {"sensor_mm": "x"}]
+    for sizes in wrong:
+        with pytest.raises(InputError, match="_mm: "):
+            Optics(**lengths, **sizes)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_views_do_not_take_numbers_of_pictures_for_light(dtype) -> None:
+    grid = OPTICS.grid((1, 2, H, W))
+    with pytest.raises(InputError, match="is sRGB, not light"):
+        Views(np.ones((1, 2, H, W, 3), dtype), grid)
+    Views(srgb_to_linear(np.ones((1, 2, H, W, 3), dtype)), grid)

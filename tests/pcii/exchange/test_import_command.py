@@ -1,0 +1,385 @@
+# ruff: noqa: E501
+"""`pcii import` as a new user types it, and fifty ways to give it something wrong."""
+
+import re
+import shutil
+import zlib
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+from command_runs import check_refused, run
+from picture_folders import H, W, make_folder, numbers, write
+from PIL import Image
+from png_files import png_file
+from rendered_cards import Card, render
+from test_arrays_and_lenses import PARAMETERS, hci_folder, pfm
+
+from pcii import CameraGrid, open_dataset
+from pcii.base.srgb import linear_to_srgb
+from pcii.io.verification import verify
+
+CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
+NAMED = ["--pattern", "{col}_{row}.png", *CAMERAS]
+GRID = CameraGrid(rows=3, cols=3, pitch_mm=(2, 2), focal_mm=35, pixel_mm=36 / 120, height=90, width=120)
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """3 x 3 sRGB pictures by column and row: a card at 60 mm before a wall at 150 mm."""
+    folder = tmp_path_factory.mktemp("photos")
+    views = render(GRID, [Card(150, seed=1), Card(60, (0.2, 0.8, 0.2, 0.7), 2)], cell=8)
+    for k, l in np.ndindex(3, 3):
+        picture = (255 * linear_to_srgb(views[k, l])).round().astype(np.uint8)
+        Image.fromarray(picture).save(folder / f"{l}_{k}.png")
+    return folder
+
+
+def test_a_new_users_pictures(photos: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "mine"
+    limits = ["--cfa", "GRBG", "--photons", "300", "--z-range-mm", "30", "200", "--licence", "CC0"]
+    assert run("import", photos, "-o", out, *NAMED, *limits) == 0
+    said = capsys.readouterr().out
+    assert "3 x 3 views of 90 x 120 px, GRBG" in said
+    assert "warning" not in said
+    dataset = open_dataset(out)
+    assert dataset.grid == GRID
+    assert dataset.cfa == "GRBG"
+    assert dataset.counts.total == pytest.approx(9 * 300, abs=4 * np.sqrt(2700))
+    assert dataset.budgets == (300,)
+    assert dataset.views is not None
+    assert dataset.views.cfa == "GRBG"
+    disparities = [467 / z for z in dataset.analysis["z_mm"]]  # in px, from the first camera to the last
+    assert disparities == pytest.approx([467 / 60, 467 / 150], abs=0.6)
+    assert dataset.analysis["z_range_mm"] == [30, 200]
+    assert dataset.manifest["licence"] == "CC0"
+    assert "300 photons expected in each view, seed 1" in dataset.manifest["origin"]
+    assert verify(out) > 10
+    assert run("import", photos, "-o", out, *NAMED, *limits) == 0  # again: the same dataset
+    assert run("import", photos, "-o", out, *NAMED, *limits, "--seed", 2) == 2
+
+
+@pytest.mark.parametrize(
+    ("pattern", "options", "mend"),
+    [
+        ("{row}_{col}.png", [], "with --swap-axes"),
+        ("{col}_{row}.png", ["--flip-rows"], "without --flip-rows"),
+        ("{col}_{row}.png", ["--swap-axes", "--flip-cols"], "without --swap-axes --flip-cols"),
+        ("{row}_{col}.png", ["--flip-cols"], "with --swap-axes and without --flip-cols"),
+    ],
+)
+def test_the_option_that_mends_is_told(photos: Path, tmp_path: Path, capsys, pattern, options, mend) -> None:
+    told = ["--pattern", pattern, *CAMERAS, *options]
+    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
+    assert f"warning: the views fit together far better {mend};" in capsys.readouterr().out
+
+
+def pages(folder: Path, out: Path, places: Iterable[tuple[int, int]]) -> list[Any]:
+    """What to type for a file whose pages are the views of these places (k, l)."""
+    stack = np.stack([np.asarray(Image.open(folder / f"{l}_{k}.png")) for k, l in places])
+    tifffile.imwrite(out.with_suffix(".tif"), stack, photometric="rgb")
+    return ["import", out.with_suffix(".tif"), "-o", out, *CAMERAS]
+
+
+def test_pages_of_a_tiff_file_are_views(photos: Path, tmp_path: Path, capsys) -> None:
+    assert run("import", photos, "-o", tmp_path / "files", *NAMED) == 0
+    assert run(*pages(photos, tmp_path / "pages", np.ndindex(3, 3))) == 0
+    down = [(k, l) for l in range(3) for k in range(3)]
+    assert run(*pages(photos, tmp_path / "down", down), "--swap-axes", "--grid", 3, 3) == 0
+    assert "warning" not in capsys.readouterr().out
+    files, *others = (open_dataset(tmp_path / name).views for name in ("files", "pages", "down"))
+    for other in others:
+        assert files is not None
+        assert other is not None
+        np.testing.assert_array_equal(np.asarray(other.radiance[1, 2]), np.asarray(files.radiance[1, 2]))
+
+
+@pytest.mark.parametrize("options", [[], ["--swap-axes"]])
+def test_pages_of_photon_counts_are_views(tmp_path: Path, options: list[str]) -> None:
+    counts = np.random.default_rng(1).poisson(2, (2, 3, H, W)).astype(np.uint16)
+    stored = counts.swapaxes(0, 1) if options else counts  # down the columns
+    tifffile.imwrite(tmp_path / "in.tif", stored.reshape(6, H, W), photometric="minisblack")
+    told = ["--counts", "--grid", 2, 3, *CAMERAS, *options]
+    assert run("import", tmp_path / "in.tif", "-o", tmp_path / "out", *told) == 0
+    seen = open_dataset(tmp_path / "out").counts
+    np.testing.assert_array_equal([[seen.view(k, l) for l in range(3)] for k in range(2)], counts)
+
+
+def test_a_stage_that_moves_to_and_fro_is_noticed(photos: Path, tmp_path: Path, capsys) -> None:
+    to_and_fro = [(k, 2 - l if k % 2 else l) for k, l in np.ndindex(3, 3)]
+    told = pages(photos, tmp_path / "mine", to_and_fro)
+    assert run(*told) == 0
+    assert "warning: the views fit together far better with --serpentine;" in capsys.readouterr().out
+    shutil.rmtree(tmp_path / "mine")
+    assert run(*told, "--serpentine") == 0
+    assert "warning" not in capsys.readouterr().out
+
+
+def test_views_that_fit_in_no_order_have_a_next_step(photos: Path, tmp_path: Path, capsys) -> None:
+    shuffled = [divmod(n, 3) for n in (3, 7, 2, 0, 6, 8, 5, 1, 4)]
+    assert run(*pages(photos, tmp_path / "mine", shuffled)) == 0
+    said = capsys.readouterr().out
+    assert re.search(
+        r"nothing is clearly sharp from [0-9.]+ mm to infinity; .* correct the order of views", said
+    )
+
+
+@pytest.mark.parametrize(
+    ("shear", "words"),
+    [(0, "--shear-px; (2.[5-9]|3) (2.[5-9]|3) or more brings all in front"), (2.7, "sharpest at 6")],
+)
+def test_shifted_pictures_are_told_to_be_sheared(tmp_path: Path, capsys, shear: float, words: str) -> None:
+    """A wall at 1.6 and a card at 3.9 px per camera, of which 2.7 px were taken out."""
+    shifted = replace(GRID, shear_px=(2.7, 2.7))
+    views = render(shifted, [Card(150, seed=1), Card(60, (0.2, 0.8, 0.2, 0.7), 2)], cell=8)
+    np.save(tmp_path / "in.npy", views.astype(np.float32))
+    told = ["--shear-px", shear, shear] if shear else []
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *CAMERAS, *told) == 0
+    said = capsys.readouterr().out
+    assert re.search(words, said)
+    assert ("warning: things are sharp at disparities below 0" in said) == (shear == 0)
+
+
+def test_a_wrong_pitch_is_told(photos: Path, tmp_path: Path, capsys) -> None:
+    told = ["--pattern", "{col}_{row}.png", "--pitch-mm", 20, 20, *CAMERAS[3:], "--z-range-mm", 30, 200]
+    assert run("import", photos, "-o", tmp_path / "mine", *told) == 0
+    assert re.search(
+        r"warning: most is sharp at about \d+ mm, .* correct --pitch-mm", capsys.readouterr().out
+    )
+
+
+def test_other_sources(tmp_path: Path, capsys) -> None:
+    root = hci_folder(tmp_path / "hci")
+    pfm(root / "gt_depth_lowres.pfm", np.full((H, W), 4.0))
+    assert run("import", root, "-o", tmp_path / "a", "--photons", 50) == 0
+    dataset = open_dataset(tmp_path / "a")
+    assert dataset.truth is not None
+    np.testing.assert_allclose(dataset.truth.z_mm, 4000)
+    assert dataset.grid.shear_px[0] > 0
+    np.save(tmp_path / "frames.npy", np.ones((2, 3, 4, H, W), np.uint8))
+    cameras = ["--pitch-mm", 5, 5, "--focal-mm", 50, "--pixel-mm", 0.05]
+    assert run("import", tmp_path / "frames.npy", "-o", tmp_path / "b", "--counts", *cameras) == 0
+    assert open_dataset(tmp_path / "b").counts.total == 4 * 6 * H * W
+    write(tmp_path / "lenses.png", np.tile(numbers(0, 0)[:, :6], (3, 4, 1)))
+    lens = ["--lens-array", 3, 4, "--lens-pitch-px", 6, 6, "--focal-mm", 3, "--pixel-mm", 0.01]
+    assert run("import", tmp_path / "lenses.png", "-o", tmp_path / "c", *lens) == 0
+    grid = open_dataset(tmp_path / "c").grid
+    assert (grid.rows, grid.cols, grid.height, grid.pitch_mm) == (3, 4, 6, (0.06, 0.06))
+    assert "cannot judge whether views fit" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("make", "options", "flags"),
+    [
+        ("hci", ["--grid", 3, 3], "--grid"),
+        ("hci", ["--array", "a", "--pitch-mm", 2, 2], "--array, --pitch-mm"),
+        ("lenses", ["--lens-array", 1, 2, "--lens-pitch-px", 4, 6, "--grid", 1, 2], "--grid"),
+        ("lenses", ["--array", "a"], "--array"),
+        ("folder", [*NAMED, "--array", "a"], "--array"),
+        ("folder", [*NAMED, "--frames", 0, 1, "--width", 3], "--width, --frames"),
+        ("folder", [*NAMED, "--inverted"], "--inverted"),
+        ("folder", [*NAMED, "--counts", "--linear"], "--linear"),
+        ("array", [*CAMERAS, "--lens-pitch-px", 6, 6], "--lens-pitch-px"),
+        ("array", [*CAMERAS, "--counts", "--width", 0], "--width"),
+    ],
+)
+def test_options_that_do_not_go_with_a_source_are_refused(tmp_path, capsys, make, options, flags) -> None:
+    makers = {"hci": hci(), "lenses": lens_picture, "folder": folder(), "array": array(LIGHT)}
+    words = f"error: {flags}: not for .*, which is read as: "
+    check_refused(makers[make](tmp_path), tmp_path / "out", options, words, capsys)
+
+
+def test_a_sensor_without_colours_may_be_said_to_have_no_pattern(tmp_path: Path) -> None:
+    np.save(tmp_path / "in.npy", np.ones((2, 2, H, W), np.uint8))
+    told = ["--counts", "--cfa", "none", *CAMERAS]
+    assert run("import", tmp_path / "in.npy", "-o", tmp_path / "out", *told) == 0
+    assert open_dataset(tmp_path / "out").cfa is None
+
+
+# What is wrong: a folder, the options, and words of the one sentence
+
+Make = Callable[[Path], Any]
+
+
+def folder(change: Make | None = None, **kinds: Any) -> Make:
+    def make(root: Path) -> Path:
+        made = make_folder(root / "in", **kinds)
+        if change is not None:
+            change(made)
+        return made
+
+    return make
+
+
+def picture(mode: str) -> Make:
+    return lambda root: Image.new(mode, (W, H)).save(root / "0_0.png")
+
+
+def png_of(width: int, height: int, bits: int = 8) -> bytes:
+    return png_file(width, height, bits, 2, zlib.compress(b"\0" * 1000))
+
+
+def content(name: str, data: bytes) -> Make:
+    return lambda root: (root / name).write_bytes(data)
+
+
+def cut(name: str) -> Make:
+    return lambda root: (root / name).write_bytes((root / name).read_bytes()[:-25])
+
+
+def turned(kind: str) -> Make:
+    def make(root: Path) -> None:
+        exif = Image.Exif()
+        exif[0x0112] = 6
+        Image.new("RGB", (W, H)).save(root / "0_0.png", kind, exif=exif)
+
+    return make
+
+
+def exr_of_two_parts(root: Path) -> None:
+    import OpenEXR
+
+    parts = [
+        OpenEXR.Part({}, {"RGB": np.ones((H, W, 3), np.float32)}, name=name) for name in ("left", "right")
+    ]
+    with OpenEXR.File(parts) as file:
+        file.write(str(root / "0_0.exr"))
+
+
+def frames(root: Path) -> Path:
+    """Of the first view 7 frames, of the second 5."""
+    for number, pages in enumerate((7, 5)):
+        tifffile.imwrite(root / f"{number}_0.tif", np.ones((pages, H, W), np.uint8), photometric="minisblack")
+    return root
+
+
+def hci(old: str = "", new: str = "", *, maps: Make | None = None) -> Make:
+    def make(root: Path) -> Path:
+        made = hci_folder(root / "in")
+        text = PARAMETERS.format(height=H, width=W, rows=3, cols=3)
+        assert old in text
+        (made / "parameters.cfg").write_text(text.replace(old, new) if old else text)
+        if maps is not None:
+            maps(made)
+        return made
+
+    return make
+
+
+def true_depth(image: Any, scale: float = -1.0, name: str = "gt_depth_lowres.pfm") -> Make:
+    return lambda root: pfm(root / name, np.asarray(image, np.float32), scale)
+
+
+def swapped(root: Path) -> None:
+    path = root / "gt_depth_lowres.pfm"
+    pfm(path, np.full((H, W), 4.0))
+    path.write_bytes(path.read_bytes().replace(b"\n-1\n", b"\n1\n"))
+
+
+def array(values: Any, name: str = "in.npy") -> Make:
+    def make(root: Path) -> Path:
+        np.save(root / name, values, allow_pickle=True)
+        return root / name
+
+    return make
+
+
+def file(name: str, data: bytes) -> Make:
+    def make(root: Path) -> Path:
+        (root / name).write_bytes(data)
+        return root / name
+
+    return make
+
+
+def lens_picture(root: Path) -> Path:
+    write(root / "in.png", numbers(0, 0))
+    return root / "in.png"
+
+
+def npz(root: Path) -> Path:
+    np.savez(root / "in.npz", a=np.zeros(3), b=np.zeros(3))
+    return root / "in.npz"
+
+
+def stack(root: Path) -> None:
+    tifffile.imwrite(root / "0_0.tif", np.zeros((3, H, W), np.uint8), photometric="minisblack")
+
+
+def two_sizes(root: Path) -> None:
+    for size in (H, H + 1):
+        tifffile.imwrite(root / "0_0.tif", np.zeros((size, W), np.uint8), append=size > H)
+
+
+def channels(root: Path) -> None:
+    frames = np.zeros((4, 2, H, W), np.uint8)
+    tifffile.imwrite(root / "0_0.tif", frames, imagej=True, metadata={"axes": "TCYX"})
+
+
+def hyphens(root: Path) -> None:
+    for number in range(4):
+        write(root / f"v-{number + 1}.png", numbers(0, 0))
+
+
+def tiff_of(number: int) -> Make:
+    def make(root: Path) -> Path:
+        tifffile.imwrite(root / "in.tif", np.zeros((number, H, W), np.uint8), photometric="minisblack")
+        return root / "in.tif"
+
+    return make
+
+
+PNG, EXR, TIF = ({"ending": ending} for ending in ("png", "exr", "tif"))
+FLOATS = EXR | {"dtype": np.float32}
+LIGHT = np.ones((2, 2, H, W))
+WRONG: list[tuple[str, Make, list[Any], str]] = [
+    ("no such source", lambda root: root / "in", NAMED, "there is no such file or folder"),
+    ("empty", lambda root: make_folder(root / "in", 0, 0), NAMED, "no file fits the pattern .*; there are no files"),
+    ("no match", folder(), ["--pattern", "v{index}.png", *CAMERAS], r"no file fits .* named like 0_0\.png"),
+    ("one missing", folder(lambda r: (r / "1_1.png").unlink(), rows=5, cols=5), NAMED, "missing of 5 x 5 views: 1_1.png"),
+    ("pattern that leaves the folder", folder(), ["--pattern", "../{index}.png", *CAMERAS], "pattern: expected {row}"),
+    ("two of one view", folder(lambda r: write(r / "00_0.png", numbers(0, 0))), NAMED, "is of the same view as"),
+    ("numbers far apart", folder(lambda r: write(r / "9_999999999.png", numbers(0, 0))), NAMED, "the numbers in"),
+    ("no square", folder(lambda r: [p.rename(r / f"{n}.png") for n, p in enumerate(sorted(r.iterdir()))]), ["--pattern", "{index}.png", *CAMERAS], "6 views are no square grid; .*--grid"),
+    ("other grid", folder(), [*NAMED, "--grid", 3, 3], "gives 2 rows and 3 columns, not those of --grid"),
+    ("no cameras", folder(), ["--pattern", "{col}_{row}.png"], "--pitch-mm, --focal-mm, --sensor-mm or --pixel-mm: missing"),
+    ("sensor and pixel", folder(), [*NAMED, "--pixel-mm", 1], "either the side of a pixel or the width"),
+    ("cfa unknown", folder(), [*NAMED, "--cfa", "RGB"], "cfa: there is no Bayer pattern"),
+    ("mixed sizes", folder(lambda r: write(r / "1_1.png", numbers(0, 0)[:5])), NAMED, "5 x 8 px, .* where 0_0.png has 6 x 8"),
+    ("alpha", folder(picture("RGBA")), NAMED, "0_0.png: has an alpha channel"),
+    ("one bit", folder(picture("1"), rows=1, cols=1), NAMED, "one bit per pixel.*--counts"),
+    ("turned JPEG", folder(turned("JPEG")), NAMED, r"has to be turned \(EXIF orientation 6\)"),
+    ("cut off", folder(cut("1_0.png")), NAMED, "1_0.png: damaged or cut off"),
+    ("no picture", folder(content("0_0.png", b"GIF89a" + bytes(99))), NAMED, "0_0.png: not a PNG, JPEG, TIFF or EXR"),
+    ("bomb", folder(content("0_0.png", png_of(60_000, 60_000))), NAMED, "exceeds limit of"),
+    ("parts of EXR", folder(exr_of_two_parts, **FLOATS), ["--pattern", "{col}_{row}.exr", *CAMERAS], "0_0.exr: has 2 parts"),
+    ("pages of no grid", tiff_of(7), CAMERAS, "in.tif: 7 views are no square grid; .*--grid"),
+    ("axes of another order", array(np.ones((9, H, W, 3))), CAMERAS, r"shape \(9, 6, 8, 3\); give --grid if it is \(N, H, W, C\)"),
+    ("another number of views", array(LIGHT[0]), [*CAMERAS, "--grid", 2, 3], "has 2 views, where --grid is of 2 x 3"),
+    ("pages of two sizes", folder(two_sizes, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS], "pictures of different sizes or types"),
+    ("channels as pages", folder(channels, **TIF), ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "the axes TCYX, frames of several channels"),
+    ("hyphen of a name", folder(hyphens), ["--pattern", "v{index}.png", *CAMERAS], "all numbers are below 0; write the hyphen"),
+    ("numbers of unknown curve", array(LIGHT.astype(np.uint8)), CAMERAS, "may be sRGB of pictures or linear"),
+    ("NaN in array", array(LIGHT * np.nan), CAMERAS, r"view \(0, 0\) holds NaN"),
+    ("objects", array(np.array([None, {}], dtype=object)), CAMERAS, "not a NumPy array"),
+    ("no array", file("in.npy", b"not an array"), CAMERAS, "not a NumPy array"),
+    ("negative counts", array(-LIGHT.astype(int)), [*CAMERAS, "--counts"], "must not be negative"),
+    ("other frames", frames, ["--pattern", "{col}_{row}.tif", *CAMERAS, "--counts"], "1_0.tif: .* 5 pages, where .* 7 pages"),
+    ("counts in colour", folder(), [*NAMED, "--counts"], "has 3 channels; photon counts have one"),
+    ("counts and photons", folder(channels=1), [*NAMED, "--counts", "--photons", 9], "--photons: is for pictures"),
+    ("lenses beyond", lens_picture, ["--lens-array", 1, 2, "--lens-pitch-px", 4.5, 6, *CAMERAS], "reach to 8.75, and the picture is 8 px wide"),
+    ("no section", hci("[intrinsics]\n", ""), [], "not a file of parameters"),
+    ("more cameras than views", hci("num_cams_x = 3", "num_cams_x = 4"), [], "missing of 3 x 4 views: input_Cam009.png, input_Cam010.png, input_Cam011.png"),
+    ("byte order", hci(maps=swapped), [], "the sign of the scale in its header"),
+    ("size of the map", hci(maps=true_depth(np.ones((W, H)))), [], "is 8 x 6 px, where the views are 6 x 8"),
+    ("depth 0", hci(maps=true_depth(np.zeros((H, W)))), [], "depths are not between"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("make", "options", "words"), [pytest.param(*row[1:], id=row[0]) for row in WRONG])
+def test_one_sentence_and_exit_code_2(tmp_path: Path, capsys, make: Make, options, words: str) -> None:
+    check_refused(make(tmp_path), tmp_path / "out", options, words, capsys)

@@ -1,0 +1,187 @@
+"""The grid behind poses: found in any order and place, or refused with the camera and how far off it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from posed_frames import about_y, frames_of, moved, read, turned
+from scipy.spatial.transform import Rotation
+from stored_datasets import one_sentence
+
+from pcii import InputError
+from pcii.exchange.posed_views import camera_grid_of, find_grid
+from pcii.exchange.transforms_file import MOST_PX
+
+SOMEWHERE = Rotation.from_euler("xyz", [40, -110, 20], degrees=True).as_matrix()
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (1, 5), (4, 1), (2, 2), (3, 4), (11, 13)])
+def test_frames_in_any_order_of_a_rig_anywhere_are_put_in_their_places(tmp_path: Path, shape) -> None:
+    rows, cols = shape
+    frames = frames_of(rows, cols, (5.0, 3.7), SOMEWHERE, (12.0, -7.0, 3.5))
+    mixed = [frames[n] for n in np.random.default_rng(1).permutation(len(frames))]
+    file = read(tmp_path, mixed)
+    found = find_grid(file)
+    names = [[file.frame_name(n) for n in row] for row in found.numbers]
+    assert names == [[f"images/{k}_{l}.png" for l in range(cols)] for k in range(rows)]
+    # Decimals come back as they were; an axis with one camera has the pitch of the other.
+    across, down = (5.0 if cols > 1 else None), (3.7 if rows > 1 else None)
+    assert found.pitch_mm == (across or down or 1.0, down or across or 1.0)
+    assert found.shear_px == found.offset_px == (0.0, 0.0)
+
+
+@given(
+    st.integers(1, 4),
+    st.integers(1, 4),
+    st.floats(0.01, 1000),
+    st.floats(0.1, 10),
+    st.integers(0, 99),
+)
+def test_every_grid_is_found(tmp_path_factory, rows, cols, pitch_mm, ratio, seed) -> None:
+    frames = frames_of(
+        rows, cols, (pitch_mm, pitch_mm * ratio), Rotation.random(random_state=seed).as_matrix()
+    )
+    file = read(tmp_path_factory.mktemp("any"), frames)
+    found = find_grid(file)
+    np.testing.assert_array_equal(found.numbers, np.arange(rows * cols).reshape(rows, cols))
+    if cols > 1:
+        assert found.pitch_mm[0] == pytest.approx(pitch_mm, rel=1e-8)  # 9 digits are kept
+    if rows > 1:
+        assert found.pitch_mm[1] == pytest.approx(pitch_mm * ratio, rel=1e-8)
+
+
+def test_right_is_larger_x_and_down_is_smaller_y(tmp_path: Path) -> None:
+    pose = np.eye(4)
+    frames = []
+    for name, x, y in (("here", 0, 0), ("right", 0.01, 0), ("below", 0, -0.02), ("both", 0.01, -0.02)):
+        pose[:3, 3] = x, y, 0
+        frames.append({"file_path": f"{name}.png", "transform_matrix": pose.tolist()})
+    file = read(tmp_path, frames)
+    found = find_grid(file)
+    names = [[file.frame_name(n) for n in row] for row in found.numbers]
+    assert names == [["here.png", "right.png"], ["below.png", "both.png"]]
+    assert found.pitch_mm == (10, 20)
+
+
+def test_shear_and_a_common_principal_point_are_found(tmp_path: Path) -> None:
+    frames = frames_of(3, 4)
+    for frame, (k, l) in zip(frames, np.ndindex(3, 4), strict=True):
+        frame |= {"cx": 320 + 7.5 + 1.25 * (l - 1.5), "cy": 240 - 3 - 0.5 * (k - 1)}
+    found = find_grid(read(tmp_path, frames[::-1], cx=1.0, cy=1.0))  # frames win over the top
+    assert found.shear_px == (1.25, -0.5)
+    assert found.offset_px == (7.5, -3)
+
+
+def test_poses_of_single_precision_are_accepted(tmp_path: Path) -> None:
+    frames = frames_of(3, 3, (5.0, 5.0), SOMEWHERE, (0.4, 0.3, 0.2))
+    for frame in frames:
+        frame["transform_matrix"] = np.float32(frame["transform_matrix"]).astype(float).tolist()
+    found = find_grid(read(tmp_path, frames))
+    assert found.pitch_mm == pytest.approx((5, 5), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("off_mm", "told"),
+    [
+        (
+            (2, 0, 0),
+            "is 2 mm from its place in a plane grid of 3 x 4 cameras, 2 to the right, 0 down, 0 forward",
+        ),
+        (
+            (0, 1, 0),
+            "is 1 mm from its place in a plane grid of 3 x 4 cameras, 0 to the right, -1 down, 0 forward",
+        ),
+        (
+            (0, 0, -3),
+            "is 3 mm from its place in a plane grid of 3 x 4 cameras, 0 to the right, 0 down, 3 forward",
+        ),
+        ((0.004, 0, 0), "is 0.004 mm from its place"),
+        ((500, 0, 0), "is 490 mm from its place"),  # of the last column
+    ],
+)
+def test_a_camera_out_of_its_place_is_named_with_the_distance(tmp_path: Path, off_mm, told) -> None:
+    frames = frames_of(3, 4)
+    moved(frames[5], *off_mm)
+    file = read(tmp_path, frames)
+    assert f"images/1_1.png {told}" in one_sentence(lambda: find_grid(file), file.path)
+
+
+def test_what_moves_nothing_visibly_is_accepted(tmp_path: Path) -> None:
+    """The nearest point moves by 640 / 4 px from camera to camera: 0.1 px are 1 / 1600 of 4 mm of pitch."""
+    frames = frames_of(3, 4)
+    moved(frames[5], 0.9 * MOST_PX / 160 * 4, 0, 0)
+    assert find_grid(read(tmp_path, frames)).pitch_mm == (5, 4)
+    moved(frames[5], 0.2 * MOST_PX / 160 * 4, 0, 0)
+    file = read(tmp_path, frames)
+    assert "and 0.1 is allowed" in one_sentence(lambda: find_grid(file), file.path)
+
+
+def test_a_turned_camera_is_named_with_the_angle(tmp_path: Path) -> None:
+    frames = frames_of(3, 3, turn=SOMEWHERE)
+    turned(frames[4], about_y(2.5))
+    file = read(tmp_path, frames)
+    told = one_sentence(lambda: find_grid(file), file.path)
+    assert "images/1_1.png is turned by 2.5 degrees from the common orientation" in told
+    # Of 0.004 degrees a point in the middle moves by 0.07 px, one in a corner by less than 0.1.
+    frames = frames_of(3, 3)
+    turned(frames[4], about_y(0.004))
+    find_grid(read(tmp_path, frames))
+
+
+def test_places_without_a_camera_are_named(tmp_path: Path) -> None:
+    frames = frames_of(3, 4)
+    file = read(tmp_path, frames[:6] + frames[7:])
+    assert "no camera at (1, 2) (row" in one_sentence(lambda: find_grid(file), file.path)
+    file = read(tmp_path, frames[1:-1])
+    assert "no camera at (0, 0) (row" in one_sentence(lambda: find_grid(file), file.path)
+    diagonal = read(tmp_path, [frames[0], frames[5]])
+    assert "no camera at (0, 1)" in one_sentence(lambda: find_grid(diagonal), diagonal.path)
+
+
+def test_two_cameras_at_one_place_are_named(tmp_path: Path) -> None:
+    frames = frames_of(2, 3)
+    file = read(tmp_path, [*frames, frames[2] | {"file_path": "again.png"}])
+    told = one_sentence(lambda: find_grid(file), file.path)
+    assert "images/0_2.png and again.png are at the same place" in told
+    same = [frames[0] | {"file_path": f"{n}.png"} for n in range(3)]
+    file = read(tmp_path, same)
+    assert "same place" in one_sentence(lambda: find_grid(file), file.path)
+
+
+def test_a_principal_point_that_is_no_shear_is_named(tmp_path: Path) -> None:
+    frames = frames_of(3, 3)
+    frames[7]["cx"] = 321.5
+    file = read(tmp_path, frames)
+    told = one_sentence(lambda: find_grid(file), file.path)
+    assert "images/2_1.png: its principal point (cx, cy) is 1.5 px from" in told
+
+
+def test_a_ring_of_cameras_that_look_inwards_is_no_grid(tmp_path: Path) -> None:
+    frames = frames_of(1, 8)
+    for number, frame in enumerate(frames):
+        turned(frame, about_y(45 * number))
+    file = read(tmp_path, frames)
+    assert "degrees from the common orientation" in one_sentence(lambda: find_grid(file), file.path)
+
+
+@pytest.mark.parametrize(
+    ("film", "focal_mm", "pixel_mm"),
+    [
+        ({"focal_mm": 50}, 50, 0.05),
+        ({"pixel_mm": 0.01}, 10, 0.01),
+        ({"sensor_mm": 36}, 56.25, 0.05625),
+        ({}, 5, 0.005),
+    ],
+)
+def test_one_length_tells_the_others(tmp_path: Path, film, focal_mm, pixel_mm) -> None:
+    file, told = read(tmp_path, frames_of(2, 3), cx=330, cy=238), []
+    lengths = {"focal_mm": None, "pixel_mm": None, "sensor_mm": None} | film
+    grid = camera_grid_of(file, find_grid(file), **lengths, tell=told.append)
+    assert (grid.focal_mm, grid.pixel_mm) == (focal_mm, pixel_mm)
+    assert (grid.pitch_mm, grid.shape_KLHW) == ((5, 4), (2, 3, 480, 640))
+    assert "10 px to the right of their middle and -2 px below" in told[-1]
+    assert ("focal length and pixel size are not in transforms.json" in told[0]) == (film == {})
+    with pytest.raises(InputError, match="give one of them"):
+        camera_grid_of(file, find_grid(file), 50, 0.01, None, told.append)

@@ -1,0 +1,181 @@
+"""What strangers write into transforms.json: read as nerfstudio reads it, or refused in one sentence."""
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from picture_folders import H, W, numbers, write
+from posed_frames import TOP, frames_of, read, written
+from stored_datasets import one_sentence
+
+from pcii import InputError
+from pcii.exchange.posed_views import camera_grid_of, find_grid
+from pcii.exchange.transforms_file import read_transforms
+
+MATRIX = frames_of(1, 1)[0]["transform_matrix"]
+
+
+def scaled(by: float, column: slice = slice(0, 3)) -> list[list[float]]:
+    """The matrix with columns of the rotation times a number."""
+    rows = [list(row) for row in MATRIX]
+    for row in rows[:3]:
+        row[column] = [by * value for value in row[column]]
+    return rows
+
+
+def changed(row: int, col: int, value: Any) -> list[list[Any]]:
+    rows: list[list[Any]] = [list(row) for row in MATRIX]
+    rows[row][col] = value
+    return rows
+
+
+def test_intrinsics_of_frames_win_and_centres_are_the_middle_by_default(tmp_path: Path) -> None:
+    frames = frames_of(1, 2)
+    frames[0] |= {"cx": 300}
+    for frame in frames:
+        frame |= {"fl_x": 900, "fl_y": 900}
+    file = read(tmp_path, frames, cy=200.5, k1=0.0, p2=0, camera_model="OPENCV", is_fisheye=False)
+    assert file.centres_px.tolist() == [[300, 200.5], [320, 200.5]]
+    assert file.focal_px == 900
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "focal_px"),
+    [("camera_angle_x", math.pi / 2, 320), ("camera_angle_y", math.pi / 2, 240), ("fl_y", 300, 300)],
+)
+def test_any_statement_of_the_focal_length_will_do(tmp_path: Path, name, value, focal_px) -> None:
+    file = read(tmp_path, frames_of(1, 1), **{"fl_x": None, "fl_y": None, name: value})
+    assert file.focal_px == pytest.approx(focal_px)
+
+
+def test_files_as_other_programs_write_them(tmp_path: Path) -> None:
+    """A byte order mark, no size, no endings, backslashes, places that were scaled, members of others."""
+    frames = frames_of(1, 2)
+    (tmp_path / "images").mkdir()
+    for frame in frames:
+        write(tmp_path / frame["file_path"], numbers(0, 0))
+        frame |= {"file_path": frame["file_path"].replace("/", "\\").removesuffix(".png"), "sharpness": 30}
+    path = written(tmp_path, frames, w=None, h=None, applied_scale=0.5, aabb_scale=16)
+    path.write_text("\ufeff" + path.read_text())
+    told: list[str] = []
+    file = read_transforms(path, tell=told.append)
+    assert told == ["not used of transforms.json: aabb_scale, sharpness"]
+    assert (file.height, file.width) == (H, W)
+    assert [file.frame_name(n) for n in range(2)] == ["images/0_0.png", "images/0_1.png"]
+    assert find_grid(file).pitch_mm == (10, 10)
+
+
+def test_a_photon_cube_says_so(tmp_path: Path) -> None:
+    """The file that visionsim writes: one file of pictures, none in the frames."""
+    frames = [{"transform_matrix": MATRIX}, {"transform_matrix": MATRIX}]
+    file = read(tmp_path, frames, file_path="frames.npy", bitpack=True, bitpack_dim=2, c=1)
+    assert (file.is_bitpacked, file.is_stack) == (True, True)
+    assert file.frame_name(1) == "frames.1"
+    assert not read(tmp_path, frames_of(1, 1)).is_bitpacked
+
+
+@pytest.mark.parametrize(
+    ("top", "told"),
+    [
+        ({"fl_x": None, "fl_y": None}, "fl_x: missing"),
+        ({"w": None}, "images/0_0.png: there is no such file"),
+        ({"h": 480.5}, "h: "),
+        ({"w": -3}, "w: "),
+        ({"fl_x": "long"}, "fl_x: "),
+        ({"fl_x": 10**400}, "fl_x: "),
+        ({"fl_y": 1010.0}, "fl_y: is 1010 where fl_x is 1000; pixels that are not square"),
+        ({"fl_x": None, "fl_y": None, "camera_angle_x": 4}, "camera_angle_x: "),
+        ({"p2": -1e-7}, "frames.0: the lens distorts"),
+        ({"is_fisheye": True}, "frames.0: the lens distorts"),
+        ({"distortion_params": [0, 0, 0.1]}, "frames.0: the lens distorts"),
+        ({"camera_model": "OPENCV_FISHEYE"}, "camera_model: expected one of OPENCV"),
+        ({"applied_scale": 0}, "applied_scale: "),
+        ({"file_path": "../frames.npy"}, "file_path: expected a path inside the folder"),
+    ],
+)
+def test_members_at_the_top_that_are_wrong_are_named(tmp_path: Path, top, told) -> None:
+    path = written(tmp_path, frames_of(1, 1), **top)
+    with pytest.raises(InputError) as caught:
+        read_transforms(path)
+    assert re.match(rf"{tmp_path}/(transforms\.json: )?{told}", str(caught.value))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("frame", "told"),
+    [
+        ({"transform_matrix": None}, "transform_matrix: "),
+        ({"transform_matrix": MATRIX[:3]}, "transform_matrix: expected four rows of four numbers"),
+        ({"transform_matrix": changed(3, 3, 2)}, "transform_matrix: expected four rows of four numbers"),
+        ({"transform_matrix": changed(0, 3, 1e300)}, "transform_matrix.0.3: "),
+        ({"transform_matrix": changed(0, 1, 0.3)}, "transform_matrix: is no rotation"),
+        ({"transform_matrix": scaled(0)}, "transform_matrix: is no rotation"),
+        ({"transform_matrix": scaled(2.5)}, "transform_matrix: is no rotation; .* scale by 2.5 to 2.5"),
+        ({"transform_matrix": scaled(-1, slice(1, 2))}, "transform_matrix: is no rotation"),
+        ({"file_path": None}, "file_path: expected a path inside the folder"),
+        ({"file_path": "/etc/passwd"}, "file_path: expected a path inside the folder"),
+        ({"file_path": "images/../../x.png"}, "file_path: expected a path inside the folder"),
+        ({"file_path": "a\0b.png"}, "file_path: expected a path inside the folder"),
+        ({"file_path": "out/secret.png"}, "file_path: expected a path inside the folder"),
+        ({"file_path": "."}, "file_path: expected a path inside the folder"),
+        ({"file_path": "./images/0_0.png"}, "file_path: is that of frames.0 too"),
+        ({"depth_file_path": "../d.npy"}, "depth_file_path: expected a path inside the folder"),
+        ({"w": 320}, "480 x 320 px"),
+        ({"fl_x": 1100, "fl_y": 1100}, "480 x 640 px and a focal length of 1100 px"),
+        ({"is_fisheye": True}, "the lens distorts"),
+    ],
+)
+def test_members_of_a_frame_that_are_wrong_are_named(tmp_path: Path, frame, told) -> None:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    (folder / "out").symlink_to(tmp_path)
+    frames = frames_of(1, 2)
+    frames[1] |= frame
+    path = written(folder, frames)
+    message = one_sentence(lambda: read_transforms(path), path)
+    assert re.match(rf"{path}: frames\.1[.:] ?(.*: )?{told}", message), message
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"[]", b"{}", b'{"frames": []}', b'{"frames": [3]}', b'{"fl_x": NaN}', b"[" * 10**5, b"\xff{}"],
+)
+def test_what_is_no_such_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "transforms.json"
+    path.write_bytes(content)
+    one_sentence(lambda: read_transforms(path), path)
+
+
+ODD = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(allow_nan=False),
+    st.text(max_size=5),
+    st.lists(st.integers(), max_size=3),
+    st.just({}),
+)
+
+
+@given(st.data())
+def test_one_member_of_any_kind_gives_a_grid_or_one_sentence(tmp_path_factory, data) -> None:
+    document: Any = json.loads(json.dumps(TOP | {"frames": frames_of(2, 2)}))
+    frame = data.draw(st.sampled_from(document["frames"]))
+    place = data.draw(
+        st.sampled_from([document, frame, *frame["transform_matrix"], frame["transform_matrix"]])
+    )
+    names = list(range(len(place))) if isinstance(place, list) else [*place, "cx", "k1", "bitpack"]
+    place[data.draw(st.sampled_from(names))] = data.draw(ODD)
+    path = tmp_path_factory.mktemp("odd") / "transforms.json"
+    path.write_text(json.dumps(document))
+    try:
+        file = read_transforms(path, tell=[].append)
+        found = camera_grid_of(file, find_grid(file), None, None, None, [].append).view_count
+    except InputError as fault:
+        found = str(fault)
+    assert found == 4 or (str(found).startswith(f"{path.parent}/") and "\n" not in str(found))
