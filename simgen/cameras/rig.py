@@ -129,7 +129,7 @@ class Rig:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Origins and unit directions (N, 3) of rays through points of films and of the lens (2, N).
 
-        `mitsuba_camera.film_rays` makes the same on the renderer's side. `lens_point` in mm is not used for
+        `path_tracing.film_rays` makes the same on the renderer's side. `lens_point` in mm is not used for
         pinholes.
         """
         axis_px = self.axis_px[k, l]

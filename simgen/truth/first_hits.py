@@ -14,8 +14,8 @@ from pcii.base.progress import Report, silent
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, Cameras, Rig, as_rig, centre_camera
 from simgen.renderer.intersection import blocked, first_objects
-from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.radiance import sensor_plugin
 
 IN_FOCUS_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
