@@ -11,9 +11,8 @@ from string import Template
 
 from pcii.base.errors import InputError
 from pcii.store.safe_files import new_folder_safely, write_bytes_safely
-from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import shorten
-from simgen.spec.recipe import recipe_file
+from simgen.spec.recipe import recipe_file, recipe_names
 from simgen.spec.scene import NAME
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
 from simgen.spec.sweeps import load_sweep
@@ -30,8 +29,7 @@ def list_scenes() -> list[str]:
 
 def list_recipes() -> list[str]:
     """A line for each recipe by name."""
-    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-    return [_line(name, _title_of_recipe) for name in sorted(names)]
+    return [_line(name, _title_of_recipe) for name in recipe_names()]
 
 
 def _title_of_recipe(name: str) -> str:

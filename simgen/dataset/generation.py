@@ -31,7 +31,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
-from simgen.truth.truth_file import TruthRequest, traced_for_visibility, write_truth
+from simgen.truth.truth_file import traced_for_visibility, write_truth
 
 Made = TypeVar("Made")
 
@@ -106,13 +106,13 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return read_whole(out, identity, content=True)
-        check_resources(prepared.needs, None, out)
+        check_resources(recipe, None, out)
         with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
             render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
         if recipe.products.counts:  # likewise: too much light
             with _timed(timings_s, "plan"):
                 counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
-                check_resources(prepared.needs, counting, out)
+                check_resources(recipe, counting, out)
         sweep_temporaries(out)
         photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
@@ -144,34 +144,25 @@ def _write_products(
 ) -> dict[str, Any] | None:
     """Write all products; what the manifest says of the photons, None without counts."""
     recipe, capture, photons = prepared.recipe, prepared.capture, None
-    products, render = recipe.products, recipe.render
+    products, sensor = recipe.products, recipe.sensor
 
     def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
         options = {"with_origins": products.truth, "keeps_frames": products.frames}
-        return log | write_counts(capture, recipe.sensor, arrivals, out, **options)
+        return log | write_counts(capture, sensor, arrivals, out, **options)
+
+    def make_truth() -> None:
+        planes_mm, has_errors = recipe.analysis.z_mm, recipe.grid.errors is not None
+        write_truth(products, planes_mm, has_errors, render_scene, capture.rig, out, report)
 
     if products.truth or products.view_truth:
-        request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
         with _timed(timings_s, "truth"):
-            reuse.folder(
-                prepared.truth_key,
-                out / TRUTH,
-                lambda: write_truth(request, render_scene, capture.rig, out, report),
-            )
+            reuse.folder(prepared.truth_key, out / TRUTH, make_truth)
     if counting is not None and counting.thins:
         with _timed(timings_s, "photons"):
             photons = write(*thin(capture, prepared.setup(render_scene), counting, report))
     dense = None if counting is None or counting.thins else counting
-    views = RenderedViews(
-        capture,
-        recipe.sensor,
-        recipe.exposure,
-        products.radiance,
-        render.samples_per_pixel if dense is None else dense.samples,
-        render.background_samples_per_pixel if dense is None else None,
-        out,
-        are_for_counts=dense is not None,
-    )
+    samples = None if dense is None else dense.samples
+    views = RenderedViews(capture, sensor, recipe.exposure, products.radiance, recipe.render, samples, out)
     if products.radiance != "none" or dense is not None:
         with _timed(timings_s, "radiance"):
             views.render(render_scene, report)

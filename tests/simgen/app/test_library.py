@@ -109,7 +109,7 @@ def test_photons_by_lens_errors_and_sensor_are_those_of_the_dataset(tmp_path: Pa
 
 @pytest.mark.renders
 def test_photons_too_many_to_be_kept_one_by_one_can_be_scored(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(counting_plan, "MOST_SINGLE_PHOTONS", 1 << 15)
+    monkeypatch.setattr(counting_plan, "MAX_SINGLE_PHOTONS", 1 << 15)
     counts, truth = simgen.draw_photons(simgen.load_scene("two_objects"), GRID, budget=6000, seed=1)
     assert abs(counts.total - 36e3) < 5 * np.sqrt(36e3)
     assert truth.photons is None
