@@ -100,7 +100,7 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     hide_frame(whole)
     rows, cols = part_of_interest(objects)
     if rows.stop - rows.start < grid.height:
-        left, right, top, bottom = cols.start - 0.5, cols.stop - 0.5, rows.start - 0.5, rows.stop - 0.5
+        left, right, top, bottom = (edge - 0.5 for edge in (cols.start, cols.stop, rows.start, rows.stop))
         corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
         whole.plot(*corners, color="0.6", linewidth=0.8)
     _draw_truth(depth, named_objects, Truth(hits.z_mm, hits.object_id, render_scene.names))

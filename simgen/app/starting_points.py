@@ -18,7 +18,6 @@ from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scen
 from simgen.spec.sweeps import load_sweep
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
-LONGEST_FAULT = 100
 
 
 def list_scenes() -> list[str]:
@@ -42,7 +41,7 @@ def _line(name: str, title_of: Callable[[str], str]) -> str:
     try:
         return f"{name:20} {title_of(name)}"
     except InputError as fault:
-        return f"{name:20} not valid: {shorten(str(fault), LONGEST_FAULT)}"
+        return f"{name:20} not valid: {shorten(str(fault), 100)}"
 
 
 def write_new_scene(name: str, source: str | None = None) -> Path:

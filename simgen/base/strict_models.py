@@ -17,7 +17,6 @@ from pcii.base.errors import InputError
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80
-LONGEST_SENTENCE = 400
 MOST_FAULTS = 20
 """Largest number of faults that one error lists."""
 
@@ -232,7 +231,7 @@ def _field(location: Sequence[int | str], values: Any, *, is_missing: bool) -> s
     return text
 
 
-def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
+def shorten(text: str, longest: int = 400) -> str:
     """One line fit for a terminal: without control characters, and with its middle left out if long."""
     if len(text) > longest:
         text = f"{text[: longest * 3 // 4]}...{text[-longest // 4 :]}"

@@ -135,6 +135,8 @@ def probe_scene(target: Prepared) -> Facts:
     corner_hits = [first_hits_of_view(render_scene, coarse, k, l) for k, l in corners(grid)]
     hit_s = (time.perf_counter() - start_s) / (len(corner_hits) * centre.z_mm.size)
     boxes, light = _boxes_mm(render_scene), image.sum(axis=(0, 1))
+    pixels = np.bincount(colour_cells(recipe.cfa).ravel(), minlength=channel_count(recipe.cfa))
+    weight = light * pixels
     shining = {surface.number for surface in render_scene.shining}
     objects: list[ObjectFacts] = []
     for number, name in render_scene.names.items():
@@ -157,7 +159,7 @@ def probe_scene(target: Prepared) -> Facts:
         objects=tuple(objects),
         corners=len(corner_hits),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
-        colour_share=_colour_share(light, recipe.cfa),
+        colour_share=weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum(),
         other_share=_share(image[centre.object_id == 0].sum(axis=0), light),
         lamps_away=_lamps_away(target.scene, list(boxes.values())),
         plan=counting_plan,
@@ -189,12 +191,6 @@ def _picture(
 
 def _share(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0)
-
-
-def _colour_share(light: np.ndarray, cfa: str | None) -> np.ndarray:
-    pixels = np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa))
-    weight = light * pixels
-    return weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum()
 
 
 def _is_cut(mask: np.ndarray) -> bool:

@@ -1,6 +1,5 @@
 """`simgen check`, and what it and `preview` look at: a scene or a recipe, by name or path."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -39,12 +38,8 @@ def lint(
     grid, sensor = target.recipe.grid, target.recipe.sensor
     views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
-    first_values = (
-        f"; of {axis.field} the first of {len(axis.values)} values, {json.dumps(axis.values[0])}"
-        for axis in sweep.axes
-    )
-    title = target.recipe.title or target.scene.title
-    line = f"{title}: {views}, {pitch}, {sensor.cfa}{''.join(first_values)}"
+    first = f"; of {', '.join(sweep.fields)} the first value" if sweep.axes else ""
+    line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {sensor.cfa}{first}"
     if lack := shortage(target.recipe, None, available_bytes()):  # so that it cannot even be looked at
         return line, [Finding("bad", "memory", lack)]
     return line, findings(probe_scene(target))

@@ -1,5 +1,6 @@
 """From a recipe to a dataset folder: the order of the work, and what datasets have in common."""
 
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -201,8 +202,7 @@ def _skipped(
     see a point; both None if there was no such work.
     """
     recipe, products, render = prepared.recipe, prepared.recipe.products, prepared.recipe.render
-    grid = recipe.grid.camera_grid()
-    pixels = grid.view_count * grid.height * grid.width
+    pixels = math.prod(recipe.grid.camera_grid().shape_KLHW)
     entries: list[dict[str, Any]] = []
 
     def add(what: str, why: str, saved: int, unit: str) -> None:
@@ -218,11 +218,10 @@ def _skipped(
     elif products.radiance == "mosaic" and recipe.cfa is not None:
         what = "two of three colours of the radiance images"
         add(what, "the Bayer pattern hides them", 8 * pixels, "bytes before compression")
-    if products.radiance != "none" and not is_dense:
-        saved = background_paths_saved(render_scene, prepared.capture.rig, render)
-        if saved:
-            why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
-            add("samples where no object can be seen", why, saved, "light paths")
+    has_images = products.radiance != "none" and not is_dense
+    if has_images and (saved := background_paths_saved(render_scene, prepared.capture.rig, render)):
+        why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
+        add("samples where no object can be seen", why, saved, "light paths")
     if shadow_rays is not None:
         add("visibility of some points", "no shape can stand in the way", pixels - shadow_rays, "rays")
     elif products.truth:

@@ -61,12 +61,11 @@ def halved_view(
 
 def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
     """Light paths that all views take less than with `render.samples_per_pixel` everywhere."""
-    fewer = render.background_samples_per_pixel
+    samples, fewer = render.samples_per_pixel, render.background_samples_per_pixel
     if fewer is None:
         return 0
     cameras = (rig.camera(k, l) for k, l in np.ndindex(rig.grid.rows, rig.grid.cols))
-    saved = (windows_of_objects(render_scene, each, render.samples_per_pixel, fewer)[1] for each in cameras)
-    return sum(max(paths, 0) for paths in saved)
+    return sum(max(windows_of_objects(render_scene, each, samples, fewer)[1], 0) for each in cameras)
 
 
 @dataclass(frozen=True, eq=False)
