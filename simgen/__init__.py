@@ -14,15 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simgen.app.in_memory import draw_photons, render
-    from simgen.app.library import (
-        Executor,
-        RecipeFile,
-        generate,
-        generate_collection,
-        load_recipe,
-        load_scene,
-        preview,
-    )
+    from simgen.app.library import Executor, generate, generate_collection, load_scene, preview
     from simgen.importing.scene_import import ImportedScene, import_scene
     from simgen.spec.lights import (
         AreaLight,
@@ -49,64 +41,22 @@ if TYPE_CHECKING:
         Stripes,
         Text,
     )
-    from simgen.spec.recipe import CalibrationErrors, Lens, Sensor
+    from simgen.spec.recipe import CalibrationErrors, Lens, RecipeFile, Sensor, load_recipe
     from simgen.spec.scene import Backdrop, Scene, SceneObject
     from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Sphere
 
-__all__ = [
-    "AreaLight",
-    "Backdrop",
-    "Box",
-    "CalibrationErrors",
-    "Card",
-    "Checks",
-    "Cylinder",
-    "DirectionalLight",
-    "Edge",
-    "Emission",
-    "EnvironmentLight",
-    "Executor",
-    "Glass",
-    "ImportedScene",
-    "Lens",
-    "Level",
-    "Material",
-    "Matt",
-    "Mesh",
-    "Metal",
-    "Noise",
-    "Plastic",
-    "PointLight",
-    "Principled",
-    "RecipeFile",
-    "Scene",
-    "SceneObject",
-    "Sensor",
-    "Spectrum",
-    "Sphere",
-    "SpotLight",
-    "Star",
-    "Stripes",
-    "Text",
-    "UniformLight",
-    "draw_photons",
-    "generate",
-    "generate_collection",
-    "import_scene",
-    "load_recipe",
-    "load_scene",
-    "preview",
-    "render",
-]
-_MODULES = (
-    "app.library",
-    "app.in_memory",
-    "importing.scene_import",
-    "spec.scene",
-    "spec.shapes",
-    "spec.materials",
-    "spec.lights",
-)
+__all__ = ["draw_photons", "import_scene", "render"]
+__all__ += ["generate", "generate_collection", "load_recipe", "load_scene", "preview"]
+__all__ += ["Backdrop", "Executor", "ImportedScene", "RecipeFile", "Scene", "SceneObject"]
+__all__ += ["CalibrationErrors", "Lens", "Sensor"]
+__all__ += ["Box", "Card", "Cylinder", "Mesh", "Sphere"]
+__all__ += ["Emission", "Material", "Spectrum"]
+__all__ += ["Glass", "Matt", "Metal", "Plastic", "Principled"]
+__all__ += ["Checks", "Edge", "Noise", "Star", "Stripes", "Text"]
+__all__ += ["AreaLight", "DirectionalLight", "PointLight", "SpotLight"]
+__all__ += ["EnvironmentLight", "Level", "UniformLight"]
+_MODULES = "app.library", "app.in_memory", "importing.scene_import", "spec.recipe", "spec.scene"
+_MODULES += "spec.shapes", "spec.materials", "spec.lights"
 """Where the names are, looked for in this order: `load_scene` is that of `app`."""
 __version__ = version("photon-integral-imaging")
 

@@ -75,6 +75,7 @@ KNOW_RECIPE = {
     "simgen.check.targets",
     "simgen.dataset.generation",
     "simgen.dataset.prepared",
+    "simgen.dataset.resources",
     "simgen.spec.sweeps",
 }
 SMALL_ROOMS: set[str] = set()

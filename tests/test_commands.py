@@ -328,7 +328,7 @@ def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> 
     for command, answer in (
         ("doctor", "Rendering will run with"),
         ("scenes", "\ntwo_objects "),
-        ("recipes", "\npaper "),
+        ("scenes", "\npaper "),
         ("schema scene", '"additionalProperties": false'),
         ("schema recipe", '"additionalProperties": false'),
     ):

@@ -20,7 +20,6 @@ from simgen.app.scene_commands import (
     new_recipe,
     new_scene,
     preview,
-    recipes,
     scenes,
     schema,
 )
@@ -29,7 +28,7 @@ app = command_line.command_app(
     "simgen", "Make photon-limited elemental images from physics, with their truth."
 )
 
-for command in (scenes, recipes, schema, check, preview, new_scene, new_recipe, import_scene):
+for command in (scenes, schema, check, preview, new_scene, new_recipe, import_scene):
     app.command(command)
 
 benchmark = App(
@@ -64,8 +63,8 @@ def doctor(*, require_compiled: bool = False, json: Json = False) -> None:
 
     chosen, candidates, advice = backend.choose(), backend.survey(), backend.advice()
     if json:
-        found = [asdict(candidate) for candidate in candidates]
-        answer_json({"chosen": asdict(chosen), "candidates": found, "advice": advice})
+        survey = [asdict(candidate) for candidate in candidates]
+        answer_json({"chosen": asdict(chosen), "candidates": survey, "advice": advice})
     else:
         answer(f"Rendering will run with {chosen.line()}")
         for candidate in candidates:
@@ -108,14 +107,14 @@ def generate(
     out
         Folder for the dataset or collection: new, empty, or an unfinished one of the same recipe.
     seeds
-        Make so many datasets, of the recipe's seed and those that follow. Each is whole; radiance is rendered
-        for each, so leave it out where nothing needs it.
+        Make this many datasets, of the recipe's seed and those that follow.
     scenes
         Make datasets of this many drawn scenes, from the recipe's scene_number on.
     """
-    from simgen.app.library import RecipeFile, generate_sweep
     from simgen.app.library import generate as generate_dataset
+    from simgen.app.library import generate_sweep
     from simgen.renderer import backend
+    from simgen.spec.recipe import RecipeFile
     from simgen.spec.sweeps import load_sweep
 
     sweep = load_sweep(recipe, set, seeds=seeds, scenes=scenes, trust_python=trust_python)

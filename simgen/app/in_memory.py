@@ -70,21 +70,28 @@ def draw_photons(
     prepared = _prepare("draw_photons", scene, grid, lens, errors, {"seed": seed, **values})
     recipe, render_scene = prepared.recipe, prepared.render_scene()
     capture, counting = prepared.capture, prepared.plan(render_scene)
-    check_resources(prepared.needs, counting, Path())
-    drawn = None
+    check_resources(prepared.recipe, counting, Path())
     if counting.thins:
-        drawn = thin(capture, prepared.setup(render_scene), counting, report)
-    arrivals, _ = drawn or _draw_from_rendered(capture, render_scene, counting, report)
+        arrivals, _ = thin(capture, prepared.setup(render_scene), counting, report)
+    else:
+        arrivals = _draw_from_rendered(capture, render_scene, counting, report)
     detected = detect(arrivals, grid, recipe.cfa, recipe.sensor, capture.seed)
     is_single = detected.object_id is not None
     counted = read_out(detected, grid, recipe.sensor, capture.seed, keeps_frames=is_single)
     counts = counts_of(counted, grid, recipe.cfa, recipe.sensor, keeps_frames=is_single)
-    return counts, _truth(render_scene, grid, counted)
+    photons = None
+    if is_single:
+        origins = counted.one_by_one().columns()
+        photons = PhotonTruth(**{name: origins[name] for name in (*"klij", "object_id", "z_mm")})
+    centre = first_hits_at_centre(render_scene, grid)
+    covered = coverage(render_scene, centre_camera(grid), centre.object_id)
+    truth = Truth(centre.z_mm, centre.object_id, render_scene.names, photons, centre.normal, covered)
+    return counts, truth
 
 
 def _draw_from_rendered(
     capture: Capture, render_scene: RenderScene, counting: Plan, report: Report
-) -> tuple[PhotonTable, dict[str, Any]]:
+) -> PhotonTable:
     """Photons where they are too many to be drawn one by one: of views that are rendered in memory."""
 
     @cache
@@ -94,7 +101,7 @@ def _draw_from_rendered(
 
     return draw_from_views(
         capture, lambda k, l: view_of(k, l)[0], lambda k, l: view_of(k, l)[1], counting, report
-    )
+    )[0]
 
 
 def render(
@@ -128,7 +135,7 @@ def render(
             f"grid: radiance of all views takes {in_bytes(needed)} of memory, and this machine has "
             f"{in_bytes(room)} available; take fewer or smaller views"
         )
-    check_resources(prepared.needs, None, Path())
+    check_resources(prepared.recipe, None, Path())
     render_scene, capture = prepared.render_scene(), prepared.capture
     radiance = np.empty((*grid.shape_KLHW, 3), np.float32)
     for done, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols), start=1):
@@ -151,20 +158,3 @@ def _prepare(
             raise InputError(f"{name}: expected a {kind.__name__}, got {type(value).__name__}")
     cameras = asdict(grid) | {"lens": lens, "errors": errors}
     return prepare_scene(validate(Recipe, {"scene": "as given", "grid": cameras, **values}, what), scene)
-
-
-def _truth(render_scene: RenderScene, grid: CameraGrid, counted: PhotonTable) -> Truth:
-    """What the virtual centre sees of a scene, and the origins of the photons where they are known."""
-    centre = first_hits_at_centre(render_scene, grid)
-    photons = None
-    if counted.object_id is not None and counted.z_mm is not None:
-        origins = counted.one_by_one().columns()
-        photons = PhotonTruth(**{name: origins[name] for name in (*"klij", "object_id", "z_mm")})
-    return Truth(
-        z_mm=centre.z_mm,
-        object_id=centre.object_id,
-        names=render_scene.names,
-        photons=photons,
-        normal=centre.normal,
-        coverage=coverage(render_scene, centre_camera(grid), centre.object_id),
-    )

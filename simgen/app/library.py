@@ -1,7 +1,6 @@
 """What the commands do, as functions: scenes and recipes by name, datasets, pictures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,22 +10,13 @@ from pcii.base.progress import Report, silent
 from pcii.exchange.dataset_card import write_card
 from pcii.io.collection import Collection, open_collection
 from simgen.app.pictures import Preview, check_picture_path, draw_preview
-from simgen.check.targets import load_target, target_of_scene
+from simgen.check.targets import load_target
 from simgen.dataset import dataset_collection as collections
 from simgen.dataset import generation
-from simgen.spec import recipe as recipes
 from simgen.spec import scene_lookup
-from simgen.spec.recipe import Recipe
+from simgen.spec.recipe import RecipeFile
 from simgen.spec.scene import Scene, scene_of
 from simgen.spec.sweeps import Sweep, load_sweep
-
-
-@dataclass(frozen=True)
-class RecipeFile:
-    """A recipe as its TOML file and overrides say, and the folder beside which its scene is looked up."""
-
-    recipe: Recipe
-    folder: Path
 
 
 def load_scene(
@@ -48,20 +38,6 @@ def load_scene(
     if isinstance(scene, dict):
         return scene_of(scene, None if folder is None else Path(folder), "scene")
     return scene_lookup.load_scene(str(scene), number=number)[0]
-
-
-def load_recipe(
-    name_or_path: str | Path, overrides: Sequence[str] = (), *, trust_python: bool = False
-) -> RecipeFile:
-    """A recipe by the name of one that ships or by path; `overrides` such as "photons.budget=300".
-
-    A file that names a Python function as its scene is read only if its author is trusted, `trust_python`.
-    Raises `pcii.InputError` for a recipe that is missing or wrong, with the field at fault.
-
-    >>> load_recipe("paper", ["photons.budget=300"]).recipe.photons.budget
-    300.0
-    """
-    return RecipeFile(*recipes.load_recipe(str(name_or_path), overrides, trust_python=trust_python))
 
 
 def generate(recipe: RecipeFile | str | Path, out: str | Path, report: Report = silent) -> dict[str, Any]:
@@ -145,10 +121,7 @@ def preview(
     """
     if out is not None:
         check_picture_path(Path(out))
-    if isinstance(scene, Scene):
-        target = target_of_scene(scene)
-    else:
-        target = load_target(str(scene), overrides, scene_number, trust_python=trust_python)
+    target = load_target(scene, overrides, scene_number, trust_python=trust_python)
     picture = draw_preview(target, samples_per_pixel)
     if out is not None:
         picture.write(out)

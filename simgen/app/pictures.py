@@ -53,7 +53,7 @@ BLOCKS = 24, 128
 
 @dataclass(frozen=True, eq=False)
 class Preview:
-    """What a scene looks like, in one figure; notebooks show it."""
+    """A figure of what a scene or a dataset looks like; notebooks show it."""
 
     title: str
     figure: "Figure" = field(repr=False)
@@ -61,10 +61,15 @@ class Preview:
     def write(self, out: str | Path, dots_per_inch: float | None = None) -> None:
         """Write it as PNG or JPEG; `InputError` for another name and for a folder that is not there."""
         check_picture_path(Path(out))
-        _save(self.figure, Path(out), dots_per_inch)
+        write_bytes_safely(Path(out), self._encode(FORMATS[Path(out).suffix.lower()], dots_per_inch))
 
     def _repr_png_(self) -> bytes:
-        return _encode(self.figure, "png")
+        return self._encode("png", None)
+
+    def _encode(self, kind: str, dots_per_inch: float | None) -> bytes:
+        buffer, dpi = io.BytesIO(), dots_per_inch or "figure"
+        self.figure.savefig(buffer, format=kind, dpi=dpi, bbox_inches="tight", pad_inches=0.15)
+        return buffer.getvalue()
 
 
 def check_picture_path(out: Path) -> None:
@@ -73,16 +78,6 @@ def check_picture_path(out: Path) -> None:
         raise InputError(f"{out}: name a .png or .jpg file")
     if not out.parent.is_dir():
         raise InputError(f"{out}: there is no folder {out.parent}; make it first")
-
-
-def _encode(figure: "Figure", kind: str, dots_per_inch: float | None = None) -> bytes:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=dots_per_inch or "figure", bbox_inches="tight", pad_inches=0.15)
-    return buffer.getvalue()
-
-
-def _save(figure: "Figure", out: Path, dots_per_inch: float | None = None) -> None:
-    write_bytes_safely(out, _encode(figure, FORMATS[out.suffix.lower()], dots_per_inch))
 
 
 def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
@@ -105,7 +100,7 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     hide_frame(whole)
     rows, cols = part_of_interest(objects)
     if rows.stop - rows.start < grid.height:
-        left, right, top, bottom = cols.start - 0.5, cols.stop - 0.5, rows.start - 0.5, rows.stop - 0.5
+        left, right, top, bottom = (edge - 0.5 for edge in (cols.start, cols.stop, rows.start, rows.stop))
         corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
         whole.plot(*corners, color="0.6", linewidth=0.8)
     _draw_truth(depth, named_objects, Truth(hits.z_mm, hits.object_id, render_scene.names))
@@ -146,7 +141,7 @@ def write_sheet(path: Path, out: Path) -> None:
     Raises `InputError` for a folder that is no finished dataset, or a picture that cannot be written.
     """
     check_picture_path(out)
-    _save(draw_sheet(open_dataset(path)), out)
+    Preview(path.name, draw_sheet(open_dataset(path))).write(out)
 
 
 def draw_sheet(dataset: Dataset) -> "Figure":

@@ -23,7 +23,7 @@ TrustPython = Annotated[
 
 
 def scenes() -> None:
-    """List the scenes that ship or stand in the working directory's `scenes/`, one line each.
+    """List scenes, then recipes: what ships or stands in the working directory's `scenes/`, `data_recipes/`.
 
     Of drawn scenes a number says which one is meant: `--scene 17`.
 
@@ -31,25 +31,11 @@ def scenes() -> None:
 
         simgen scenes
     """
-    from simgen.app.starting_points import list_scenes
+    from simgen.app.starting_points import list_recipes, list_scenes
 
-    for line in list_scenes():
+    for line in (*list_scenes(), "", "Recipes, of which `simgen generate` makes datasets:", *list_recipes()):
         answer(line)
     say_next("simgen", "preview", "two_objects", "-o", "two_objects.png")
-
-
-def recipes() -> None:
-    """List the recipes that ship or stand in the working directory's `data_recipes/`, one line each.
-
-    Example of use:
-
-        simgen recipes
-    """
-    from simgen.app.starting_points import list_recipes
-
-    for line in list_recipes():
-        answer(line)
-    say_next("simgen", "generate", "small", "-o", "out/small")
 
 
 def schema(what: Literal["scene", "recipe"]) -> None:
@@ -243,15 +229,7 @@ def import_scene(
     """
     from simgen.importing.scene_import import import_scene
 
-    imported = import_scene(
-        file,
-        out,
-        camera=camera,
-        unit=unit,
-        place_at_mm=place_at_mm,
-        fit_mm=fit_mm,
-        emission_unit=emission_unit,
-    )
-    for line in imported.lines():
+    place = {"camera": camera, "unit": unit, "place_at_mm": place_at_mm, "fit_mm": fit_mm}
+    for line in import_scene(file, out, **place, emission_unit=emission_unit).lines():
         say(line)
     say_next("simgen", "preview", out, "-o", f"{out.name}.png")

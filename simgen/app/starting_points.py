@@ -11,15 +11,13 @@ from string import Template
 
 from pcii.base.errors import InputError
 from pcii.store.safe_files import new_folder_safely, write_bytes_safely
-from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import shorten
-from simgen.spec.recipe import recipe_file
+from simgen.spec.recipe import recipe_file, recipe_names
 from simgen.spec.scene import NAME
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, load_scene, scene_names
 from simgen.spec.sweeps import load_sweep
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
-LONGEST_FAULT = 100
 
 
 def list_scenes() -> list[str]:
@@ -30,8 +28,7 @@ def list_scenes() -> list[str]:
 
 def list_recipes() -> list[str]:
     """A line for each recipe by name."""
-    names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-    return [_line(name, _title_of_recipe) for name in sorted(names)]
+    return [_line(name, _title_of_recipe) for name in recipe_names()]
 
 
 def _title_of_recipe(name: str) -> str:
@@ -44,7 +41,7 @@ def _line(name: str, title_of: Callable[[str], str]) -> str:
     try:
         return f"{name:20} {title_of(name)}"
     except InputError as fault:
-        return f"{name:20} not valid: {shorten(str(fault), LONGEST_FAULT)}"
+        return f"{name:20} not valid: {shorten(str(fault), 100)}"
 
 
 def write_new_scene(name: str, source: str | None = None) -> Path:

@@ -17,31 +17,11 @@ OVERLAP = 1 / 1024
 rounded corners would leave gaps between them."""
 MOST_CELLS = 1 << 25
 PAIRS_AT_ONCE = 1 << 18
-# Points around a cell, counterclockwise with v up: its corners 0, 2, 4, 6 and the ends 1, 3, 5, 7 of the line
-# on its sides. The polygons that are full, by the sum of 1, 2, 4, 8 for the corners that are full.
-_PARTS: dict[int, tuple[tuple[int, ...], ...]] = {
-    1: ((0, 1, 7),),
-    2: ((1, 2, 3),),
-    3: ((0, 2, 3, 7),),
-    4: ((3, 4, 5),),
-    5: ((0, 1, 7), (3, 4, 5)),
-    6: ((1, 2, 4, 5),),
-    7: ((0, 2, 4, 5, 7),),
-    8: ((5, 6, 7),),
-    9: ((0, 1, 5, 6),),
-    10: ((1, 2, 3), (5, 6, 7)),
-    11: ((0, 2, 3, 5, 6),),
-    12: ((3, 4, 6, 7),),
-    13: ((0, 1, 3, 4, 6),),
-    14: ((1, 2, 4, 6, 7),),
-}
-_JOINED = {5: ((0, 1, 3, 4, 5, 7),), 10: ((1, 2, 3, 5, 6, 7),)}
-"""The same of two opposite full corners, where the middle between them is full too."""
+_OPPOSITE = {5: (1, 4), 10: (2, 8)}
+"""Sums of two opposite full corners, which are apart unless the middle between them is full."""
 
 Polygons = tuple[np.ndarray, np.ndarray]
 """Corners (N, V, 2), x right and y up in pixels, and how many of them (N,) each polygon has."""
-Part = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Triangles (M, 3) of new corners, the mesh's face (C,) that each corner lies on, and shares (C, 3) of it."""
 
 
 def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles | None:
@@ -69,8 +49,20 @@ def cut_out(mesh: Triangles, opacity: np.ndarray, *, tiled: bool) -> Triangles |
     is_line = np.abs(cross_2d(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])) < OVERLAP**2
     col, row = np.round(corners[:, 0]).astype(np.int64).T
     is_whole = np.where(is_line, full[row, col] > 0, is_whole)
-    parts = list(_clipped(_pieces(values, sums), corners, ~is_empty & ~is_whole & ~is_line))
-    return _joined(mesh, mesh.faces[is_whole], parts)
+    parts = [*_clipped(_pieces(values, sums), corners, ~is_empty & ~is_whole & ~is_line)]
+    if not is_whole.any() and not any(len(faces) for faces, _, _ in parts):
+        return None
+
+    def at_corners(values: np.ndarray) -> np.ndarray:
+        values = values.astype(np.float64)
+        mixed = [np.einsum("nc,ncd->nd", shares, values[mesh.faces[face]]) for _, face, shares in parts]
+        return np.concatenate([values, *mixed])
+
+    starts = len(mesh.positions) + np.cumsum([0, *(len(face) for _, face, _ in parts)])
+    faces = [mesh.faces[is_whole], *(part[0] + start for part, start in zip(parts, starts, strict=False))]
+    normals = None if mesh.normals is None else at_corners(mesh.normals)
+    positions, texcoords = at_corners(mesh.positions), at_corners(mesh.texcoords)
+    return Triangles.checked(positions, np.concatenate(faces), normals, texcoords)
 
 
 def _all_in(flag: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -84,17 +76,24 @@ def _all_in(flag: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 def _pieces(values: np.ndarray, sums: np.ndarray) -> Polygons:
     """The full part of the image as convex polygons of at most 6 corners."""
-    shapes, counts = [_rectangles(sums == 15)], [4]
+    shapes = [_rectangles(sums == 15)]
     joined = values[:-1, :-1] + values[:-1, 1:] + values[1:, 1:] + values[1:, :-1] >= 4 * FULL
-    for number, apart in _PARTS.items():
-        here = sums == number
-        for parts, cells in ((apart, here & ~joined), (_JOINED.get(number, apart), here & joined)):
-            ring = _ring(values, *np.nonzero(cells))
-            for part in parts:
-                shapes.append(ring[:, list(part)])
-                counts.append(len(part))
+    for number in range(1, 15):
+        for parts, is_joined in ((_OPPOSITE.get(number, (number,)), False), ((number,), True)):
+            ring = _ring(values, *np.nonzero((sums == number) & (joined == is_joined)))
+            shapes += [ring[:, _outline(part)] for part in parts]
     padded = [np.pad(shape, ((0, 0), (0, 6 - shape.shape[1]), (0, 0))) for shape in shapes]
+    counts = [shape.shape[1] for shape in shapes]
     return np.concatenate(padded), np.repeat(counts, [len(shape) for shape in shapes])
+
+
+def _outline(number: int) -> np.ndarray:
+    """Points of a cell's ring that bound its full part; `number` sums 1, 2, 4, 8 for its full corners.
+
+    These are its full corners, and the points on sides between a full corner and one that is not.
+    """
+    full = np.array([number >> corner & 1 for corner in range(4)])
+    return np.flatnonzero(np.stack([full, full != np.roll(full, -1)], axis=1))
 
 
 def _rectangles(full: np.ndarray) -> np.ndarray:
@@ -113,7 +112,8 @@ def _rectangles(full: np.ndarray) -> np.ndarray:
 
 
 def _ring(values: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
-    """The 8 points around cells, (N, 8, 2); a side that the line does not cross has some point."""
+    """The 8 points around cells, (N, 8, 2), counterclockwise with v up: each corner, and after it the end of
+    the line on the next side; a side that the line does not cross has some point."""
     corner = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     at = values[row[:, None] + corner[:, 1], col[:, None] + corner[:, 0]].astype(np.float64)
     onward = np.roll(at, -1, axis=1) - at
@@ -124,8 +124,11 @@ def _ring(values: np.ndarray, row: np.ndarray, col: np.ndarray) -> np.ndarray:
     return points + np.stack([col, row], axis=-1)[:, None]
 
 
-def _clipped(pieces: Polygons, corners: np.ndarray, is_cut: np.ndarray) -> Iterator[Part]:
-    """Pieces within those triangles of `corners` (M, 3, 2) that are cut."""
+def _clipped(
+    pieces: Polygons, corners: np.ndarray, is_cut: np.ndarray
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Pieces within those triangles of `corners` (M, 3, 2) that are cut: triangles (T, 3) of new corners, the
+    face (C,) that each corner lies on, and shares (C, 3) of it."""
     shapes, counts = pieces
     real = np.arange(shapes.shape[1]) < counts[:, None]
     low = np.where(real[..., None], shapes, np.inf).min(axis=1)
@@ -170,23 +173,3 @@ def _on_one_side(polygons: np.ndarray, counts: np.ndarray, inside: np.ndarray) -
     is_corner = np.stack([real & (here >= 0), crosses], axis=2).reshape(len(polygons), 2 * size)
     first = np.argsort(~is_corner, axis=1, kind="stable")[:, : size + 1]
     return np.take_along_axis(points, first[..., None], axis=1), is_corner.sum(axis=1)
-
-
-def _joined(mesh: Triangles, whole: np.ndarray, parts: list[Part]) -> Triangles | None:
-    """The faces that stay whole, and those of the parts."""
-    if not len(whole) and not any(len(faces) for faces, _, _ in parts):
-        return None
-
-    def at_corners(values: np.ndarray) -> np.ndarray:
-        values = values.astype(np.float64)
-        mixed = [np.einsum("nc,ncd->nd", shares, values[mesh.faces[face]]) for _, face, shares in parts]
-        return np.concatenate([values, *mixed])
-
-    starts = len(mesh.positions) + np.cumsum([0, *(len(face) for _, face, _ in parts)])
-    faces = [whole, *(part[0] + start for part, start in zip(parts, starts, strict=False))]
-    return Triangles.checked(
-        at_corners(mesh.positions),
-        np.concatenate(faces),
-        None if mesh.normals is None else at_corners(mesh.normals),
-        None if mesh.texcoords is None else at_corners(mesh.texcoords),
-    )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,20 +70,16 @@ def _second_integral(cycles: np.ndarray) -> np.ndarray:
 
 
 class _Canvas(NamedTuple):
-    """Where the pixels lie; the longer side has length 1, the centre is (0, 0), Y runs down."""
+    """Where the centres of columns (1, W) and rows (H, 1) lie, and width and height of a pixel.
 
+    The longer side has length 1, the centre is (0, 0), Y runs down.
+    """
+
+    shape: tuple[int, int]
     width: float
     x: np.ndarray
-    """Of the columns' centres, (1, W)."""
     y: np.ndarray
-    """Of the rows' centres, (H, 1)."""
     pixel: tuple[float, float]
-    """Width and height of a pixel: equal but for whole numbers of pixels."""
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
-        return self.y.size, self.x.size
 
 
 def paint(texture: Texture, width_over_height: float) -> np.ndarray:
@@ -95,37 +91,27 @@ def paint(texture: Texture, width_over_height: float) -> np.ndarray:
     width, height = min(width_over_height, 1.0), min(1 / width_over_height, 1.0)
     columns, rows = (max(1, round(side * texture.pixels)) for side in (width, height))
     x, y = (((np.arange(n) + 0.5) / n - 0.5) * side for n, side in ((columns, width), (rows, height)))
-    canvas = _Canvas(width, x[None], y[:, None], (width / columns, height / rows))
-    match texture:
-        case Noise():
-            return _noise(texture, canvas)
-        case Checks():
-            share = _checks(texture, canvas)
-        case Stripes():
-            share = _stripes(texture, canvas)
-        case Star():
-            share = _by_bands(canvas, lambda x, y: _star(x, y, canvas.pixel, texture.spokes))
-        case Edge():
-            share = _edge(texture, canvas)
-        case Text():
-            share = _text(texture, canvas)
+    canvas = _Canvas((rows, columns), width, x[None], y[:, None], (width / columns, height / rows))
+    if isinstance(texture, Noise):
+        return _noise(texture, canvas)
+    shares_of = {Checks: _checks, Stripes: _stripes, Star: _star, Edge: _edge, Text: _text}
+    share = shares_of[type(texture)](texture, canvas)[..., None].astype(np.float32)
     first, second = srgb_to_linear(np.array(texture.colours)).astype(np.float32)
-    share = share[..., None].astype(np.float32)
     return share * first + (1 - share) * second
 
 
 def _by_bands(canvas: _Canvas, share: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
     """Shares (H, W) float32 by a function of x (1, W) and y (h, 1) that is called for a band of rows."""
     starts = range(0, canvas.y.size, BAND_ROWS)
-    bands = [share(canvas.x, canvas.y[start : start + BAND_ROWS]).astype(np.float32) for start in starts]
-    return np.concatenate(bands)
+    bands = (share(canvas.x, canvas.y[start : start + BAND_ROWS]) for start in starts)
+    return np.concatenate([band.astype(np.float32) for band in bands])
 
 
 def _checks(texture: Checks, canvas: _Canvas) -> np.ndarray:
     # A chessboard is the product of two square waves, and so is its mean over a pixel.
-    across, down = (
+    down, across = (
         square_wave((np.arange(count) + 0.5) * cells / (2 * count), cells / (2 * count), 0.0)
-        for count, cells in ((canvas.x.size, texture.columns), (canvas.y.size, texture.rows))
+        for count, cells in zip(canvas.shape, (texture.rows, texture.columns), strict=True)
     )
     return (1 + down[:, None] * across) / 2
 
@@ -134,33 +120,35 @@ def _stripes(texture: Stripes, canvas: _Canvas) -> np.ndarray:
     angle = math.radians(texture.angle_deg)
     cycles_x = math.cos(angle) * texture.periods / canvas.width
     cycles_y = math.sin(angle) * texture.periods / canvas.width
-    span_x, span_y = abs(cycles_x) * canvas.pixel[0], abs(cycles_y) * canvas.pixel[1]
-    wave = {"square": square_wave, "sine": sine_wave}[texture.profile]
-
-    def share(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        return (1 + wave(texture.periods / 2 + cycles_x * x + cycles_y * y, span_x, span_y)) / 2
-
-    return _by_bands(canvas, share)
+    spans = abs(cycles_x) * canvas.pixel[0], abs(cycles_y) * canvas.pixel[1]
+    wave, half = square_wave if texture.profile == "square" else sine_wave, texture.periods / 2
+    return _by_bands(canvas, lambda x, y: (1 + wave(half + cycles_x * x + cycles_y * y, *spans)) / 2)
 
 
 def _edge(texture: Edge, canvas: _Canvas) -> np.ndarray:
     angle = math.radians(texture.angle_deg)
     normal_x, normal_y = -math.cos(angle), -math.sin(angle)  # to the left, where the first colour is
-    span_x, span_y = abs(normal_x) * canvas.pixel[0], abs(normal_y) * canvas.pixel[1]
-    return _by_bands(canvas, lambda x, y: half_plane(normal_x * x + normal_y * y, span_x, span_y))
+    spans = abs(normal_x) * canvas.pixel[0], abs(normal_y) * canvas.pixel[1]
+    return _by_bands(canvas, lambda x, y: half_plane(normal_x * x + normal_y * y, *spans))
 
 
-def _star(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], spokes: int) -> np.ndarray:
+def _star(texture: Star, canvas: _Canvas) -> np.ndarray:
     """Share of the first colour, exact where no more than one border can cross a pixel."""
-    x, y = np.broadcast_arrays(x, y)
-    share = _nearest_border(x, y, pixel, spokes)
-    crowded = np.hypot(x, y) < math.hypot(*pixel) / (2 * math.sin(math.pi / (2 * spokes)))
+    spokes, (width, height) = texture.spokes, canvas.pixel
+    crowded_within = math.hypot(width, height) / (2 * math.sin(math.pi / (2 * spokes)))
     inside = (np.arange(SUBPIXELS) + 0.5) / SUBPIXELS - 0.5
-    sub_x = x[crowded][:, None, None] + inside[:, None] * pixel[0]
-    sub_y = y[crowded][:, None, None] + inside * pixel[1]
-    finer = pixel[0] / SUBPIXELS, pixel[1] / SUBPIXELS
-    share[crowded] = _nearest_border(sub_x, sub_y, finer, spokes).mean(axis=(1, 2))
-    return share
+
+    def share_of_band(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        x, y = np.broadcast_arrays(x, y)
+        share = _nearest_border(x, y, canvas.pixel, spokes)
+        crowded = np.hypot(x, y) < crowded_within
+        sub_x = x[crowded][:, None, None] + inside[:, None] * width
+        sub_y = y[crowded][:, None, None] + inside * height
+        finer = width / SUBPIXELS, height / SUBPIXELS
+        share[crowded] = _nearest_border(sub_x, sub_y, finer, spokes).mean(axis=(1, 2))
+        return share
+
+    return _by_bands(canvas, share_of_band)
 
 
 def _nearest_border(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], spokes: int) -> np.ndarray:
@@ -174,63 +162,51 @@ def _nearest_border(x: np.ndarray, y: np.ndarray, pixel: tuple[float, float], sp
 
 
 def _text(texture: Text, canvas: _Canvas) -> np.ndarray:
-    from PIL import Image
-
-    (rows, columns), size = canvas.shape, 256.0
-    for _ in range(2):  # again, since letters keep whole pixels apart
-        ink = _ink(texture.text, size)
-        size = max(1.0, size * TEXT_SHARE * min(columns / ink.width, rows / ink.height))
-    ink = _ink(texture.text, size)
-    page = Image.new("L", (columns, rows))
-    page.paste(ink, ((columns - ink.width) // 2, (rows - ink.height) // 2))
-    # FreeType's grey levels are the covered area, so they are shares of linear light as they are.
-    return np.asarray(page) / 255
-
-
-def _ink(text: str, size: float) -> Any:
-    """A picture of the text as tight as its ink, 8 bits of coverage."""
     import matplotlib as mpl
     from PIL import Image, ImageDraw, ImageFont
 
     file = Path(mpl.get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"  # the same on every machine
-    font = ImageFont.truetype(str(file), size, layout_engine=ImageFont.Layout.BASIC)
-    left, top, right, bottom = font.getbbox(text)
-    line = Image.new("L", (max(1, int(right - left)), max(1, int(bottom - top))))
-    ImageDraw.Draw(line).text((-left, -top), text, fill=255, font=font)
-    return line.crop(line.getbbox())
+
+    def ink(size: float) -> Image.Image:
+        """A picture of the text as tight as its ink, 8 bits of coverage."""
+        font = ImageFont.truetype(str(file), size, layout_engine=ImageFont.Layout.BASIC)
+        left, top, right, bottom = font.getbbox(texture.text)
+        line = Image.new("L", (max(1, int(right - left)), max(1, int(bottom - top))))
+        ImageDraw.Draw(line).text((-left, -top), texture.text, fill=255, font=font)
+        return line.crop(line.getbbox())
+
+    (rows, columns), size, letters = canvas.shape, 256.0, ink(256.0)
+    for _ in range(2):  # again, since letters keep whole pixels apart
+        size = max(1.0, size * TEXT_SHARE * min(columns / letters.width, rows / letters.height))
+        letters = ink(size)
+    page = Image.new("L", (columns, rows))
+    page.paste(letters, ((columns - letters.width) // 2, (rows - letters.height) // 2))
+    # FreeType's grey levels are the covered area, so they are shares of linear light as they are.
+    return np.asarray(page) / 255
 
 
 def _noise(texture: Noise, canvas: _Canvas) -> np.ndarray:
-    generator = np.random.default_rng(texture.seed)
-    amplitude = _amplitude_spectrum(texture.exponent, canvas)
-    shared = _spectral_noise(generator, amplitude, canvas)
-    channels = []
-    for mean in srgb_to_linear(np.array(texture.colour)).tolist():
-        mixed = shared
-        if texture.chroma > 0:
-            own = _spectral_noise(generator, amplitude, canvas)
-            mixed = math.sqrt(1 - texture.chroma) * shared + math.sqrt(texture.chroma) * own
-            mixed /= mixed.std()
-        channels.append(np.clip(mean * (1 + texture.contrast * mixed), 0, 1).astype(np.float32))
-    return np.stack(channels, axis=-1)
-
-
-def _amplitude_spectrum(exponent: float, canvas: _Canvas) -> np.ndarray:
-    """Of each frequency of `rfft2`: frequency^-exponent, and 0 for the mean; float32."""
-    rows, columns = canvas.shape
-    across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])
-    squared = (down**2)[:, None] + across**2
-    squared[0, 0] = 1.0
-    amplitude = squared.astype(np.float32) ** np.float32(-exponent / 2)
-    amplitude[0, 0] = 0.0
-    return amplitude
-
-
-def _spectral_noise(generator: np.random.Generator, amplitude: np.ndarray, canvas: _Canvas) -> np.ndarray:
-    """Normal noise (H, W), float32, periodic, of the given spectrum, with mean 0 and deviation 1."""
     # SciPy's transforms stay in single precision, which takes half the time.
     from scipy.fft import irfft2, rfft2
 
-    white = generator.standard_normal(canvas.shape).astype(np.float32)
-    noise = np.asarray(irfft2(rfft2(white) * amplitude, canvas.shape))
-    return noise / noise.std(dtype=np.float64).astype(np.float32)
+    generator, (rows, columns) = np.random.default_rng(texture.seed), canvas.shape
+    across, down = np.fft.rfftfreq(columns, canvas.pixel[0]), np.fft.fftfreq(rows, canvas.pixel[1])
+    squared = (down**2)[:, None] + across**2
+    squared[0, 0] = 1.0
+    amplitude = squared.astype(np.float32) ** np.float32(-texture.exponent / 2)
+    amplitude[0, 0] = 0.0  # the mean
+
+    def noise() -> np.ndarray:
+        """Normal noise (H, W), float32, periodic, of this spectrum, with mean 0 and deviation 1."""
+        white = generator.standard_normal(canvas.shape).astype(np.float32)
+        values = np.asarray(irfft2(np.asarray(rfft2(white)) * amplitude, canvas.shape))
+        return values / values.std(dtype=np.float64).astype(np.float32)
+
+    shared, channels = noise(), []
+    for mean in srgb_to_linear(np.array(texture.colour)).tolist():
+        mixed = shared
+        if texture.chroma > 0:
+            mixed = math.sqrt(1 - texture.chroma) * shared + math.sqrt(texture.chroma) * noise()
+            mixed /= mixed.std()
+        channels.append(np.clip(mean * (1 + texture.contrast * mixed), 0, 1).astype(np.float32))
+    return np.stack(channels, axis=-1)

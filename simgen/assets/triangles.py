@@ -22,7 +22,7 @@ GLOBE_ROWS = 90
 """Of a globe, which has twice as many columns: its area is 3e-4 less than the sphere's."""
 CYLINDER_SECTORS = 1024
 """Chords stay within 5e-6 of the radius, so that depth is exact to a millionth of the distance."""
-# By face of the box: outwards, and where the picture's right and upper borders lie.
+# By face of a box: outwards, and where the picture's right and upper borders lie.
 _SIDES = (
     ((0, 0, -1), (1, 0, 0), (0, -1, 0)),
     ((0, 0, 1), (-1, 0, 0), (0, -1, 0)),
@@ -31,13 +31,12 @@ _SIDES = (
     ((0, -1, 0), (1, 0, 0), (0, 0, 1)),
     ((0, 1, 0), (1, 0, 0), (0, 0, -1)),
 )
-PROBE_POINTS = 1024
+_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+PROBE_POINTS, PAIRS_AT_ONCE = 1024, 1 << 22
 """Points at which `bears_pictures_once` looks; a hundredth of a picture that is there twice is noticed."""
-PAIRS_AT_ONCE = 1 << 22
-INSIDE = 1e-4
-"""Points nearer to the sides of a triangle than this share of its height may be a neighbour's."""
-SAME_PLACE = 1e-3
-"""Places nearer to each other than this share of a mesh's size are one."""
+INSIDE, SAME_PLACE = 1e-4, 1e-3
+"""Points nearer to a triangle's sides than `INSIDE` of its height may be a neighbour's, and places nearer to
+each other than `SAME_PLACE` of a mesh's size are one."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,7 @@ class Triangles:
 
     @classmethod
     def checked(
-        cls,
-        positions: np.ndarray,
-        faces: np.ndarray,
-        normals: np.ndarray | None,
-        texcoords: np.ndarray | None,
+        cls, positions: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, uv: np.ndarray | None
     ) -> Self:
         """Triangles from numbers of any dtype; vertices that no face uses are left out.
 
@@ -68,20 +63,15 @@ class Triangles:
         if not len(faces):
             raise ValueError("has no faces")
         if len(positions) > MOST_VERTICES or len(faces) > MOST_FACES:
+            raise ValueError(f"has more than {MOST_VERTICES} vertices or {MOST_FACES} faces")
+        beyond = faces[(faces < 0) | (faces >= len(positions))]
+        if beyond.size:
             raise ValueError(
-                f"has {len(positions)} vertices and {len(faces)} faces; at most {MOST_VERTICES} and "
-                f"{MOST_FACES} are allowed"
-            )
-        low, high = int(faces.min()), int(faces.max())
-        if low < 0 or high >= len(positions):
-            raise ValueError(
-                f"has a face with vertex {low if low < 0 else high}, but only vertices 0 to "
-                f"{len(positions) - 1} exist"
+                f"has a face with vertex {beyond[0]}, but only vertices 0 to {len(positions) - 1} exist"
             )
         used = np.zeros(len(positions), dtype=bool)
         used[faces] = True
-        if not used.all():
-            faces = (np.cumsum(used) - 1)[faces]
+        faces = (np.cumsum(used) - 1)[faces]
         corners = _numbers("position", positions[used])
         if not np.ptp(corners, axis=0).any():
             raise ValueError("has no extent: all its vertices are one point")
@@ -89,15 +79,14 @@ class Triangles:
             corners.astype(np.float32),
             faces.astype(np.int32),
             None if normals is None else _unit(_numbers("normal", normals[used])),
-            None if texcoords is None else _numbers("texture coordinate", texcoords[used]).astype(np.float32),
+            None if uv is None else _numbers("texture coordinate", uv[used]).astype(np.float32),
         )
 
 
 def _numbers(what: str, array: np.ndarray) -> np.ndarray:
-    is_sound = np.abs(array) <= LARGEST_COORDINATE  # false for NaN
-    if not is_sound.all():
-        value = float(array[~is_sound][0])
-        raise ValueError(f"has a {what} of {value:g}; numbers up to {LARGEST_COORDINATE:g} are allowed")
+    beyond = array[~(np.abs(array) <= LARGEST_COORDINATE)]  # or NaN
+    if beyond.size:
+        raise ValueError(f"has a {what} of {beyond[0]:g}; numbers up to {LARGEST_COORDINATE:g} are allowed")
     return array.astype(np.float64)
 
 
@@ -114,23 +103,12 @@ def fan_all(corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     `corners` are those of all polygons one after another, `counts` of them each. Raises `ValueError` with
     the end of a sentence for a polygon of fewer than three.
     """
-    if len(counts) and counts.min() < 3:
+    if (counts < 3).any():
         raise ValueError(f"has a face of {counts.min()} corners; a face has at least 3")
-    starts = np.cumsum(counts) - counts
-    parts, order = [np.empty((0, 3), corners.dtype)], [np.empty(0, np.int64)]
-    for n in np.unique(counts):
-        rows = np.flatnonzero(counts == n)
-        parts.append(_fans(corners[starts[rows][:, None] + np.arange(n)]))
-        order.append(np.repeat(rows, n - 2))
-    return np.concatenate(parts)[np.argsort(np.concatenate(order), kind="stable")]
-
-
-def _fans(polygons: np.ndarray) -> np.ndarray:
-    """(M, n) corners of convex polygons as (M (n - 2), 3) triangles about their first corners."""
-    n = polygons.shape[1]
-    middle = np.arange(1, n - 1)
-    first = np.broadcast_to(polygons[:, :1], (len(polygons), n - 2))
-    return np.stack([first, polygons[:, middle], polygons[:, middle + 1]], axis=-1).reshape(-1, 3)
+    first, triangles = np.cumsum(counts) - counts, counts - 2
+    number = np.arange(triangles.sum()) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    first = np.repeat(first, triangles)
+    return corners[np.stack([first, first + number + 1, first + number + 2], axis=-1)]
 
 
 def cross_2d(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -184,9 +162,8 @@ def _scaled(shape: Mesh, mesh: Triangles) -> Triangles:
 
 def card_triangles(width: float, height: float) -> Triangles:
     """A rectangle that faces the cameras, the picture upright."""
-    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
-    positions = np.column_stack([(corners - 0.5) * [width, -height], np.zeros(4)])
-    return Triangles.checked(positions, np.array([(0, 1, 2), (0, 2, 3)]), None, corners)
+    positions = np.column_stack([(_SQUARE - 0.5) * [width, -height], np.zeros(4)])
+    return Triangles.checked(positions, np.array([(0, 1, 2), (0, 2, 3)]), None, _SQUARE)
 
 
 def globe(radius: float, rows: int = GLOBE_ROWS) -> Triangles:
@@ -197,12 +174,9 @@ def globe(radius: float, rows: int = GLOBE_ROWS) -> Triangles:
     normals = np.stack([np.sin(east) * np.cos(north), -np.sin(north), -np.cos(east) * np.cos(north)], axis=-1)
     corner = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
     quads = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
-    return Triangles.checked(
-        radius * normals.reshape(-1, 3),
-        _fans(quads.reshape(-1, 4)),
-        normals.reshape(-1, 3),
-        np.stack([along, up], axis=-1).reshape(-1, 2),
-    )
+    faces, texcoords = fan_all(quads.ravel(), np.full(rows * columns, 4)), np.stack([along, up], axis=-1)
+    normals = normals.reshape(-1, 3)
+    return Triangles.checked(radius * normals, faces, normals, texcoords.reshape(-1, 2))
 
 
 def box(width: float, height: float, depth: float) -> Triangles:
@@ -211,16 +185,11 @@ def box(width: float, height: float, depth: float) -> Triangles:
     On the top the picture's lower border is in front, on the bottom its upper one.
     """
     outwards, right, up = np.array(_SIDES, dtype=float).transpose(1, 0, 2)[:, :, None]
-    texcoords = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
-    u, v = 2 * texcoords.T[..., None] - 1
-    positions = outwards + u * right + v * up
-    first = 4 * np.arange(len(_SIDES))[:, None, None]
-    return Triangles.checked(
-        positions.reshape(-1, 3) * np.array([width, height, depth]) / 2,
-        (first + np.array([(0, 1, 2), (0, 2, 3)])).reshape(-1, 3),
-        np.broadcast_to(outwards, positions.shape).reshape(-1, 3),
-        np.tile(texcoords, (len(_SIDES), 1)),
-    )
+    u, v = 2 * _SQUARE.T[..., None] - 1
+    positions = (outwards + u * right + v * up).reshape(-1, 3) * np.array([width, height, depth]) / 2
+    faces = fan_all(np.arange(len(positions)), np.full(len(_SIDES), 4))
+    normals = np.repeat(outwards.reshape(-1, 3), 4, axis=0)
+    return Triangles.checked(positions, faces, normals, np.tile(_SQUARE, (len(_SIDES), 1)))
 
 
 def cylinder(radius: float, length: float) -> Triangles:
@@ -231,26 +200,23 @@ def cylinder(radius: float, length: float) -> Triangles:
     n = CYLINDER_SECTORS
     angle = np.linspace(-np.pi, np.pi, n + 1)  # from the front towards the right
     ring = np.stack([np.sin(angle), 0 * angle, -np.cos(angle)], axis=-1)
-    down, along = np.array([0, 1.0, 0]), np.linspace(0, 1, n + 1)
+    disc, down, along = np.vstack([[0, 0, 0], ring[:-1]]), np.array([0, 1.0, 0]), np.linspace(0, 1, n + 1)
     positions = [radius * ring - length / 2 * down, radius * ring + length / 2 * down]
     texcoords = [np.stack([along, 0 * along + v], axis=-1) for v in (1, 0)]
     normals, upper = [ring, ring], np.arange(n)
     lower = upper + n + 1
     faces = [np.stack([upper, lower, upper + 1], -1), np.stack([upper + 1, lower, lower + 1], -1)]
-    for side in (-1, 1):  # the top end, the bottom end
-        middle = sum(map(len, positions))
-        positions.append(np.vstack([[0, 0, 0], radius * ring[:-1]]) + side * length / 2 * down)
-        disc = np.vstack([[0, 0, 0], ring[:-1]]) / 2
-        texcoords.append(np.stack([0.5 + disc[:, 0], 0.5 - side * disc[:, 2]], axis=-1))
+    for end, side in ((2, -1), (3, 1)):  # the top, the bottom
+        positions.append(radius * disc + side * length / 2 * down)
+        texcoords.append(0.5 + disc[:, ::2] / 2 * [1, -side])
         normals.append(np.tile(side * down, (n + 1, 1)))
-        rim = middle + 1 + np.arange(n)
-        faces.append(np.stack([0 * rim + middle, rim, np.roll(rim, -1)], -1)[:, ::-side])
+        rim = end * (n + 1) + 1 + upper
+        faces.append(np.stack([0 * rim + end * (n + 1), rim, np.roll(rim, -1)], -1)[:, ::-side])
     return Triangles.checked(*map(np.concatenate, (positions, faces, normals, texcoords)))
 
 
 class SurfacePoints(NamedTuple):
-    """Middles of N parts of a surface: places (N, 3), normals (N, 3) of length 1 outwards, areas (N,) of the
-    parts, texture coordinates (N, 2) where there are any."""
+    """Middles (N, 3) of parts of a surface, unit normals outwards, areas (N,), texture coordinates if any."""
 
     position: np.ndarray
     normal: np.ndarray
@@ -273,13 +239,10 @@ def surface_points(mesh: Triangles, number: int) -> SurfacePoints:
     corner = mesh.positions.astype(np.float64)[mesh.faces]
     across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     doubled = np.linalg.norm(across, axis=1)
-    normal = across / np.where(doubled > 0, doubled, 1)[:, None]
-    return SurfacePoints(
-        at_points(mesh.positions),
-        np.repeat(normal, n * n, axis=0),
-        np.repeat(doubled / (2 * n * n), n * n),
-        None if mesh.texcoords is None else at_points(mesh.texcoords),
-    )
+    normal = np.repeat(across / np.where(doubled > 0, doubled, 1)[:, None], n * n, axis=0)
+    texcoord = None if mesh.texcoords is None else at_points(mesh.texcoords)
+    area = np.repeat(doubled / (2 * n * n), n * n)
+    return SurfacePoints(at_points(mesh.positions), normal, area, texcoord)
 
 
 def bears_pictures_once(mesh: Triangles) -> bool:
@@ -289,17 +252,15 @@ def bears_pictures_once(mesh: Triangles) -> bool:
     points = surface_points(mesh, PROBE_POINTS)
     assert points.texcoord is not None
     step = max(1, len(points.texcoord) // PROBE_POINTS)
-    at, place = points.texcoord[::step], points.position[::step]
-    uv, corner = mesh.texcoords.astype(np.float64)[mesh.faces], mesh.positions.astype(np.float64)[mesh.faces]
+    texcoord, place = points.texcoord[::step], points.position[::step]
     reach = SAME_PLACE * np.ptp(mesh.positions, axis=0).max()
-    chunk = max(1, PAIRS_AT_ONCE // len(at))
-    for start in range(0, len(uv), chunk):
-        some, of = uv[start : start + chunk], corner[start : start + chunk]
-        near = (at[None] > some.min(axis=1)[:, None]) & (at[None] < some.max(axis=1)[:, None])
-        triangle, point = np.nonzero(near.all(axis=2))
-        shares = barycentric(at[point], some[triangle])
+    for faces in np.array_split(mesh.faces, math.ceil(len(mesh.faces) * len(texcoord) / PAIRS_AT_ONCE)):
+        uv, corner = mesh.texcoords[faces].astype(np.float64), mesh.positions[faces].astype(np.float64)
+        near = (texcoord > uv.min(axis=1)[:, None]) & (texcoord < uv.max(axis=1)[:, None])
+        face, point = np.nonzero(near.all(axis=2))
+        shares = barycentric(texcoord[point], uv[face])
         inside = (shares > INSIDE).all(axis=1)
-        other_place = np.einsum("nc,ncd->nd", shares[inside], of[triangle[inside]])
+        other_place = np.einsum("nc,ncd->nd", shares[inside], corner[face[inside]])
         if (np.linalg.norm(other_place - place[point[inside]], axis=1) > reach).any():
             return False
     return True

@@ -21,25 +21,19 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 Value = TypeVar("Value")
 
 
-def scene_roots() -> list[Path]:
-    """Folders that hold scene folders."""
-    return _roots("scenes")
+def roots() -> list[Path]:
+    """Where scenes and recipes may be: in the working directory, the source tree, the installed package."""
+    return list(dict.fromkeys((Path.cwd(), _PACKAGE.parent, _PACKAGE / "_shipped")))
 
 
-def recipe_roots() -> list[Path]:
-    """Folders that hold recipe files."""
-    return _roots("data_recipes")
-
-
-def _roots(name: str) -> list[Path]:
-    """Folders of this name in the working directory, the source tree and the installed package."""
-    candidates = (Path.cwd() / name, _PACKAGE.parent / name, _PACKAGE / "_shipped" / name)
-    return list(dict.fromkeys(root.resolve() for root in candidates if root.is_dir()))
-
-
-def find(roots: Callable[[], list[Path]], name: str) -> Path | None:
-    """The first file of that name under any of the roots."""
+def find(name: str) -> Path | None:
+    """The first file of that name, such as "scenes/desk/scene.toml", under any of the roots."""
     return next((root / name for root in roots() if (root / name).is_file()), None)
+
+
+def find_all(pattern: str) -> list[Path]:
+    """All files of that pattern, such as "data_recipes/*.toml", under all roots."""
+    return [file for root in roots() for file in sorted(root.glob(pattern))]
 
 
 class AssetName(str):
@@ -47,8 +41,6 @@ class AssetName(str):
 
     A field is `Annotated[str, ImageName]`, so that type checkers allow any string; it holds an `ImageName`.
     """
-
-    __slots__ = ()
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -59,19 +51,13 @@ class AssetName(str):
 class ImageName(AssetName):
     """A texture: PNG, JPEG or TIFF."""
 
-    __slots__ = ()
-
 
 class EnvironmentName(AssetName):
     """Light from all around: OpenEXR."""
 
-    __slots__ = ()
-
 
 class MeshName(AssetName):
     """A mesh: PLY or OBJ."""
-
-    __slots__ = ()
 
 
 def named_files(value: Any, where: str = "") -> Iterator[tuple[str, AssetName]]:
@@ -99,11 +85,8 @@ def asset(folder: Path, name: str, where: str) -> Path:
         raise InputError(f"{where}: {name!r} lies outside the scene's folder")
     if not is_plain:
         raise InputError(f"{where}: there is no file {name!r} in {folder}")
-    size = path.stat().st_size
-    if size > LARGEST_FILE_BYTES:
-        raise InputError(
-            f"{where}: {name!r} has {size} bytes, more than a scene's file may have ({LARGEST_FILE_BYTES})"
-        )
+    if path.stat().st_size > LARGEST_FILE_BYTES:
+        raise InputError(f"{where}: {name!r} is larger than the {LARGEST_FILE_BYTES} bytes that are allowed")
     return path
 
 

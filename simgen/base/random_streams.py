@@ -34,7 +34,6 @@ Stage = Literal[
     "candidate numbers",
     "candidate times",
 ]
-_STAGES: tuple[Stage, ...] = get_args(Stage)
 OF_THE_CAMERAS: tuple[Stage, ...] = ("camera errors", "faulty pixels")
 """Stages that describe the cameras themselves. They depend on the recipe's seed alone, so that the same
 cameras photograph every scene."""
@@ -50,24 +49,20 @@ def seed_of_draw(seed: int, drawn: Any) -> int:
     return int(hash_json(drawn)[:32], 16) << _SEED_BITS | seed
 
 
-def _sequence(
-    seed: int, stage: Stage, view: int, part: int, attempt: int, round_number: int
-) -> np.random.SeedSequence:
-    if stage in OF_THE_CAMERAS:
-        seed %= 1 << _SEED_BITS
-    key = (_STAGES.index(stage), view, part, attempt, round_number)
-    return np.random.SeedSequence(seed, spawn_key=key)
-
-
 def generator(
     seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
 ) -> np.random.Generator:
     """NumPy's generator of a stage: of one view, of one part of the stage's work, of one attempt or round."""
-    return np.random.default_rng(_sequence(seed, stage, view, part, attempt, round_number))
+    if stage in OF_THE_CAMERAS:
+        seed %= 1 << _SEED_BITS
+    key = (get_args(Stage).index(stage), view, part, attempt, round_number)
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
 def integer(
     seed: int, *, stage: Stage, view: int = 0, part: int = 0, attempt: int = 0, round_number: int = 0
 ) -> int:
     """A 32-bit seed for the renderer, of a stage as for `generator`."""
-    return int(_sequence(seed, stage, view, part, attempt, round_number).generate_state(1)[0])
+    key = {"view": view, "part": part, "attempt": attempt, "round_number": round_number}
+    sequence = generator(seed, stage=stage, **key).bit_generator.seed_seq
+    return int(sequence.generate_state(1)[0])

@@ -17,7 +17,6 @@ from pcii.base.errors import InputError
 
 LARGEST_TOML_BYTES = 1 << 19
 LONGEST_PART = 80
-LONGEST_SENTENCE = 400
 MOST_FAULTS = 20
 """Largest number of faults that one error lists."""
 
@@ -41,7 +40,7 @@ class Strict(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, values: Any) -> Any:
-        """Before pydantic does, which does not say what would be right."""
+        # Before pydantic does, which does not say what would be right.
         known = set(cls.model_fields)
         unknown = [key for key in values if key not in known] if isinstance(values, Mapping) else []
         if unknown:
@@ -62,27 +61,22 @@ NonNegative = Annotated[Real, Field(ge=0)]
 Share = Annotated[Real, Field(ge=0, le=1)]
 Count = Annotated[Whole, Field(ge=1)]
 Vector = tuple[Real, Real, Real]
-SMALLEST_MM = 1e-6
 LARGEST_MM = 1e6
 """Lengths are a nanometre to a kilometre: products of several are still numbers in single precision."""
-Length = Annotated[Real, Field(ge=SMALLEST_MM, le=LARGEST_MM)]
+Length = Annotated[Real, Field(ge=1e-6, le=LARGEST_MM)]
 Coordinate = Annotated[Real, Field(ge=-LARGEST_MM, le=LARGEST_MM)]
 Position = tuple[Coordinate, Coordinate, Coordinate]
 Colour = Annotated[tuple[Share, Share, Share], Field(description="sRGB, three numbers from 0 to 1")]
-LARGEST_COMPONENT = 1e6
 
 
 def _has_a_length(direction: tuple[float, float, float]) -> tuple[float, float, float]:
-    if not 1 / LARGEST_COMPONENT <= max(map(abs, direction)) <= LARGEST_COMPONENT:
-        raise ValueError(
-            f"the largest number of a direction must be {1 / LARGEST_COMPONENT:g} to {LARGEST_COMPONENT:g} "
-            f"in size, as in (0, 0, 1), got {direction}"
-        )
+    if not 1e-6 <= max(map(abs, direction)) <= 1e6:  # single precision can square these
+        raise ValueError(f"the largest number of a direction must be 1e-6 to 1e6 in size, got {direction}")
     return direction
 
 
 Direction = Annotated[Vector, AfterValidator(_has_a_length)]
-"""A direction, whose length does not matter as long as single precision can square it."""
+"""A direction, whose length does not matter."""
 
 
 def _one_line(title: str) -> str:
@@ -130,16 +124,17 @@ def toml_text(model: Strict, comments: Sequence[str] = ()) -> str:
 
     Fields at their defaults are left out, except for the `type` of a table. `comments` are lines at the top.
     """
-    fields = dict(_written_fields(model))
-    tables = {name: value for name, value in fields.items() if _makes_tables(value)}
     head = [f"# {_printable(line)}".rstrip() for text in comments for line in text.splitlines() or [""]]
-    blocks = [head, _lines({name: value for name, value in fields.items() if name not in tables})]
-    for name, value in tables.items():
+    values: list[str] = []
+    tables: list[list[str]] = []
+    for name, value in _written_fields(model):
         if isinstance(value, BaseModel):
-            blocks.append([f"[{name}]", *_lines(dict(_written_fields(value)))])
+            tables.append([f"[{name}]", *_lines(value)])
+        elif isinstance(value, tuple) and all(isinstance(part, BaseModel) for part in value):
+            tables += [[f"[[{name}]]", *_lines(part)] for part in value]
         else:
-            blocks += [[f"[[{name}]]", *_lines(dict(_written_fields(part)))] for part in value]
-    return "\n".join("".join(f"{line}\n" for line in block) for block in blocks if block)
+            values.append(_line(name, value))
+    return "\n".join("".join(f"{line}\n" for line in block) for block in (head, values, *tables) if block)
 
 
 def _written_fields(model: BaseModel) -> Iterator[tuple[str, Any]]:
@@ -152,22 +147,18 @@ def _written_fields(model: BaseModel) -> Iterator[tuple[str, Any]]:
             yield name, value
 
 
-def _makes_tables(value: Any) -> bool:
-    models = value if isinstance(value, tuple) and value else (value,)
-    return all(isinstance(part, BaseModel) for part in models)
+def _lines(model: BaseModel) -> list[str]:
+    return [_line(name, value) for name, value in _written_fields(model)]
 
 
-def _lines(fields: Mapping[str, Any]) -> list[str]:
-    """A line for each field; a string keeps its lines."""
-    texts = {
-        name: f'"""\n{_escaped(value)}"""' if isinstance(value, str) and "\n" in value else _inline(value)
-        for name, value in fields.items()
-    }
-    return [f"{name} = {text}" for name, text in texts.items()]
+def _line(name: str, value: Any) -> str:
+    """A field on one line, or on several if it is a string that has several."""
+    if isinstance(value, str) and "\n" in value:
+        return f'{name} = """\n{_escaped(value)}"""'
+    return f"{name} = {_inline(value)}"
 
 
 def _inline(value: Any) -> str:
-    """A value in one line."""
     if isinstance(value, BaseModel):
         return f"{{ {', '.join(f'{name} = {_inline(part)}' for name, part in _written_fields(value))} }}"
     if isinstance(value, tuple):
@@ -183,52 +174,37 @@ def _escaped(text: str) -> str:
     return "\n".join(lines).replace("\x7f", "\\u007f")
 
 
-def validate(
-    model: type[Model], values: Mapping[str, Any], source: str, context: dict[str, Any] | None = None
-) -> Model:
-    """Build a model, or raise `InputError` with a sentence for each fault that begins with its field.
-
-    `source` names the values, and `context` is handed to the model's validators.
-    """
+def validate(model: type[Model], values: Mapping[str, Any], source: str) -> Model:
+    """A model of the values, which errors call `source`; `InputError` with a sentence for each fault."""
     with _as_input_errors(source, values):
-        return model.model_validate(values, context=context)
+        return model.model_validate(values)
 
 
 @contextmanager
 def _as_input_errors(source: str, values: Mapping[str, Any]) -> Iterator[None]:
-    """Raises what pydantic finds wrong with the values as `InputError`."""
+    """Raise what pydantic finds wrong as `InputError`: the first fault in its text, others as notes."""
     try:
         yield
-    except ValidationError as fault:
+    except ValidationError as invalid:
         # Unknown keys come first: they are often why others are missing.
-        errors = sorted(fault.errors(include_url=False), key=lambda error: error["type"] != "unknown_keys")
-        raise faults_of(source, [text for error in errors for text in _sentences(error, values)]) from None
-
-
-def faults_of(source: str, sentences: Sequence[str]) -> InputError:
-    """An error with the first of these faults of a file in its text, and the next ones as notes, a line each.
-
-    At most `MOST_FAULTS` are listed.
-    """
-    first, *others = (shorten(sentence) for sentence in sentences[:MOST_FAULTS])
-    more = f" (and {len(sentences) - 1} more)" if others else ""
-    fault = InputError(f"{source}: {first}{more}")
-    for other in others:
-        fault.add_note(f"  {other}")
-    return fault
+        errors = sorted(invalid.errors(include_url=False), key=lambda error: error["type"] != "unknown_keys")
+        sentences = [shorten(text) for error in errors for text in _sentences(error, values)]
+        more = f" (and {len(sentences) - 1} more)" if sentences[1:] else ""
+        fault = InputError(f"{source}: {sentences[0]}{more}")
+        for sentence in sentences[1:MOST_FAULTS]:
+            fault.add_note(f"  {sentence}")
+        raise fault from None
 
 
 def _sentences(error: ErrorDetails, values: Mapping[str, Any]) -> list[str]:
-    """What is wrong according to one error: a sentence or, of unknown keys, one for each."""
+    """A sentence about one error or, of unknown keys, about each."""
     kind, context = error["type"], error.get("ctx", {})
     where = _field(error["loc"], values, is_missing=kind == "missing")
     if kind == "unknown_keys":
         table, known = f"{where}." if where else "", context["known"]
         return [f"unknown key '{table}{key}'{suggestion(str(key), known)}" for key in context["unknown"]]
-    if kind == "missing":
-        return [f"'{where}' is missing"]
-    if kind == "union_tag_not_found":
-        return [f"'{where}.type' is missing"]
+    if kind in ("missing", "union_tag_not_found"):
+        return [f"'{where}{'.type' * (kind != 'missing')}' is missing"]
     if kind == "union_tag_invalid":
         types = re.findall(r"'(.*?)'", context["expected_tags"])
         return [f"'{where}.type': there is no {context['tag']!r}{suggestion(context['tag'], types)}"]
@@ -255,7 +231,7 @@ def _field(location: Sequence[int | str], values: Any, *, is_missing: bool) -> s
     return text
 
 
-def shorten(text: str, longest: int = LONGEST_SENTENCE) -> str:
+def shorten(text: str, longest: int = 400) -> str:
     """One line fit for a terminal: without control characters, and with its middle left out if long."""
     if len(text) > longest:
         text = f"{text[: longest * 3 // 4]}...{text[-longest // 4 :]}"

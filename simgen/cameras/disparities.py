@@ -42,11 +42,8 @@ def shifts_px(grid: CameraGrid, z_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Whole pixels (rows (K,), columns (L,)), int64, by which a section at z shifts each camera's image."""
     across_px, down_px = disparities_px(grid, z_mm)
     rows, cols = (np.arange(cameras) - (cameras - 1) / 2 for cameras in (grid.rows, grid.cols))
-    return _rounded(rows * down_px), _rounded(cols * across_px)
-
-
-def _rounded(px: np.ndarray) -> np.ndarray:
-    return np.floor(px + 0.5).astype(np.int64)
+    down, across = np.floor(rows * down_px + 0.5), np.floor(cols * across_px + 0.5)
+    return down.astype(np.int64), across.astype(np.int64)
 
 
 def share_seen_by_all(grid: CameraGrid, z_mm: float) -> float:
@@ -86,11 +83,11 @@ def mending_pitch_mm(grid: CameraGrid, depths_mm: Sequence[float]) -> tuple[floa
         # To what one would type: a hundredth of a millimetre, or finer where that is coarse.
         pitch = tuple(round(factor * old, 2) if old >= 1 else factor * old for old in grid.pitch_mm)
         changed = replace(grid, pitch_mm=pitch)
-        if all(_has_both_parities(shift) for z in depths_mm for shift in shifts_px(changed, z)):
+        parities = [shift % 2 for z in depths_mm for shift in shifts_px(changed, z)]
+        rarer = [min(odd.sum(), odd.size - odd.sum()) for odd in parities]
+        if all(
+            count >= max(1, int(MIN_PARITY_SHARE * odd.size))
+            for count, odd in zip(rarer, parities, strict=True)
+        ):
             return changed.pitch_mm
     return None
-
-
-def _has_both_parities(shifts: np.ndarray) -> bool:
-    odd = int((shifts % 2).sum())
-    return min(odd, shifts.size - odd) >= max(1, int(MIN_PARITY_SHARE * shifts.size))

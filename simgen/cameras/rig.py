@@ -12,7 +12,7 @@ import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
-from simgen.spec.recipe import CalibrationErrors, Grid, Lens
+from simgen.spec.recipe import Grid, Lens
 
 
 def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, Any]) -> tuple[Any, Any]:
@@ -24,14 +24,12 @@ def film_slopes(grid: CameraGrid, row_px: Any, col_px: Any, axis_px: tuple[Any, 
     return (col_px - axis_px[0]) * per_px, (row_px - axis_px[1]) * per_px
 
 
-def slopes_behind_lens(
-    slopes: tuple[Any, Any], lens: Lens, lens_point_mm: tuple[Any, Any]
-) -> tuple[Any, Any]:
+def slopes_behind_lens(slopes: tuple[Any, Any], lens: Lens, point_mm: tuple[Any, Any]) -> tuple[Any, Any]:
     """Slopes (x, y) of rays of the same film points that leave from a point (x, y) of a thin lens.
 
     All rays of a film point meet where the chief ray, through the lens's centre, is in focus.
     """
-    return slopes[0] - lens_point_mm[0] / lens.focus_mm, slopes[1] - lens_point_mm[1] / lens.focus_mm
+    return slopes[0] - point_mm[0] / lens.focus_mm, slopes[1] - point_mm[1] / lens.focus_mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +52,12 @@ class Camera:
         axis_px = (grid.width - 1) / 2 + right, (grid.height - 1) / 2 + down
         row_px, col_px = (np.asarray(px, dtype=np.float64) for px in (row_px, col_px))
         x, y = film_slopes(grid, row_px, col_px, axis_px)
-        return _turned(np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1), self.rotation.T)
+        return np.stack(np.broadcast_arrays(x, y, 1.0), axis=-1) @ self.rotation.T
 
     def on_film(self, point_mm: np.ndarray) -> np.ndarray:
         """Whether the chief rays of points (N, 3) fall on the film, (N,) bool."""
         grid = self.grid
-        x, y, z = _turned(point_mm - self.position_mm, self.rotation).T
+        x, y, z = ((point_mm - self.position_mm) @ self.rotation).T
         scale_px = grid.focal_mm / grid.pixel_mm
         is_on_film = z > 0
         for offset, shift, size in ((x, self.shift_px[0], grid.width), (y, self.shift_px[1], grid.height)):
@@ -79,10 +77,6 @@ class Camera:
         down += (grid.height - rows.stop - rows.start) / 2
         window = replace(grid, height=rows.stop - rows.start, width=cols.stop - cols.start)
         return replace(self, grid=window, shift_px=(right, down))
-
-
-def _turned(rows: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    return rows if np.array_equal(rotation, np.eye(3)) else rows @ rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +123,7 @@ class Rig:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Origins and unit directions (N, 3) of rays through points of films and of the lens (2, N).
 
-        `mitsuba_camera.film_rays` makes the same on the renderer's side. `lens_point` in mm is not used for
+        `path_tracing.film_rays` makes the same on the renderer's side. `lens_point` in mm is not used for
         pinholes.
         """
         axis_px = self.axis_px[k, l]
@@ -151,7 +145,9 @@ def as_rig(cameras: Cameras) -> Rig:
     """The rig that these cameras are."""
     if isinstance(cameras, Rig):
         return cameras
-    x_mm, y_mm = _evenly(cameras.pitch_mm[0], cameras.cols), _evenly(cameras.pitch_mm[1], cameras.rows)
+    counts = cameras.cols, cameras.rows
+    spans_mm = [pitch * (count - 1) for pitch, count in zip(cameras.pitch_mm, counts, strict=True)]
+    x_mm, y_mm = (np.linspace(-mm / 2, mm / 2, n) for mm, n in zip(spans_mm, counts, strict=True))
     across, down = np.meshgrid(x_mm, y_mm)
     position_mm = np.stack([across, down, np.zeros_like(across)], axis=-1)
     return Rig(cameras, position_mm, np.tile(np.eye(3), (*across.shape, 1, 1)))
@@ -178,19 +174,17 @@ def centre_camera(grid: CameraGrid) -> Camera:
     return Camera(grid, np.zeros(3), np.eye(3), (0.0, 0.0), None)
 
 
-def _evenly(pitch_mm: float, count: int) -> np.ndarray:
-    """Places evenly spaced, symmetric about 0, growing to the right or downwards."""
-    span = pitch_mm * (count - 1)
-    return np.linspace(-span / 2, span / 2, count)
-
-
 def rig_of(grid: Grid, seed: int) -> Rig:
-    """The cameras of a recipe's grid, with their lens and errors of calibration; one seed, one rig."""
-    perfect = as_rig(grid.camera_grid())
-    position_mm, rotation = perfect.position_mm, perfect.rotation
-    if grid.errors is not None:
-        position_mm, rotation = _with_errors(position_mm, grid.errors, seed)
-    return Rig(perfect.grid, position_mm, rotation, grid.lens)
+    """The cameras of a recipe's grid, with their lens and errors of calibration, by a random stream each."""
+    rig, errors = replace(as_rig(grid.camera_grid()), lens=grid.lens), grid.errors
+    if errors is None:
+        return rig
+    rows, cols, _ = rig.position_mm.shape
+    streams = (seeds.generator(seed, view=view, stage="camera errors") for view in range(rows * cols))
+    normal = np.stack([stream.standard_normal(6) for stream in streams]).reshape(rows, cols, 6)
+    off_mm, angles_deg = normal[..., :3] * errors.position_sd_mm, normal[..., 3:] * errors.rotation_sd_deg
+    rotation = np.stack([[turn(angles) for angles in row] for row in angles_deg])
+    return replace(rig, position_mm=rig.position_mm * (1 + errors.pitch_error) + off_mm, rotation=rotation)
 
 
 def turn(angles_deg: np.ndarray) -> np.ndarray:
@@ -207,15 +201,3 @@ def turn(angles_deg: np.ndarray) -> np.ndarray:
         about_axis[second, first], about_axis[first, second] = math.sin(angle), -math.sin(angle)
         total = about_axis @ total
     return total
-
-
-def _with_errors(
-    position_mm: np.ndarray, errors: CalibrationErrors, seed: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where cameras of these places really are and how they are turned; each has its own random stream."""
-    rows, cols, _ = position_mm.shape
-    streams = (seeds.generator(seed, view=view, stage="camera errors") for view in range(rows * cols))
-    normal = np.stack([stream.standard_normal(6) for stream in streams]).reshape(rows, cols, 6)
-    off_mm, angles_deg = normal[..., :3] * errors.position_sd_mm, normal[..., 3:] * errors.rotation_sd_deg
-    rotation = np.stack([[turn(angles) for angles in row] for row in angles_deg])
-    return position_mm * (1 + errors.pitch_error) + off_mm, rotation

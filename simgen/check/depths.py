@@ -34,11 +34,10 @@ def depth_findings(facts: Facts) -> list[Finding]:
         return [Finding("ok", "disparity", "one camera has none: depths cannot be told apart")]
     if not facts.planes_mm:
         return []
-    findings = [_overlap_finding(facts), *_colour_findings(facts)]
+    findings: list[Finding] = []
     if facts.seen:
-        findings = [*_focus_findings(facts), *findings]
-        findings = [_disparity_finding(facts), *_separation_findings(facts), *findings]
-    return findings
+        findings = [_disparity_finding(facts), *_separation_findings(facts), *_focus_findings(facts)]
+    return [*findings, _overlap_finding(facts), *_colour_findings(facts)]
 
 
 def _disparity_finding(facts: Facts) -> Finding:
@@ -88,17 +87,13 @@ def _focus_findings(facts: Facts) -> list[Finding]:
     planes, analysis, findings = facts.planes_mm, facts.target.recipe.analysis, []
     shares = np.array([[focus_share(facts, thing, z) for z in planes] for thing in facts.seen])
     best, names = shares.max(axis=1), listed([f"{z:g}" for z in planes])
-    blurred = listed(
-        [f"{t.middle_mm:.0f}" for t, s in zip(facts.seen, best, strict=True) if s < MIN_FOCUS_SHARE]
-    )
+    blurred = [f"{t.middle_mm:.0f}" for t, s in zip(facts.seen, best, strict=True) if s < MIN_FOCUS_SHARE]
     text = (
         f"of {facts.seen[best.argmin()].name}, the object least in focus, {best.min():.0%} is in focus at "
         f"the best of the planes {names} mm"
     )
-    if blurred:
-        findings.append(Finding("warn", "focus", text, f"add {blurred} to analysis.z_mm"))
-    else:
-        findings.append(Finding("ok", "focus", text))
+    remedy = f"add {listed(blurred)} to analysis.z_mm" if blurred else ""
+    findings.append(Finding("warn" if blurred else "ok", "focus", text, remedy))
     if not analysis.z_mm:
         text = "neither the scene nor the recipe names depths to look at, and pcii asks for --z-mm"
         findings.append(Finding("warn", "focus", text, f"add planes_mm = [{names}] to the scene"))
@@ -143,15 +138,11 @@ def _colour_findings(facts: Facts) -> list[Finding]:
     if not lacking:
         return [Finding("ok", "colours", "every voxel has all three at all planes")]
     most = np.max(list(lacking.values()), axis=0)
-    text = ", ".join(
-        f"{share:.0%} have no {name}" for share, name in zip(most, COLOURS, strict=True) if share
-    )
-    text = f"of the voxels at {listed([f'{z:g}' for z in lacking])} mm {text}, as most shifts are even"
+    lacks = [f"{share:.0%} have no {name}" for share, name in zip(most, COLOURS, strict=True) if share]
+    planes = listed([f"{z:g}" for z in lacking])
+    text = f"of the voxels at {planes} mm {', '.join(lacks)}, as most shifts are even"
     pitch = mending_pitch_mm(grid, facts.planes_mm)
-    if pitch is None:
-        remedy = "add camera rows and columns, or set sensor.cfa = 'none'"
-    else:
-        remedy = f"take a pitch of {pitch[0]:g} x {pitch[1]:g} mm"
+    remedy = f"take a pitch of {pitch[0]:g} x {pitch[1]:g} mm" if pitch else "set sensor.cfa = 'none'"
     return [Finding("warn", "colours", text, remedy)]
 
 

@@ -7,14 +7,7 @@ import numpy as np
 from pcii.core.bayer import channel_count
 from pcii.core.photon_events import NEGLIGIBLE_LOSS, clipped_mean
 from simgen.check.scene_probe import Facts, Finding, ObjectFacts
-from simgen.dataset.resources import (
-    Needs,
-    available_bytes,
-    in_bytes,
-    peak_bytes,
-    product_bytes,
-    shortage,
-)
+from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes, shortage
 from simgen.photons.counting_plan import PHOTON_COST, SAMPLE_COST, SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
 MIN_PHOTONS = 100
@@ -32,8 +25,18 @@ def photon_findings(facts: Facts) -> list[Finding]:
         return []
     total = photons_per_view(facts, np.ones(facts.colour_share.size))
     findings = [_object_finding(facts, thing, total) for thing in facts.seen]
-    findings += _other_findings(facts, total) + _saturation_findings(facts)
-    return findings + _dark_findings(facts, total)
+    other_share = photons_per_view(facts, facts.other_share) / total
+    if other_share > MAX_OTHER_SHARE and facts.seen:
+        text = f"{other_share:.1%} of the photons come from no object"
+        remedy = "darken backdrop and lamps in view, or take more light"
+        findings.append(Finding("warn", "photons", text, remedy))
+    findings += _saturation_findings(facts)
+    sensor, grid = facts.target.recipe.sensor, facts.grid
+    dark = (sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts) * grid.height * grid.width
+    if dark > MAX_OTHER_SHARE * (dark + total):
+        text = f"{_number(dark)} dark counts per view, {dark / (dark + total):.0%} of all counts"
+        findings.append(Finding("warn", "photons", text, "lower sensor.dark_counts"))
+    return findings
 
 
 def photons_per_view(facts: Facts, light_share: np.ndarray) -> float:
@@ -63,29 +66,18 @@ def _object_finding(facts: Facts, thing: ObjectFacts, total: float) -> Finding:
     factor = max(MIN_PHOTONS / max(per_view * views, 1e-9), MIN_VOXEL_COUNTS / max(per_voxel, 1e-9))
     if factor <= 1:
         return Finding("ok", "photons", text)
-    return Finding("warn", "photons", text, f"{_more_light(facts, factor)}, or larger pixels")
+    remedy = f"expose {factor:.2g} times as long"
+    if facts.target.recipe.photons.scope != "exposure":
+        budget = facts.target.recipe.photons.budget * factor
+        step = 10 ** max(0, math.floor(math.log10(budget)) - 1)
+        remedy = f"photons.budget = {math.ceil(budget / step) * step}"
+    return Finding("warn", "photons", text, f"{remedy}, or larger pixels")
 
 
 def _per_pixel(facts: Facts, thing: ObjectFacts) -> float:
     """Counts of one view's pixel, over the whole exposure, where it sees the object."""
     pixels = facts.grid.height * facts.grid.width
     return photons_per_view(facts, thing.light_share) / max(thing.film_share * pixels, 1e-9)
-
-
-def _more_light(facts: Facts, factor: float) -> str:
-    if facts.target.recipe.photons.scope == "exposure":
-        return f"expose {factor:.2g} times as long"
-    budget = facts.target.recipe.photons.budget * factor
-    step = 10 ** max(0, math.floor(math.log10(budget)) - 1)
-    return f"photons.budget = {math.ceil(budget / step) * step}"
-
-
-def _other_findings(facts: Facts, total: float) -> list[Finding]:
-    share = photons_per_view(facts, facts.other_share) / total
-    if share <= MAX_OTHER_SHARE or not facts.seen:
-        return []
-    text = f"{share:.1%} of the photons come from no object"
-    return [Finding("warn", "photons", text, "darken backdrop and lamps in view, or take more light")]
 
 
 def _saturation_findings(facts: Facts) -> list[Finding]:
@@ -103,35 +95,18 @@ def _saturation_findings(facts: Facts) -> list[Finding]:
     return [Finding("warn", "photons", text, "raise sensor.frames, or take less light")]
 
 
-def _dark_findings(facts: Facts, total: float) -> list[Finding]:
-    """Whether most counts are made by no photon."""
-    sensor, grid = facts.target.recipe.sensor, facts.grid
-    dark = (sensor.dark_counts + sensor.hot_pixel_share * sensor.hot_pixel_counts) * grid.height * grid.width
-    share = dark / (dark + total)
-    if share <= MAX_OTHER_SHARE:
-        return []
-    text = f"{_number(dark)} dark counts per view, {share:.0%} of all counts"
-    return [Finding("warn", "photons", text, "lower sensor.dark_counts")]
-
-
 def _number(value: float) -> str:
     """A whole number where it is large, three digits where it is small."""
     return f"{value:,.0f}" if 10 <= value < 1e7 else f"{value:.3g}"
 
 
-def shortage_findings(needs: Needs) -> list[Finding]:
-    """What of a recipe memory cannot hold whatever the scene, so that it cannot even be looked at."""
-    text = shortage(needs, None, available_bytes())
-    return [] if text is None else [Finding("bad", "memory", text)]
-
-
 def cost_findings(facts: Facts) -> list[Finding]:
     """What will be written and what it takes, before compression and to an order of magnitude."""
-    needs, plan = facts.target.needs, facts.plan
-    sizes = product_bytes(needs, plan)
+    recipe, plan = facts.target.recipe, facts.plan
+    sizes = product_bytes(recipe, plan)
     size = ", ".join(f"{name} {in_bytes(of_name)}" for name, of_name in sizes.items()) or "only a manifest"
-    lack = shortage(needs, plan, facts.memory_bytes)
-    peak = f"{in_bytes(peak_bytes(needs, plan))} at the peak, of {in_bytes(facts.memory_bytes)} available"
+    lack = shortage(recipe, plan, facts.memory_bytes)
+    peak = f"{in_bytes(peak_bytes(recipe, plan))} at the peak, of {in_bytes(facts.memory_bytes)} available"
     return [
         Finding("ok", "size", f"{size}, before compression"),
         Finding("ok", "memory", peak) if lack is None else Finding("bad", "memory", lack),
@@ -160,28 +135,20 @@ def seconds(facts: Facts) -> float:
     grid, products, plan = facts.grid, facts.target.recipe.products, facts.plan
     pixels = grid.height * grid.width
     spent_s = facts.hit_s * pixels * (products.truth + grid.view_count * bool(products.view_truth))
+    samples = facts.target.recipe.render.samples_per_pixel if products.radiance != "none" else 0
     if plan is not None and not plan.thins:
-        spent_s += facts.path_s * plan.samples * pixels * grid.view_count
-    elif products.radiance != "none":
-        samples = facts.target.recipe.render.samples_per_pixel
-        spent_s += facts.path_s * samples * pixels * grid.view_count
+        samples = plan.samples
+    spent_s += facts.path_s * samples * pixels * grid.view_count
     if plan is not None and plan.thins:
-        photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
-        if facts.is_compiled:
-            photon_cost, sample_cost = PHOTON_COST, SAMPLE_COST
+        cost = PHOTON_COST / SAMPLE_COST if facts.is_compiled else SCALAR_PHOTON_COST / SCALAR_SAMPLE_COST
         share = USUAL_SHARE if plan.explored is None else plan.explored.kept_share
-        paths_per_photon = photon_cost / sample_cost * max(USUAL_SHARE / share, 1.0)
+        paths_per_photon = cost * max(USUAL_SHARE / share, 1.0)
         spent_s += facts.path_s * paths_per_photon * plan.photons_per_view * grid.view_count
     return spent_s
 
 
 def in_time(spent_s: float) -> str:
     """A time in the unit that suits it, with one digit; no less than a second."""
-    for size_s, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
-        if spent_s >= 2 * size_s:
-            return f"{_one_digit(spent_s / size_s)} {unit}"
-    return f"{_one_digit(max(spent_s, 1))} s"
-
-
-def _one_digit(value: float) -> str:
-    return f"{float(f'{value:.1g}'):g}"
+    units = ((86400, "days"), (3600, "hours"), (60, "minutes"))
+    size_s, unit = next(((size_s, unit) for size_s, unit in units if spent_s >= 2 * size_s), (1, "s"))
+    return f"{float(f'{max(spent_s, 1) / size_s:.1g}'):g} {unit}"

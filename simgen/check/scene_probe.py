@@ -23,7 +23,7 @@ from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view
 from simgen.spec.lights import AreaLight, SpotLight
 from simgen.spec.scene import Scene
-from simgen.truth.first_hits import FirstHits, first_hits_at_centre, first_hits_of_view, shape_boxes_mm
+from simgen.truth.first_hits import first_hits_at_centre, first_hits_of_view, shape_boxes_mm
 
 SIDE_PX, SCALAR_SIDE_PX = 512, 256
 """Longer side of the probe's film with a compiled backend and without one."""
@@ -49,23 +49,22 @@ class Finding:
 
 @dataclass(frozen=True, eq=False)
 class ObjectFacts:
-    """What the probe shows of one object."""
+    """What the probe shows of one object.
+
+    From the virtual centre: depths `z_mm` (P,) of the pixels that see it, their share of the film, its share
+    (C,) of the light in each colour, and whether it ends at the film's border. `body_z_mm` are the nearest
+    and farthest depth of its bounding box, of what is hidden too. `corners_seeing` corner cameras see any of
+    it, and `corners_seeing_all` see it without its ending at the border of their films.
+    """
 
     name: str
     z_mm: np.ndarray
-    """Depths (P,) of the probe's pixels that see it from the virtual centre."""
     film_share: float
-    """Share of the virtual centre's pixels that see it."""
     light_share: np.ndarray
-    """Share (C,) of the light in each colour of the virtual centre's image that comes from it."""
     body_z_mm: tuple[float, float]
-    """Nearest and farthest depth of its bounding box, of what is hidden too."""
     corners_seeing: int = 4
-    """Corner cameras that see any of it."""
     corners_seeing_all: int = 4
-    """Corner cameras that see it and at whose film's border it does not end."""
     is_cut_at_centre: bool = False
-    """Whether it ends at the border of the virtual centre's film."""
     shines: bool = False
 
     @cached_property
@@ -76,42 +75,32 @@ class ObjectFacts:
 
 @dataclass(frozen=True, eq=False)
 class Facts:
-    """What the findings rest on: a recipe with its scene, a coarse look at it, and a plan of the counts."""
+    """What the findings rest on: a recipe with its scene, a coarse look at it, and a plan of the counts.
+
+    Of the virtual centre's image: mean `luminance` in cd/m^2 (in spectral mode what its pixels see), shares
+    (C,) of its light that the pixels of each colour get, which sum to 1, and shares (C,) of the light in each
+    colour that come from no object. `corners` is the number of corner cameras: 4, or fewer of a single row;
+    `lamps_away` are the lamps, from 1, that shine away from all objects. `plan` is None if the recipe wants
+    no counts. The probe took `path_s` for a light path and `hit_s` for a first hit.
+    """
 
     target: Prepared
     objects: tuple[ObjectFacts, ...]
     corners: int
-    """Number of corner cameras: 4, or fewer of a single row or column."""
     luminance: float
-    """Mean luminance of the virtual centre's image in cd/m^2; in spectral mode what its pixels see."""
     colour_share: np.ndarray
-    """Share (C,) of that image's light that the pixels of each colour get; sums to 1."""
     other_share: np.ndarray
-    """Share (C,) of the light in each colour that comes from none of the objects."""
     lamps_away: tuple[int, ...]
-    """Lamps, from 1, that shine away from all objects."""
     plan: Plan | None
-    """How the counts will be made; None if the recipe wants none."""
     path_s: float
-    """Seconds that the probe took for a light path."""
     hit_s: float
-    """Seconds that the probe took for a first hit."""
     is_compiled: bool
-    """Whether a compiled backend renders."""
     memory_bytes: float
-    """Memory of this machine that is available."""
-    pixel_px: float
-    """Side of the probe's pixels, in pixels of the recipe."""
 
     @cached_property
     def grid(self) -> CameraGrid:
         """The recipe's cameras."""
         return self.target.recipe.grid.camera_grid()
-
-    @property
-    def backdrop_mm(self) -> float | None:
-        """Depth of the scene's backdrop, None if there is none."""
-        return None if self.target.scene.backdrop is None else self.target.scene.backdrop.z_mm
 
     @property
     def seen(self) -> tuple[ObjectFacts, ...]:
@@ -146,17 +135,31 @@ def probe_scene(target: Prepared) -> Facts:
     corner_hits = [first_hits_of_view(render_scene, coarse, k, l) for k, l in corners(grid)]
     hit_s = (time.perf_counter() - start_s) / (len(corner_hits) * centre.z_mm.size)
     boxes, light = _boxes_mm(render_scene), image.sum(axis=(0, 1))
+    pixels = np.bincount(colour_cells(recipe.cfa).ravel(), minlength=channel_count(recipe.cfa))
+    weight = light * pixels
     shining = {surface.number for surface in render_scene.shining}
-    objects = tuple(
-        _object_facts(name, number, boxes.get(number), image, centre, corner_hits, number in shining)
-        for number, name in render_scene.names.items()
-    )
+    objects: list[ObjectFacts] = []
+    for number, name in render_scene.names.items():
+        mask, views = centre.object_id == number, [hits.object_id == number for hits in corner_hits]
+        near_mm, far_mm = boxes[number][:, 2].tolist() if number in boxes else (math.inf, math.inf)
+        facts = ObjectFacts(
+            name=name,
+            z_mm=centre.z_mm[mask].astype(np.float64),
+            film_share=float(mask.mean()),
+            light_share=_share(image[mask].sum(axis=0), light),
+            body_z_mm=(near_mm, far_mm),
+            corners_seeing=sum(bool(view.any()) for view in views),
+            corners_seeing_all=sum(bool(view.any()) and not _is_cut(view) for view in views),
+            is_cut_at_centre=_is_cut(mask),
+            shines=number in shining,
+        )
+        objects.append(facts)
     return Facts(
         target=target,
-        objects=objects,
+        objects=tuple(objects),
         corners=len(corner_hits),
         luminance=float(image.mean() if render_scene.filters is not None else sense(image, None).mean()),
-        colour_share=_colour_share(light, recipe.cfa),
+        colour_share=weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum(),
         other_share=_share(image[centre.object_id == 0].sum(axis=0), light),
         lamps_away=_lamps_away(target.scene, list(boxes.values())),
         plan=counting_plan,
@@ -164,7 +167,6 @@ def probe_scene(target: Prepared) -> Facts:
         hit_s=hit_s,
         is_compiled=is_compiled,
         memory_bytes=available_bytes(),
-        pixel_px=grid.width / coarse.width,
     )
 
 
@@ -187,37 +189,8 @@ def _picture(
     return (image if cfa is not None else sense(image, None)[..., None]), path_s
 
 
-def _object_facts(
-    name: str,
-    number: int,
-    box_mm: np.ndarray | None,
-    image: np.ndarray,
-    centre: FirstHits,
-    corner_hits: list[FirstHits],
-    shines: bool,
-) -> ObjectFacts:
-    mask, corner_masks = centre.object_id == number, [hits.object_id == number for hits in corner_hits]
-    return ObjectFacts(
-        name=name,
-        z_mm=centre.z_mm[mask].astype(np.float64),
-        film_share=float(mask.mean()),
-        light_share=_share(image[mask].sum(axis=0), image.sum(axis=(0, 1))),
-        body_z_mm=(math.inf, math.inf) if box_mm is None else (float(box_mm[0, 2]), float(box_mm[1, 2])),
-        corners_seeing=sum(bool(one.any()) for one in corner_masks),
-        corners_seeing_all=sum(bool(one.any()) and not _is_cut(one) for one in corner_masks),
-        is_cut_at_centre=_is_cut(mask),
-        shines=shines,
-    )
-
-
 def _share(part: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return np.divide(part, whole, out=np.zeros(part.shape), where=whole > 0)
-
-
-def _colour_share(light: np.ndarray, cfa: str | None) -> np.ndarray:
-    pixels = np.bincount(colour_cells(cfa).ravel(), minlength=channel_count(cfa))
-    weight = light * pixels
-    return weight / weight.sum() if weight.sum() > 0 else pixels / pixels.sum()
 
 
 def _is_cut(mask: np.ndarray) -> bool:
@@ -229,8 +202,7 @@ def _boxes_mm(render_scene: RenderScene) -> dict[int, np.ndarray]:
     """Bounding boxes (2, 3) of the objects by number, smallest and largest X, Y, Z in mm."""
     boxes_mm = shape_boxes_mm(render_scene)
     object_of_box = render_scene.object_of_shape[backend.shape_numbers(render_scene.scene)]
-    numbers = np.unique(object_of_box[object_of_box > 0])
-    own = {int(number): boxes_mm[object_of_box == number] for number in numbers}
+    own = {number: boxes_mm[object_of_box == number] for number in set(object_of_box.tolist()) - {0}}
     return {number: np.array([box[:, 0].min(axis=0), box[:, 1].max(axis=0)]) for number, box in own.items()}
 
 

@@ -18,7 +18,21 @@ def sight_findings(facts: Facts) -> list[Finding]:
         findings.insert(0, Finding("ok", "objects", f"the centre and the corner cameras see {listed(whole)}"))
     if not facts.objects:
         findings.append(Finding("warn", "objects", "there are none", "add [[objects]] to the scene"))
-    return findings + _backdrop_findings(facts) + _glass_findings(facts) + _light_findings(facts)
+    scene, depth = facts.target.scene, facts.target.recipe.render.max_depth
+    if scene.backdrop is not None and scene.backdrop.z_mm < _nearest_mm(facts):
+        findings.append(_too_near("backdrop", f"it is at z = {scene.backdrop.z_mm:g} mm"))
+    glass = [thing.name for thing in scene.objects if is_clear(thing.material.finish)]
+    if glass and depth < MIN_GLASS_DEPTH:
+        text = f"paths of {depth} segments end inside {listed(glass)}, whose glass looks dark"
+        findings.append(Finding("warn", "glass", text, f"set render.max_depth to {MIN_GLASS_DEPTH} or more"))
+    for number in facts.lamps_away:
+        text, remedy = f"lamp {number} shines away from every object", f"turn lights[{number - 1}].target_mm"
+        findings.append(Finding("warn", "lights", text, f"{remedy} to the objects"))
+    text = f"the picture's mean luminance is {facts.luminance:.3g} cd/m^2"
+    if facts.luminance > 0:
+        return [*findings, Finding("ok", "lights", text)]
+    remedy = "point a lamp at the objects, or add a light of type 'uniform'"
+    return [*findings, Finding("bad", "lights", text, remedy)]
 
 
 def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
@@ -29,7 +43,13 @@ def _object_findings(facts: Facts, thing: ObjectFacts) -> list[Finding]:
     if not thing.corners_seeing and not thing.z_mm.size:
         if thing.shines:  # a lamp may stand where no camera sees it
             return []
-        return [Finding("bad", "objects", f"no camera sees {thing.name}", _into_view(facts, thing))]
+        across_mm, down_mm = (px * facts.grid.pixel_mm / 2 for px in (facts.grid.width, facts.grid.height))
+        per_mm = far_mm / facts.grid.focal_mm
+        remedy = (
+            f"move it from behind what hides it, or into view, which at {far_mm:.0f} mm reaches "
+            f"{across_mm * per_mm:.0f} mm to either side and {down_mm * per_mm:.0f} mm up and down"
+        )
+        return [Finding("bad", "objects", f"no camera sees {thing.name}", remedy)]
     if not thing.z_mm.size:
         text = f"corner cameras see {thing.name}, but the virtual centre, of which the truth is, does not"
         return [Finding("warn", "objects", text, "move it into view")]
@@ -47,44 +67,3 @@ def _nearest_mm(facts: Facts) -> float:
 def _too_near(subject: str, text: str) -> Finding:
     remedy = "Z runs forward in millimetres, not metres: give it a z of some hundred"
     return Finding("bad", subject, f"{text}, beside the cameras or behind them", remedy)
-
-
-def _into_view(facts: Facts, thing: ObjectFacts) -> str:
-    grid, z_mm = facts.grid, thing.body_z_mm[1]
-    across_mm, down_mm = (
-        side_px * grid.pixel_mm / grid.focal_mm * z_mm / 2 for side_px in (grid.width, grid.height)
-    )
-    return (
-        f"move it from behind what hides it, or into view, which at {z_mm:.0f} mm reaches {across_mm:.0f} mm "
-        f"to either side and {down_mm:.0f} mm up and down; below {facts.pixel_px:.2g} px this look misses it"
-    )
-
-
-def _backdrop_findings(facts: Facts) -> list[Finding]:
-    wall_mm = facts.backdrop_mm
-    if wall_mm is None or wall_mm >= _nearest_mm(facts):
-        return []
-    return [_too_near("backdrop", f"it is at z = {wall_mm:g} mm")]
-
-
-def _glass_findings(facts: Facts) -> list[Finding]:
-    depth = facts.target.recipe.render.max_depth
-    glass = [thing.name for thing in facts.target.scene.objects if is_clear(thing.material.finish)]
-    if not glass or depth >= MIN_GLASS_DEPTH:
-        return []
-    text = f"paths of {depth} segments end inside {listed(glass)}, whose glass looks dark"
-    return [Finding("warn", "glass", text, f"set render.max_depth to {MIN_GLASS_DEPTH} or more")]
-
-
-def _light_findings(facts: Facts) -> list[Finding]:
-    findings = []
-    for number in facts.lamps_away:
-        text = f"lamp {number} shines away from every object"
-        findings.append(
-            Finding("warn", "lights", text, f"turn lights[{number - 1}].target_mm to the objects")
-        )
-    text = f"the picture's mean luminance is {facts.luminance:.3g} cd/m^2"
-    if facts.luminance > 0:
-        return [*findings, Finding("ok", "lights", text)]
-    remedy = "point a lamp at the objects, or add a light of type 'uniform'"
-    return [*findings, Finding("bad", "lights", text, remedy)]

@@ -1,20 +1,19 @@
 """`simgen check`, and what it and `preview` look at: a scene or a recipe, by name or path."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from pcii.base.errors import InputError
-from simgen.base.file_lookup import recipe_roots
 from simgen.base.strict_models import suggestion
 from simgen.check.depths import depth_findings
-from simgen.check.light import cost_findings, photon_findings, shortage_findings
+from simgen.check.light import cost_findings, photon_findings
 from simgen.check.scene_probe import Facts, Finding, probe_scene
 from simgen.check.sight import sight_findings
 from simgen.dataset.prepared import Prepared, prepare, prepare_scene
+from simgen.dataset.resources import available_bytes, shortage
 from simgen.spec.materials import is_clear
-from simgen.spec.recipe import Recipe, Render, recipe_file
+from simgen.spec.recipe import Recipe, Render, recipe_file, recipe_names
 from simgen.spec.scene import Scene
 from simgen.spec.scene_lookup import drawn_scenes, is_drawn, is_scene, scene_names
 from simgen.spec.sweeps import Sweep, load_sweep
@@ -39,13 +38,11 @@ def lint(
     grid, sensor = target.recipe.grid, target.recipe.sensor
     views = f"{grid.rows} x {grid.cols} views of {grid.height} x {grid.width} pixels"
     pitch = f"pitch {grid.pitch_mm[0]:g} x {grid.pitch_mm[1]:g} mm"
-    first_values = (
-        f"; of {axis.field} the first of {len(axis.values)} values, {json.dumps(axis.values[0])}"
-        for axis in sweep.axes
-    )
-    title = target.recipe.title or target.scene.title
-    line = f"{title}: {views}, {pitch}, {sensor.cfa}{''.join(first_values)}"
-    return line, shortage_findings(target.needs) or findings(probe_scene(target))
+    first = f"; of {', '.join(sweep.fields)} the first value" if sweep.axes else ""
+    line = f"{target.recipe.title or target.scene.title}: {views}, {pitch}, {sensor.cfa}{first}"
+    if lack := shortage(target.recipe, None, available_bytes()):  # so that it cannot even be looked at
+        return line, [Finding("bad", "memory", lack)]
+    return line, findings(probe_scene(target))
 
 
 def findings(facts: Facts) -> list[Finding]:
@@ -54,13 +51,13 @@ def findings(facts: Facts) -> list[Finding]:
 
 
 def load_target(
-    name_or_path: str,
+    target: Scene | str | Path,
     overrides: Sequence[str] = (),
     scene_number: int | None = None,
     *,
     trust_python: bool = False,
 ) -> Prepared:
-    """A recipe with its scene, from the name or path of either.
+    """A recipe with its scene, from a scene or from the name or path of either.
 
     A scene is looked at as by a recipe that says nothing else: with the paper's camera grid, and with
     longer light paths if there is glass in it. A name of both a scene and a recipe means the scene; with
@@ -68,12 +65,9 @@ def load_target(
     of other fields with several values the first is taken. `trust_python` runs a Python function that a
     recipe file names. Raises `InputError` for what is missing or not valid.
     """
-    return _target_of(*_sweep_of(name_or_path, overrides, trust_python), scene_number)
-
-
-def target_of_scene(scene: Scene) -> Prepared:
-    """A scene, looked at as `load_target` says; raises `InputError` for a file that it names and lacks."""
-    return _with_long_paths(prepare_scene(Recipe(scene="as given"), scene))
+    if isinstance(target, Scene):
+        return _with_long_paths(prepare_scene(Recipe(scene="as given"), target))
+    return _target_of(*_sweep_of(str(target), overrides, trust_python), scene_number)
 
 
 def _target_of(sweep: Sweep, recipe_folder: Path | None, scene_number: int | None) -> Prepared:
@@ -101,8 +95,7 @@ def _sweep_of(name_or_path: str, overrides: Sequence[str], trust_python: bool) -
             raise InputError(f"--set: {name_or_path!r} is a scene, without cameras of its own; name a recipe")
         return Sweep({"scene": name_or_path}, (), name_or_path, Path()), None
     if recipe_file(name_or_path) is None:
-        recipes = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-        hint = suggestion(Path(name_or_path).stem, {*recipes, *scene_names(), *drawn_scenes()})
+        hint = suggestion(Path(name_or_path).stem, {*recipe_names(), *scene_names(), *drawn_scenes()})
         raise InputError(f"there is no scene or recipe {name_or_path!r}{hint}")
     sweep = load_sweep(name_or_path, overrides, trust_python=trust_python)
     return sweep, sweep.recipe_folder

@@ -28,7 +28,7 @@ from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
 from pcii.io.evaluation_layout import read_evaluation
 from pcii.store.hashes import hash_json
 from pcii.store.safe_files import write_json_safely
-from simgen.base.file_lookup import recipe_roots
+from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.dataset.dataset_folder import versions
@@ -41,7 +41,7 @@ REFERENCE_PHOTONS_PER_VIEW = 1000.0
 
 def benchmark_files() -> dict[str, Path]:
     """Files of the benchmarks that ship, by name."""
-    return {file.stem: file for root in recipe_roots() for file in sorted(root.glob("benchmarks/*.toml"))}
+    return {file.stem: file for file in find_all("data_recipes/benchmarks/*.toml")}
 
 
 def load_definition(name_or_path: str) -> tuple[Definition, Path]:
@@ -170,10 +170,9 @@ def reference_scores(benchmark: Path, halves: Iterable[Half]) -> dict[str, Mappi
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder) / "scores"
             words = ["benchmark", "run", REFERENCE_METHOD, "--budget", f"{REFERENCE_PHOTONS_PER_VIEW:g}"]
-            words += ["--half", half]
+            words += ["--half", half, "--data", str(benchmark), "-o", str(out)]
             program = "import sys; from pcii.app.commands import main; sys.exit(main())"
-            command = [sys.executable, "-c", program, *words, "--data", str(benchmark), "-o", str(out)]
-            if subprocess.run(command, stdout=subprocess.DEVNULL).returncode:
+            if subprocess.run([sys.executable, "-c", program, *words], stdout=subprocess.DEVNULL).returncode:
                 raise InputError(f"certificate: `pcii {' '.join(words)}` failed, as said above")
             for group in read_evaluation(out)["groups"]:
                 (result,) = group["results"]

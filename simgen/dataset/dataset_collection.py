@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -23,7 +23,7 @@ from pcii.io.collection_layout import (
 )
 from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from pcii.store.safe_files import locked, named_in_errors, temporaries_of
-from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_versions
+from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_dataset, other_versions
 from simgen.dataset.generation import Reuse, make
 from simgen.dataset.prepared import prepare
 from simgen.renderer import backend
@@ -66,18 +66,18 @@ def generate_collection(
     out = out.resolve()
     with named_in_errors(out):
         _begin(series, out)
-    rows, faults, pieces = dict[int, Row](), list[str](), range(len(series))
+    rows, faults, pieces = list[Row](), list[str](), range(len(series))
     try:
         with closing(executor.run(DatasetJob(series, out), pieces, report)) as work:
             for done in work:
                 if done.result is None:
                     faults.append(done.fault)
                 else:
-                    rows[done.piece] = done.result
+                    rows.append(done.result)
                 report("datasets", len(rows) + len(faults), len(pieces))
     finally:
         with named_in_errors(out):
-            _write_whole_index(series, out, list(rows.values()))
+            _write_whole_index(series, out, rows)
     return faults
 
 
@@ -94,16 +94,14 @@ class DatasetJob:
         Raises `BusyError` if another process is at it, `InputError` if it cannot be made, or if this process
         has other versions of the software than the one that made the job.
         """
-        differences = other_versions(self.versions)
-        if differences:
-            raise InputError(
-                f"{self.name(piece)}: the collection is of other software ({differences}); install that"
-            )
+        if other_versions(self.versions):
+            raise other_dataset(self.out, "collection", self.versions)
         prepared = prepare(self.series.recipe(piece), self.series.recipe_folder)
         folder = self.out / self.series.folder(piece)
         # Sizes show well enough that it is whole: hashes are compared when it is read and verified.
         manifest = find_finished(folder, prepared.identity, content=False)
-        return _row(self.series, piece, folder, manifest or make(prepared, folder, silent, self.reuse))
+        manifest = manifest or make(prepared, folder, silent, self.reuse)
+        return index_row(folder.name, self.series.values(piece), manifest, folder / MANIFEST)
 
     def name(self, piece: int) -> str:
         """The dataset's folder."""
@@ -115,11 +113,10 @@ class DatasetJob:
 
 
 def _begin(series: Series, out: Path) -> None:
-    """Make the folder of a collection, or see that it is one of the same recipe.
+    """Make the folder of a collection, or raise `InputError` unless it is one of the same recipe.
 
     Other values of the swept fields may be there already; a collection that ended without any dataset gives
-    way to another. `InputError` for a file, a dataset, the collection of another recipe or other software, or
-    a folder that holds something else.
+    way to another.
     """
     if (out / MANIFEST).exists() or (out / MARKER).exists():
         raise InputError(f"{out}: holds a single dataset; name another folder for a collection")
@@ -135,16 +132,8 @@ def _begin(series: Series, out: Path) -> None:
             if _is_free(out):
                 COLLECTION_FOLDER.write(out, document)
     known = read_collection(out)
-    if any(known.get(name) != document[name] for name in ("fields", "recipe")):
-        raise InputError(
-            f"{out}: holds the collection of another recipe or of other swept fields; name a new folder"
-        )
-    differences = other_versions(known.get("versions", {}))
-    if differences:
-        raise InputError(
-            f"{out}: holds the collection of other software, whose photons may differ ({differences}); name "
-            "a new folder, or install that software"
-        )
+    if any(known.get(name) != value for name, value in document.items()):
+        raise other_dataset(out, "collection", known.get("versions", {}))
 
 
 def _is_free(out: Path) -> bool:
@@ -152,10 +141,6 @@ def _is_free(out: Path) -> bool:
     if not is_collection(out) or not (out / COLLECTION).stat().st_size:
         return True
     return (out / INDEX).is_file() and not any(entry.is_dir() for entry in os.scandir(out))
-
-
-def _row(series: Series, number: int, folder: Path, manifest: Mapping[str, Any]) -> Row:
-    return index_row(folder.name, series.values(number), manifest, folder / MANIFEST)
 
 
 def _write_whole_index(series: Series, out: Path, rows: Sequence[Row]) -> None:
@@ -174,24 +159,18 @@ def _write_whole_index(series: Series, out: Path, rows: Sequence[Row]) -> None:
 
 def _all_rows(series: Series, out: Path, rows: Sequence[Row]) -> list[Row]:
     """These rows, those of the index as it is, and of what other processes have finished; in order."""
-    by_name = {row["path"]: row for row in [*_rows_of_index(out), *rows]}
+    by_name: dict[str, Row] = {}
+    for row in read_index(out) if (out / INDEX).is_file() else ():
+        with suppress(InputError):  # of a dataset that is gone or another one by now
+            check_manifest(out, row)
+            by_name[row["path"]] = row
+    by_name |= {row["path"]: row for row in rows}
     present = {entry.name for entry in os.scandir(out) if entry.is_dir()}
     names = [series.folder(number) for number in range(len(series))]
     for number, name in enumerate(names):
         folder = out / name
         is_missing = name in present and name not in by_name
         if is_missing and (folder / MANIFEST).is_file() and not (folder / MARKER).exists():
-            by_name[name] = _row(series, number, folder, read_written_manifest(folder))
+            manifest, values = read_written_manifest(folder), series.values(number)
+            by_name[name] = index_row(name, values, manifest, folder / MANIFEST)
     return [by_name[name] for name in dict.fromkeys([*names, *by_name]) if name in by_name]
-
-
-def _rows_of_index(out: Path) -> list[Row]:
-    """Rows of the index as it is, but for those whose datasets are gone or others by now."""
-    rows: list[Row] = []
-    for row in read_index(out) if (out / INDEX).is_file() else ():
-        try:
-            check_manifest(out, row)
-        except InputError:
-            continue
-        rows.append(row)
-    return rows

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ def read_whole(out: Path, identity: str, *, content: bool) -> dict[str, Any]:
     """The manifest of a finished dataset; `InputError` if it is another one or a file is damaged."""
     manifest = read_written_manifest(out)
     if manifest.get("identity") != identity:
-        raise _other(out, "dataset", manifest.get("versions", {}))
+        raise other_dataset(out, "dataset", manifest.get("versions", {}))
     check_held(out, manifest, content=content)
     return manifest
 
@@ -77,19 +77,14 @@ def claim(out: Path, identity: str, engine: dict[str, Any]) -> Iterator[Path]:
             try:
                 yield marker
             except BaseException:
-                _leave_nothing(out, new)
+                with suppress(OSError):
+                    if [entry.name for entry in out.iterdir()] == [MARKER]:
+                        marker.unlink()
+                        for folder in new:
+                            folder.rmdir()
                 raise
     except BlockingIOError:
         raise BusyError(f"{out}: another run is writing this dataset") from None
-
-
-def _leave_nothing(out: Path, new: Sequence[Path]) -> None:
-    """Remove the mark of a folder in which there is nothing else, and these folders if they are empty."""
-    with suppress(OSError):
-        if [entry.name for entry in out.iterdir()] == [MARKER]:
-            (out / MARKER).unlink()
-            for folder in new:
-                folder.rmdir()
 
 
 def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]) -> None:
@@ -103,7 +98,7 @@ def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{marker}: damaged; delete the folder {out} to start again") from None
     if known != identity:
-        raise _other(out, "unfinished dataset", recorded)
+        raise other_dataset(out, "unfinished dataset", recorded)
     if before != {key: engine[key] for key in decisive}:
         raise InputError(
             f"{out}: was begun with {before['variant']}, and this machine now runs {engine['variant']}, "
@@ -111,12 +106,12 @@ def _check_mark(marker: Path, text: bytes, identity: str, engine: dict[str, Any]
         )
 
 
-def _other(out: Path, what: str, recorded: Mapping[str, str]) -> InputError:
-    """That a folder holds something of another recipe, or of other versions of the software."""
+def other_dataset(out: Path, what: str, recorded: Mapping[str, str]) -> InputError:
+    """That a folder holds something of other software or, if its versions agree, of another recipe."""
     differences = other_versions(recorded)
-    if differences:
-        return InputError(
-            f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a "
-            "new or empty folder, or install that software"
-        )
-    return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
+    if not differences:
+        return InputError(f"{out}: holds the {what} of another recipe or scene; name a new or empty folder")
+    return InputError(
+        f"{out}: holds the {what} of other software, whose photons may differ ({differences}); name a new or "
+        "empty folder, or install that software"
+    )

@@ -1,5 +1,6 @@
 """From a recipe to a dataset folder: the order of the work, and what datasets have in common."""
 
+import math
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -31,7 +32,7 @@ from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Recipe
-from simgen.truth.truth_file import TruthRequest, traced_for_visibility, write_truth
+from simgen.truth.truth_file import traced_for_visibility, write_truth
 
 Made = TypeVar("Made")
 
@@ -106,13 +107,13 @@ def make(prepared: Prepared, out: Path, report: Report, reuse: Reuse) -> dict[st
         if (out / MANIFEST).is_file():  # another run has finished it since
             marker.unlink()
             return read_whole(out, identity, content=True)
-        check_resources(prepared.needs, None, out)
+        check_resources(recipe, None, out)
         with _timed(timings_s, "load"):  # before anything is written: a bad scene shows here
             render_scene = reuse.once("scene", prepared.scene_key, prepared.render_scene)
         if recipe.products.counts:  # likewise: too much light
             with _timed(timings_s, "plan"):
                 counting = reuse.once("plan", prepared.light_key, lambda: prepared.plan(render_scene))
-                check_resources(prepared.needs, counting, out)
+                check_resources(recipe, counting, out)
         sweep_temporaries(out)
         photons = _write_products(prepared, render_scene, counting, reuse, out, timings_s, report)
         shutil.rmtree(out / RENDERED, ignore_errors=True)
@@ -144,34 +145,25 @@ def _write_products(
 ) -> dict[str, Any] | None:
     """Write all products; what the manifest says of the photons, None without counts."""
     recipe, capture, photons = prepared.recipe, prepared.capture, None
-    products, render = recipe.products, recipe.render
+    products, sensor = recipe.products, recipe.sensor
 
     def write(arrivals: PhotonTable, log: dict[str, Any]) -> dict[str, Any]:
         options = {"with_origins": products.truth, "keeps_frames": products.frames}
-        return log | write_counts(capture, recipe.sensor, arrivals, out, **options)
+        return log | write_counts(capture, sensor, arrivals, out, **options)
+
+    def make_truth() -> None:
+        planes_mm, has_errors = recipe.analysis.z_mm, recipe.grid.errors is not None
+        write_truth(products, planes_mm, has_errors, render_scene, capture.rig, out, report)
 
     if products.truth or products.view_truth:
-        request = TruthRequest(products, recipe.analysis.z_mm, recipe.grid.errors is not None)
         with _timed(timings_s, "truth"):
-            reuse.folder(
-                prepared.truth_key,
-                out / TRUTH,
-                lambda: write_truth(request, render_scene, capture.rig, out, report),
-            )
+            reuse.folder(prepared.truth_key, out / TRUTH, make_truth)
     if counting is not None and counting.thins:
         with _timed(timings_s, "photons"):
             photons = write(*thin(capture, prepared.setup(render_scene), counting, report))
     dense = None if counting is None or counting.thins else counting
-    views = RenderedViews(
-        capture,
-        recipe.sensor,
-        recipe.exposure,
-        products.radiance,
-        render.samples_per_pixel if dense is None else dense.samples,
-        render.background_samples_per_pixel if dense is None else None,
-        out,
-        are_for_counts=dense is not None,
-    )
+    samples = None if dense is None else dense.samples
+    views = RenderedViews(capture, sensor, recipe.exposure, products.radiance, recipe.render, samples, out)
     if products.radiance != "none" or dense is not None:
         with _timed(timings_s, "radiance"):
             views.render(render_scene, report)
@@ -210,8 +202,7 @@ def _skipped(
     see a point; both None if there was no such work.
     """
     recipe, products, render = prepared.recipe, prepared.recipe.products, prepared.recipe.render
-    grid = recipe.grid.camera_grid()
-    pixels = grid.view_count * grid.height * grid.width
+    pixels = math.prod(recipe.grid.camera_grid().shape_KLHW)
     entries: list[dict[str, Any]] = []
 
     def add(what: str, why: str, saved: int, unit: str) -> None:
@@ -227,11 +218,10 @@ def _skipped(
     elif products.radiance == "mosaic" and recipe.cfa is not None:
         what = "two of three colours of the radiance images"
         add(what, "the Bayer pattern hides them", 8 * pixels, "bytes before compression")
-    if products.radiance != "none" and not is_dense:
-        saved = background_paths_saved(render_scene, prepared.capture.rig, render)
-        if saved:
-            why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
-            add("samples where no object can be seen", why, saved, "light paths")
+    has_images = products.radiance != "none" and not is_dense
+    if has_images and (saved := background_paths_saved(render_scene, prepared.capture.rig, render)):
+        why = f"the recipe asks for {render.background_samples_per_pixel} per pixel there"
+        add("samples where no object can be seen", why, saved, "light paths")
     if shadow_rays is not None:
         add("visibility of some points", "no shape can stand in the way", pixels - shadow_rays, "rays")
     elif products.truth:

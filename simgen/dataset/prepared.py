@@ -15,7 +15,7 @@ from simgen.base import random_streams as seeds
 from simgen.base.file_lookup import asset
 from simgen.cameras.rig import rig_of
 from simgen.dataset.dataset_folder import decisive_versions
-from simgen.dataset.resources import Needs, available_bytes, shortage
+from simgen.dataset.resources import available_bytes, shortage
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Capture, Plan, plan
 from simgen.renderer import backend
@@ -33,7 +33,7 @@ AROUND_PLANES_MM = 60.0
 class Prepared:
     """What a dataset is made from; the recipe with depths to look at, if the scene names them.
 
-    `curves` (C, N) are None in RGB mode (see `spectra`).
+    `curves` (C, N) are the sensor's sensitivities by wavelength, None in RGB mode.
     """
 
     recipe: Recipe
@@ -89,13 +89,13 @@ class Prepared:
         """Hash of what the scene in the renderer depends on."""
         return hash_json([self.scene_content, self.recipe.render.max_depth])
 
-    @cached_property
+    @property
     def truth_key(self) -> str:
         """Hash of what the truth on disk depends on."""
         recipe = self.recipe_of_data
         return hash_json([self._camera_key, recipe["products"], recipe["analysis"]["z_mm"]])
 
-    @cached_property
+    @property
     def light_key(self) -> str:
         """Hash of what the plan of the counts depends on: not the seed, unless cameras have errors."""
         light = [self.recipe_of_data[part] for part in ("sensor", "photons", "exposure")]
@@ -106,11 +106,6 @@ class Prepared:
         grid = self.recipe.grid
         seed_of_errors = None if grid.errors is None else self.recipe.seed
         return hash_json([self.scene_key, grid.model_dump(mode="json"), seed_of_errors])
-
-    @property
-    def needs(self) -> Needs:
-        """What takes memory and disk."""
-        return needs_of(self.recipe)
 
     @cached_property
     def capture(self) -> Capture:
@@ -131,14 +126,12 @@ class Prepared:
 
     def plan(self, render_scene: RenderScene) -> Plan:
         """How the photon counts will be made, as memory is now; raises `InputError` for too many photons."""
-        needs, room = self.needs, available_bytes()
-        return plan(
-            self.capture,
-            self.setup(render_scene),
-            backend.choose().kind,
-            least_samples(self.recipe),
-            may_explore=lambda counting: shortage(needs, counting, room) is None,
-        )
+        setup, kind, room = self.setup(render_scene), backend.choose().kind, available_bytes()
+
+        def may_explore(counting: Plan) -> bool:
+            return shortage(self.recipe, counting, room) is None
+
+        return plan(self.capture, setup, kind, least_samples(self.recipe), may_explore=may_explore)
 
 
 def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
@@ -150,32 +143,22 @@ def prepare(recipe: Recipe, recipe_folder: Path | None) -> Prepared:
 def prepare_scene(recipe: Recipe, scene: Scene, recipe_folder: Path | None = None) -> Prepared:
     """A recipe with this scene, whatever scene it names; `InputError` for a file that is missing or wrong."""
     folder = checked_folder(scene)
-    resolved = recipe.model_copy(update={"analysis": _analysis_of(recipe.analysis, scene.planes_mm)})
+    analysis, planes_mm = recipe.analysis, scene.planes_mm
+    if planes_mm and not analysis.z_mm:
+        near, far = min(planes_mm), max(planes_mm)
+        around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
+        analysis = Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
+    resolved = recipe.model_copy(update={"analysis": analysis})
     return Prepared(resolved, scene, folder, sensitivities(recipe.sensor, recipe_folder or Path()))
 
 
-def _analysis_of(analysis: Analysis, planes_mm: tuple[float, ...]) -> Analysis:
-    """Where to look: at the scene's planes, if the recipe names none."""
-    if analysis.z_mm or not planes_mm:
-        return analysis
-    near, far = min(planes_mm), max(planes_mm)
-    around = max(near - AROUND_PLANES_MM, near / 2), far + AROUND_PLANES_MM
-    return Analysis(z_mm=planes_mm, z_range_mm=analysis.z_range_mm or around)
-
-
 def capture_of(recipe: Recipe, seed: int) -> Capture:
-    """What of a recipe decides which photons arrive where; `seed` is that of the draw (`Prepared.seed`)."""
+    """What decides which photons arrive where; `seed` is that of the draw (`Prepared.seed`)."""
     gain = None
     if recipe.photons.scope == "exposure":
         assert recipe.exposure is not None
         gain = photons_per_radiance(recipe.exposure, recipe.grid.pixel_mm)
     return Capture(rig_of(recipe.grid, seed), recipe.cfa, recipe.photons, gain, seed)
-
-
-def needs_of(recipe: Recipe) -> Needs:
-    """What of a recipe takes memory and disk."""
-    planes = len(recipe.analysis.z_mm)
-    return Needs(recipe.grid, recipe.sensor, recipe.photons, recipe.products, planes)
 
 
 def least_samples(recipe: Recipe) -> int:

@@ -33,17 +33,13 @@ def exact_view(
     l: int,
     samples_per_pixel: int,
     background_samples: int | None = None,
+    *,
+    part: int = 0,
 ) -> np.ndarray:
-    """Radiance (H, W, C), float32, of camera (k, l), with noise of its own."""
-    return render_view(
-        render_scene,
-        capture.rig,
-        k,
-        l,
-        samples_per_pixel=samples_per_pixel,
-        background_samples=background_samples,
-        seed=seeds.integer(capture.seed, view=_view_number(capture, k, l), stage="radiance"),
-    )
+    """Radiance (H, W, C), float32, of camera (k, l), with noise of its own and of this `part`."""
+    seed = seeds.integer(capture.seed, view=k * capture.grid.cols + l, stage="radiance", part=part)
+    samples = {"samples_per_pixel": samples_per_pixel, "background_samples": background_samples}
+    return render_view(render_scene, capture.rig, k, l, seed=seed, **samples)
 
 
 def halved_view(
@@ -54,18 +50,9 @@ def halved_view(
     It has as many samples per pixel, or one more. The noise (C,), which follows from the difference of the
     halves, is the variance of the mean in the sensor's colours, summed over the pixels of each.
     """
-    view, samples = _view_number(capture, k, l), math.ceil(samples_per_pixel / 2)
-    one, other = (
-        render_view(
-            render_scene,
-            capture.rig,
-            k,
-            l,
-            samples_per_pixel=samples,
-            seed=seeds.integer(capture.seed, view=view, stage="radiance", part=part),
-        ).astype(np.float64)
-        for part in (0, 1)
-    )
+    samples = math.ceil(samples_per_pixel / 2)
+    halves = (exact_view(render_scene, capture, k, l, samples, part=part) for part in (0, 1))
+    one, other = (half.astype(np.float64) for half in halves)
     apart = sense(one - other, capture.cfa)
     colours = colour_index(apart.shape[0], apart.shape[1], capture.cfa).ravel()
     variance = np.bincount(colours, (apart**2).ravel() / 4, minlength=channel_count(capture.cfa))
@@ -74,12 +61,11 @@ def halved_view(
 
 def background_paths_saved(render_scene: RenderScene, rig: Rig, render: Render) -> int:
     """Light paths that all views take less than with `render.samples_per_pixel` everywhere."""
-    fewer = render.background_samples_per_pixel
+    samples, fewer = render.samples_per_pixel, render.background_samples_per_pixel
     if fewer is None:
         return 0
     cameras = (rig.camera(k, l) for k, l in np.ndindex(rig.grid.rows, rig.grid.cols))
-    saved = (windows_of_objects(render_scene, each, render.samples_per_pixel, fewer)[1] for each in cameras)
-    return sum(max(paths, 0) for paths in saved)
+    return sum(max(windows_of_objects(render_scene, each, samples, fewer)[1], 0) for each in cameras)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,35 +73,32 @@ class RenderedViews:
     """The rendered views of the dataset in the folder `out`.
 
     `radiance` is the product: "rgb" is all colours, "mosaic" the pixel's own. With `sensor.full_light` it is
-    what a camera with this `exposure` reads, else exact radiance.
+    what a camera with this `exposure` reads, else exact radiance. A view has as many samples as `settings`
+    say or, if counts are drawn from it, `samples_for_counts` in two halves, so that its noise is known.
     """
 
     capture: Capture
     sensor: Sensor
     exposure: Exposure | None
     radiance: Literal["none", "mosaic", "rgb"]
-    samples_per_pixel: int
-    background_samples: int | None
+    settings: Render
+    samples_for_counts: int | None
     out: Path
-    are_for_counts: bool = False
-    """Whether counts are drawn from them: then each is rendered in two halves, and its noise is known."""
 
     def render(self, render_scene: RenderScene, report: Report) -> None:
         """Write every view that is not on disk yet; the next one is rendered while one is compressed."""
         grid, stage = self.capture.grid, "views"
-        if self.are_for_counts:
-            stage = f"views of {self.samples_per_pixel} samples per pixel, for the counts"
+        if self.samples_for_counts is not None:
+            stage = f"views of {self.samples_for_counts} samples per pixel, for the counts"
         with ThreadPoolExecutor(1, "views") as writer:
-            before: Future[None] | None = None
-            for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
-                view = None if self._is_rendered(k, l) else self._rendered(render_scene, k, l)
-                if before is not None:
-                    before.result()
-                    report(stage, number, grid.view_count)
-                before = writer.submit(self._write, k, l, view)
-            if before is not None:
-                before.result()
-                report(stage, grid.view_count, grid.view_count)
+            writes: list[Future[None]] = []
+            for k, l in np.ndindex(grid.rows, grid.cols):
+                view = self._rendered(render_scene, k, l)
+                for write in writes[-1:]:
+                    write.result()
+                writes.append(writer.submit(self._write, k, l, view))
+                report(stage, len(writes), grid.view_count)
+            writes[-1].result()
 
     def mosaic(self, k: int, l: int) -> np.ndarray:
         """Radiance that each of the sensor's pixels gets in a view that is on disk, (H, W)."""
@@ -126,17 +109,17 @@ class RenderedViews:
         """Noise (C,) of a view that is on disk, as of `halved_view`."""
         return np.array(json.loads(self._noise_file(k, l).read_bytes()))
 
-    def _is_rendered(self, k: int, l: int) -> bool:
-        return self._exact_file(k, l).is_file() and (
-            not self.are_for_counts or self._noise_file(k, l).is_file()
-        )
-
-    def _rendered(self, render_scene: RenderScene, k: int, l: int) -> tuple[np.ndarray, np.ndarray | None]:
-        """Radiance of a view, and its noise if counts are drawn from it."""
-        if self.are_for_counts:
-            return halved_view(render_scene, self.capture, k, l, self.samples_per_pixel)
-        samples = self.samples_per_pixel, self.background_samples
-        return exact_view(render_scene, self.capture, k, l, *samples), None
+    def _rendered(
+        self, render_scene: RenderScene, k: int, l: int
+    ) -> tuple[np.ndarray, np.ndarray | None] | None:
+        """Radiance of a view and, if counts are drawn from it, its noise; None if they are on disk."""
+        samples, settings = self.samples_for_counts, self.settings
+        if self._exact_file(k, l).is_file() and (samples is None or self._noise_file(k, l).is_file()):
+            return None
+        if samples is not None:
+            return halved_view(render_scene, self.capture, k, l, samples)
+        both = settings.samples_per_pixel, settings.background_samples_per_pixel
+        return exact_view(render_scene, self.capture, k, l, *both), None
 
     def _write(self, k: int, l: int, view: tuple[np.ndarray, np.ndarray | None] | None) -> None:
         """Write the exact radiance of a view, unless it is there, and what a camera reads, if asked for."""
@@ -148,13 +131,9 @@ class RenderedViews:
                 write_json_safely(self._noise_file(k, l), variance.tolist())
         if self.sensor.full_light is not None and self.radiance != "none":
             assert self.exposure is not None
-            measured = full_light_image(
-                read_exr(exact),
-                capture.cfa,
-                photons_per_radiance(self.exposure, capture.grid.pixel_mm),
-                self.sensor,
-                seeds.generator(capture.seed, view=_view_number(capture, k, l), stage="full light"),
-            )
+            gain = photons_per_radiance(self.exposure, capture.grid.pixel_mm)
+            rng = seeds.generator(capture.seed, view=k * capture.grid.cols + l, stage="full light")
+            measured = full_light_image(read_exr(exact), capture.cfa, gain, self.sensor, rng)
             write_exr_safely(self.out / radiance_name(k, l), measured)
 
     def _noise_file(self, k: int, l: int) -> Path:
@@ -165,7 +144,3 @@ class RenderedViews:
         name = radiance_name(k, l)
         is_product = self.radiance != "none" and self.sensor.full_light is None
         return self.out / (name if is_product else name.replace(RADIANCE, RENDERED, 1))
-
-
-def _view_number(capture: Capture, k: int, l: int) -> int:
-    return k * capture.grid.cols + l

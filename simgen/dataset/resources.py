@@ -6,7 +6,6 @@ Bytes per item were measured, as the growth of the process with the number of it
 import math
 import os
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from pcii.base.errors import InputError
 from simgen.photons.counting_plan import Plan
 from simgen.photons.disparity_layers import layers_for, tile_px_for
 from simgen.photons.exploration import MAX_RAYS
-from simgen.spec.recipe import Grid, Photons, Products, Sensor
+from simgen.spec.recipe import Recipe
 
 BASE_BYTES = 4e8
 """The renderer and its libraries."""
@@ -32,27 +31,16 @@ EXR_SHARE = 0.5
 """Noise of rendered views keeps their files larger than this share of what they are before compression."""
 
 
-@dataclass(frozen=True)
-class Needs:
-    """What of a recipe takes memory and disk; `planes` is for how many the truth says what is in focus."""
-
-    grid: Grid
-    sensor: Sensor
-    photons: Photons
-    products: Products
-    planes: int
-
-
-def bytes_of_steps(needs: Needs, plan: Plan | None) -> dict[str, float]:
+def bytes_of_steps(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
     """Memory of each step of the work by the fields that it grows with; without a plan of the first ones."""
-    grid, sensor, products = needs.grid, needs.sensor, needs.products
+    grid, sensor, products = recipe.grid, recipe.sensor, recipe.products
     pixels, views = float(grid.height * grid.width), float(grid.rows * grid.cols)
     each = PHOTON_BYTES if sensor.bits is not None or products.frames else ORIGIN_BYTES
     hot = sensor.hot_pixel_share * (PHOTON_BYTES + each * sensor.hot_pixel_counts)
     steps = {
         "grid.height, grid.width": PIXEL_BYTES * pixels,
         "grid.rows, grid.cols": VIEW_BYTES * views,
-        "analysis.z_mm": PLANE_BYTES * pixels * needs.planes * products.truth,
+        "analysis.z_mm": PLANE_BYTES * pixels * len(recipe.analysis.z_mm) * products.truth,
         "sensor.dark_counts": PHOTON_BYTES * sensor.dark_counts * pixels * views * products.counts,
         "sensor.hot_pixel_share, sensor.hot_pixel_counts": hot * pixels * views * products.counts,
     }
@@ -62,7 +50,7 @@ def bytes_of_steps(needs: Needs, plan: Plan | None) -> dict[str, float]:
     if not (plan.thins and plan.keeps_origins):
         sums = SUM_BYTES * pixels * views if plan.thins else 0.0
         photon_bytes = min(photon_bytes, PHOTON_BYTES * pixels * views) + sums
-    steps["exposure" if needs.photons.scope == "exposure" else "photons.budget"] = photon_bytes
+    steps["exposure" if recipe.photons.scope == "exposure" else "photons.budget"] = photon_bytes
     if plan.thins:
         cameras, z_mm = grid.camera_grid(), np.array(plan.depths_mm or (math.inf,))
         tiles = layers_for(cameras, tile_px_for(cameras, MAX_RAYS), z_mm).tiles
@@ -70,57 +58,57 @@ def bytes_of_steps(needs: Needs, plan: Plan | None) -> dict[str, float]:
     return steps
 
 
-def peak_bytes(needs: Needs, plan: Plan | None) -> float:
+def peak_bytes(recipe: Recipe, plan: Plan | None) -> float:
     """Memory at the peak: of the libraries and of the largest step."""
-    return BASE_BYTES + max(bytes_of_steps(needs, plan).values())
+    return BASE_BYTES + max(bytes_of_steps(recipe, plan).values())
 
 
-def shortage(needs: Needs, plan: Plan | None, room: float) -> str | None:
+def shortage(recipe: Recipe, plan: Plan | None, room: float) -> str | None:
     """A sentence on the largest step, if memory of `room` bytes cannot hold it; None if it can."""
-    field, most = max(bytes_of_steps(needs, plan).items(), key=lambda step: step[1])
+    field, most = max(bytes_of_steps(recipe, plan).items(), key=lambda step: step[1])
     if most <= room:
         return None
     return f"{field}: takes some {in_bytes(most)} of memory, and this machine has {in_bytes(room)} available"
 
 
-def check_resources(needs: Needs, plan: Plan | None, out: Path) -> None:
+def check_resources(recipe: Recipe, plan: Plan | None, out: Path) -> None:
     """Raise `InputError` if memory cannot hold a step, or the disk of `out` the rendered views."""
-    sentence = shortage(needs, plan, available_bytes())
+    sentence = shortage(recipe, plan, available_bytes())
     if sentence is not None:
         raise InputError(sentence)
     place = next(folder for folder in (out, *out.absolute().parents) if folder.exists())
-    needed = least_rendered_bytes(needs, plan)
+    needed = least_rendered_bytes(recipe, plan)
     free = shutil.disk_usage(place).free + sum(file.stat().st_size for file in out.glob("*/view_*.exr"))
     if needed > free:
-        field = "products.radiance" if needs.products.radiance != "none" else "photons, drawn from such"
+        field = "products.radiance" if recipe.products.radiance != "none" else "photons, drawn from such"
         raise InputError(
             f"{field}: rendered views of all cameras take {in_bytes(needed)} or more on disk, and {out} has "
             f"{in_bytes(free)} left"
         )
 
 
-def product_bytes(needs: Needs, plan: Plan | None) -> dict[str, float]:
+def product_bytes(recipe: Recipe, plan: Plan | None) -> dict[str, float]:
     """Bytes of each product that the recipe asks for, before compression."""
-    grid, products = needs.grid, needs.products
+    grid, products = recipe.grid, recipe.products
     pixels, views = float(grid.height * grid.width), grid.rows * grid.cols
     sizes: dict[str, float] = {}
     if plan is not None:
         photons = plan.photons_per_view * views
-        frames = FRAME_BYTES * photons * (products.frames and needs.sensor.frames > 1)
+        frames = FRAME_BYTES * photons * (products.frames and recipe.sensor.frames > 1)
         sizes["counts"] = EVENT_BYTES * min(photons, pixels * views) + frames
     if products.radiance != "none":
-        sizes["radiance"] = least_rendered_bytes(needs, None) / EXR_SHARE
+        sizes["radiance"] = least_rendered_bytes(recipe, None) / EXR_SHARE
     if products.truth or products.view_truth:
         sizes["truth"] = TRUTH_BYTES * pixels * (products.truth + views * bool(products.view_truth))
     return sizes
 
 
-def least_rendered_bytes(needs: Needs, plan: Plan | None) -> float:
+def least_rendered_bytes(recipe: Recipe, plan: Plan | None) -> float:
     """What the files of rendered views take at least: of products, or for dense counts to be drawn from."""
-    if needs.products.radiance == "none" and (plan is None or plan.thins):
+    if recipe.products.radiance == "none" and (plan is None or plan.thins):
         return 0.0
-    pixels = float(needs.grid.height * needs.grid.width * needs.grid.rows * needs.grid.cols)
-    return EXR_SHARE * 4.0 * pixels * (3 if needs.products.radiance == "rgb" else 1)
+    pixels = float(recipe.grid.height * recipe.grid.width * recipe.grid.rows * recipe.grid.cols)
+    return EXR_SHARE * 4.0 * pixels * (3 if recipe.products.radiance == "rgb" else 1)
 
 
 def available_bytes() -> float:

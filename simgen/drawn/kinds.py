@@ -1,31 +1,22 @@
-"""The ten kinds of drawn scenes: two or three solids, many cards or leaves, a room, things on a desk."""
+"""The ten kinds of drawn scenes: two or three solids, many cards or leaves, a room, things on a desk.
+
+The order in which a scene calls its `Random` is part of what a number means.
+"""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import pairwise
 from random import Random
 
-from simgen.drawn.composition import (
-    REFERENCE_MM,
-    Table,
-    box_of,
-    card,
-    chessboard,
-    colour,
-    cylinder_of,
-    drawn_scene,
-    glossy,
-    noise,
-    pattern,
-    placed,
-    plain,
-    planes_apart,
-    solid,
-    sphere,
-    two_planes,
-)
-from simgen.spec.scene import Scene
+from simgen.drawn.composition import Table, box_of, card, colour, cylinder_of, noise, placed, sphere
+from simgen.spec.scene import Scene, scene_of
 
+REFERENCE_MM = 560.0
+"""Sizes and places are drawn for this depth and scaled, so that things are as large in the picture."""
+PLANES_MM: tuple[int, ...] = (480, 510, 545, 585, 630, 680)
+MIN_DEPTH_GAP_MM = 80
+DARK_BACKDROP = {"z_mm": 3000.0, "reflectance": "black 2"}
 DESK_TOP_MM = 65.0
 MIN_GAP_MM = 2.0
 MAX_TRIES = 1000
@@ -44,22 +35,13 @@ def drawn_textured(random: Random) -> Scene:
 def drawn_checks(random: Random) -> Scene:
     """Two or three solids of coarse checks, one before the middle of the other."""
     # Close together, so that borders run through the middle of what is behind.
-    return _side_by_side(
-        random,
-        "checks",
-        partial(chessboard, fewest=2, most=5),
-        first_mm=(-30, -45),
-        apart_mm=(30, 60),
-        radius_mm=(40, 60),
-        high_mm=30,
-    )
+    coarse = partial(chessboard, fewest=2, most=5)
+    return _side_by_side(random, "checks", coarse, (-30, -45), (30, 60), (40, 60), 30)
 
 
 def drawn_shiny(random: Random) -> Scene:
     """Two or three solids of plastic or metal, glossy or dull, each by itself."""
-    return _side_by_side(
-        random, "shiny", glossy, first_mm=(-60, -105), apart_mm=(95, 115), radius_mm=(30, 48), high_mm=60
-    )
+    return _side_by_side(random, "shiny", glossy, (-60, -105), (95, 115), (30, 48), 60)
 
 
 def drawn_crossing(random: Random) -> Scene:
@@ -88,7 +70,6 @@ def _side_by_side(
     random: Random,
     kind: str,
     material: Callable[[Random], Table],
-    *,
     first_mm: tuple[float, float] = (-60, -80),
     apart_mm: tuple[float, float] = (50, 85),
     radius_mm: tuple[float, float] = (36, 58),
@@ -207,9 +188,8 @@ def drawn_foliage(random: Random) -> Scene:
     """Seeing through what stands in front: 20 to 45 leaves of one kind before a patterned solid."""
     near = random.randint(465, 500)
     far = near + random.randint(95, 140)
-    green = random.choices(
-        [[0.3, 0.5, 0.2], [0.45, 0.55, 0.25], [0.6, 0.45, 0.2], [0.55, 0.25, 0.2]], weights=[4, 3, 1, 1]
-    )[0]
+    greens = [[0.3, 0.5, 0.2], [0.45, 0.55, 0.25], [0.6, 0.45, 0.2], [0.55, 0.25, 0.2]]
+    (green,) = random.choices(greens, weights=[4, 3, 1, 1])
     objects = []
     for number in range(random.randint(20, 45)):
         place = random.gauss(0, 33), random.gauss(0, 33), near + random.gauss(0, 2)
@@ -219,13 +199,8 @@ def drawn_foliage(random: Random) -> Scene:
         light = random.uniform(0.8, 1.25)
         material = noise(random, [round(min(light * part, 1.0), 3) for part in green])
         objects.append(placed(f"leaf-{number + 1}", place, rotation_deg, shape, material))
-    shape = random.choice(
-        [
-            sphere(random.uniform(58, 72)),
-            cylinder_of(random.uniform(42, 54), random.uniform(110, 150)),
-            box_of(random.uniform(85, 110), random.uniform(95, 130), 60),
-        ]
-    )
+    ball, tin = sphere(random.uniform(58, 72)), cylinder_of(random.uniform(42, 54), random.uniform(110, 150))
+    shape = random.choice([ball, tin, box_of(random.uniform(85, 110), random.uniform(95, 130), 60)])
     rotation_deg = random.uniform(-20, 20), random.uniform(-40, 40), random.uniform(-30, 30)
     place = random.uniform(-15, 15), random.uniform(-15, 15), far + 25.0
     objects.append(placed("hidden", place, rotation_deg, shape, _material(random, "hidden")))
@@ -248,3 +223,76 @@ def _material(random: Random, name: str) -> Table:
     periods, angle = random.randint(6, 16), round(random.uniform(-90, 90), 1)
     colours = [colour(random, 0.1, 0.6), [0.9, 0.88, 0.8]]
     return {"texture": {"type": "stripes", "periods": periods, "angle_deg": angle, "colours": colours}}
+
+
+def plain(random: Random) -> Table:
+    """One colour."""
+    return {"reflectance": colour(random, 0.15, 0.85)}
+
+
+def pattern(random: Random) -> Table:
+    """Noise or checks."""
+    if random.random() < 0.6:
+        return noise(random, colour(random, 0.3, 0.7))
+    return chessboard(random)
+
+
+def glossy(random: Random) -> Table:
+    """Plastic of one colour, or metal, each from a near mirror to dull."""
+    roughness = round(10 ** random.uniform(-1.4, -0.3), 2)
+    if random.random() < 0.5:
+        return plain(random) | {"finish": {"type": "plastic", "roughness": roughness}}
+    metal = random.choice(["Ag", "Al", "Au", "Cr", "Cu", "W"])
+    return {"finish": {"type": "metal", "name": metal, "roughness": roughness}}
+
+
+def drawn_scene(
+    random: Random,
+    title: str,
+    objects: list[Table],
+    planes_mm: Sequence[int],
+    backdrop: Table | None = DARK_BACKDROP,
+) -> Scene:
+    """The scene of these objects, its lamps drawn last."""
+    lamp = {
+        "type": "area",
+        "position_mm": [round(random.uniform(-300, 300), 0), -430.0, round(random.uniform(150, 400), 0)],
+        "target_mm": [0.0, 0.0, 600.0],
+        "width_mm": 400.0,
+        "height_mm": 300.0,
+        "luminance_cd_m2": 2000.0,
+    }
+    sky = {"type": "uniform", "luminance_cd_m2": round(random.uniform(60, 150), 0)}
+    scene = {"title": title, "planes_mm": list(planes_mm), "objects": objects, "lights": [lamp, sky]}
+    return scene_of(scene if backdrop is None else scene | {"backdrop": backdrop}, None, title)
+
+
+def planes_apart(random: Random, count: int) -> list[int]:
+    """`count` depths, in mm, well apart."""
+    while True:
+        planes: list[int] = sorted(random.sample(PLANES_MM, count))
+        if all(far - near >= MIN_DEPTH_GAP_MM for near, far in pairwise(planes)):
+            return planes
+
+
+def two_planes(random: Random) -> tuple[int, int]:
+    """Two depths, from 90 to 140 mm apart, the nearer first."""
+    near = random.randrange(470, 531)
+    return near, near + random.randrange(90, 141)
+
+
+def solid(
+    random: Random, name: str, place_mm: tuple[float, float, float], radius_mm: float, material: Table
+) -> Table:
+    """A turned sphere, cylinder or box, about as large as a sphere of this radius."""
+    rotation_deg = random.uniform(-25, 25), random.uniform(-40, 40), random.uniform(-25, 25)
+    r = radius_mm
+    shapes = [sphere(r), cylinder_of(0.7 * r, 2.1 * r), box_of(1.5 * r, 1.7 * r, 1.3 * r)]
+    return placed(name, place_mm, rotation_deg, random.choice(shapes), material)
+
+
+def chessboard(random: Random, fewest: int = 4, most: int = 8) -> Table:
+    """Checks of two colours, from `fewest` to `most` to a side."""
+    colours = [colour(random, 0.15, 0.85), colour(random, 0.15, 0.85)]
+    rows, columns = random.randint(fewest, most), random.randint(fewest, most)
+    return {"texture": {"type": "checks", "rows": rows, "columns": columns, "colours": colours}}

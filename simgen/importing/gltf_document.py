@@ -11,23 +11,11 @@ from pydantic import AliasPath, BaseModel, ConfigDict, Field
 from pydantic.alias_generators import to_camel
 
 from simgen.base.strict_models import LONGEST_PART, Positive, Real, Vector, shorten, shown_value, validate
+from simgen.spec.materials import MOST_INDEX
 
-UNREAD = {
-    "targets": "shape keys",
-    "COLOR_0": "colours of vertices",
-    "occlusionTexture": "ambient occlusion",
-    "specularColorFactor": "colours of highlights",
-    "orthographic": "parallel views of cameras",
-    "range": "distances at which lights end",
-    "KHR_materials_unlit": "materials that are shown without light",
-    "KHR_texture_basisu": "pictures in the format KTX2",
-    "EXT_texture_webp": "pictures in the format WebP",
-    ("magFilter", 9728): "sharp pixels of pictures",
-    ("wrapS", 33648): "mirrored repetition of pictures",
-    ("wrapT", 33648): "mirrored repetition of pictures",
-}
-"""Properties that are left out, or values of a property that is read, and what they mean. A property that is
-neither here nor read is named as it stands in the file."""
+UNREAD_VALUES = dict.fromkeys([("wrapS", 33648), ("wrapT", 33648)], "MIRRORED_REPEAT")
+UNREAD_VALUES["magFilter", 9728] = "NEAREST"
+"""Values of properties that are read which are left out, and what the specification calls them."""
 NEUTRAL = (None, [], [1, 1, 1])
 """Values with which a property that is left out changes nothing."""
 SAYS_NOTHING = {
@@ -49,22 +37,26 @@ Many = Annotated[tuple[Item, ...], Field(max_length=100_000)]
 Index = Annotated[int, Field(strict=True, ge=0)]
 Bytes = Annotated[int, Field(strict=True, ge=0, le=1 << 31)]
 Name = Annotated[str, Field(max_length=1000)]
+Pair = tuple[Real, Real]
 Quadruple = tuple[Real, Real, Real, Real]
 Share = Annotated[Real, Within(0.0, 1.0)]
 NotNegative = Annotated[Real, Within(0.0, math.inf)]
 Cone = Annotated[Real, Within(0.002, 1.553)]
 Rgb = Annotated[Vector, Within(0.0, math.inf)]
 ZEROS, ONES = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
-PBR = ("pbrMetallicRoughness",)
-TRANSMISSION = ("extensions", "KHR_materials_transmission")
-COAT = ("extensions", "KHR_materials_clearcoat")
-MOVED = ("extensions", "KHR_texture_transform")
-LIGHTS = ("extensions", "KHR_lights_punctual")
 
 
 def _at(*path: str, default: Any = None) -> Any:
     """A field whose value stands deeper in the JSON."""
     return Field(default=default, validation_alias=AliasPath(*path))
+
+
+def _pbr(name: str, default: Any = None) -> Any:
+    return _at("pbrMetallicRoughness", name, default=default)
+
+
+def _extension(extension: str, name: str, default: Any = None) -> Any:
+    return _at("extensions", extension, name, default=default)
 
 
 class Read(BaseModel):
@@ -73,15 +65,15 @@ class Read(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, alias_generator=to_camel)
 
 
-class Buffer(Read):
-    """A run of bytes: in a file of its own, in the address itself, or behind the JSON of a .glb file."""
+class Stored(Read):
+    """A buffer or an image: a file of its own, or in the address itself, or without one in a buffer view or
+    behind the JSON of a .glb file."""
 
     uri: str | None = None
+    buffer_view: Index = 0
 
 
-class BufferView(Read):
-    """A part of a buffer."""
-
+class _BufferView(Read):
     buffer: Index
     byte_offset: Bytes = 0
     byte_length: Bytes
@@ -96,20 +88,11 @@ class Accessor(Read):
     component_type: Literal[5120, 5121, 5122, 5123, 5125, 5126]
     normalized: bool = False
     count: Annotated[int, Field(strict=True, ge=1)]
-    type: Literal["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]
+    type: str
     sparse: Any = None
 
 
-class Image(Read):
-    """A PNG or JPEG picture."""
-
-    uri: str | None = None
-    buffer_view: Index = 0
-
-
-class Texture(Read):
-    """An image and how it is repeated."""
-
+class _Texture(Read):
     source: Index | None = None
     sampler: Index | None = None
 
@@ -128,36 +111,32 @@ class TextureInfo(Read):
     index: Index
     tex_coord: Index = 0
     scale: Real = 1.0
-    moved_tex_coord: Index | None = _at(*MOVED, "texCoord")
-    uv_offset: tuple[Real, Real] = _at(*MOVED, "offset", default=(0.0, 0.0))
-    uv_rotation: Real = _at(*MOVED, "rotation", default=0.0)
-    uv_scale: tuple[Real, Real] = _at(*MOVED, "scale", default=(1.0, 1.0))
+    other_tex_coord: Index | None = _extension("KHR_texture_transform", "texCoord")
+    uv_offset: Pair = _extension("KHR_texture_transform", "offset", (0.0, 0.0))
+    uv_rotation: Real = _extension("KHR_texture_transform", "rotation", 0.0)
+    uv_scale: Pair = _extension("KHR_texture_transform", "scale", (1.0, 1.0))
 
 
 class Material(Read):
     """What a surface does with light."""
 
     name: Name = ""
-    base_color_factor: Annotated[Quadruple, Within(0.0, 1.0)] = _at(
-        *PBR, "baseColorFactor", default=(*ONES, 1.0)
-    )
-    base_color_texture: TextureInfo | None = _at(*PBR, "baseColorTexture")
-    metallic_factor: Share = _at(*PBR, "metallicFactor", default=1.0)
-    roughness_factor: Share = _at(*PBR, "roughnessFactor", default=1.0)
-    metallic_roughness_texture: TextureInfo | None = _at(*PBR, "metallicRoughnessTexture")
+    base_color_factor: Annotated[Quadruple, Within(0.0, 1.0)] = _pbr("baseColorFactor", (*ONES, 1.0))
+    base_color_texture: TextureInfo | None = _pbr("baseColorTexture")
+    metallic_factor: Share = _pbr("metallicFactor", 1.0)
+    roughness_factor: Share = _pbr("roughnessFactor", 1.0)
+    metallic_roughness_texture: TextureInfo | None = _pbr("metallicRoughnessTexture")
     normal_texture: TextureInfo | None = None
     emissive_texture: TextureInfo | None = None
     emissive_factor: Rgb = ZEROS
-    emissive_strength: NotNegative = _at(
-        "extensions", "KHR_materials_emissive_strength", "emissiveStrength", default=1.0
-    )
-    transmission_factor: Share = _at(*TRANSMISSION, "transmissionFactor", default=0.0)
-    transmission_texture: TextureInfo | None = _at(*TRANSMISSION, "transmissionTexture")
-    ior: NotNegative = _at("extensions", "KHR_materials_ior", "ior", default=1.5)
-    specular_factor: Share = _at("extensions", "KHR_materials_specular", "specularFactor", default=1.0)
-    clearcoat_factor: Share = _at(*COAT, "clearcoatFactor", default=0.0)
-    clearcoat_texture: TextureInfo | None = _at(*COAT, "clearcoatTexture")
-    clearcoat_roughness: Share = _at(*COAT, "clearcoatRoughnessFactor", default=0.0)
+    emissive_strength: NotNegative = _extension("KHR_materials_emissive_strength", "emissiveStrength", 1.0)
+    transmission_factor: Share = _extension("KHR_materials_transmission", "transmissionFactor", 0.0)
+    transmission_texture: TextureInfo | None = _extension("KHR_materials_transmission", "transmissionTexture")
+    ior: Annotated[Real, Within(0.0, MOST_INDEX)] = _extension("KHR_materials_ior", "ior", 1.5)
+    specular_factor: Share = _extension("KHR_materials_specular", "specularFactor", 1.0)
+    clearcoat_factor: Share = _extension("KHR_materials_clearcoat", "clearcoatFactor", 0.0)
+    clearcoat_texture: TextureInfo | None = _extension("KHR_materials_clearcoat", "clearcoatTexture")
+    clearcoat_roughness: Share = _extension("KHR_materials_clearcoat", "clearcoatRoughnessFactor", 0.0)
     alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alpha_cutoff: NotNegative = 0.5
     double_sided: bool = False
@@ -172,9 +151,7 @@ class Primitive(Read):
     mode: Annotated[int, Field(strict=True, ge=0, le=6)] = 4
 
 
-class Mesh(Read):
-    """Primitives that stand together."""
-
+class _Mesh(Read):
     name: Name = ""
     primitives: Annotated[tuple[Primitive, ...], Field(min_length=1)]
 
@@ -187,30 +164,24 @@ class Node(Read):
     mesh: Index | None = None
     camera: Index | None = None
     skin: Index | None = None
-    light: Index | None = _at(*LIGHTS, "light")
-    copies: dict[str, Index] | None = _at("extensions", "EXT_mesh_gpu_instancing", "attributes")
+    light: Index | None = _extension("KHR_lights_punctual", "light")
+    copies: dict[str, Index] | None = _extension("EXT_mesh_gpu_instancing", "attributes")
     matrix: Annotated[tuple[Real, ...], Field(min_length=16, max_length=16)] | None = None
     translation: Vector = ZEROS
     rotation: Quadruple = (*ZEROS, 1.0)
     scale: Vector = ONES
 
 
-class Skin(Read):
-    """Joints, which are nodes, and by which each places the vertices that follow it."""
-
+class _Skin(Read):
     joints: tuple[Index, ...]
     inverse_bind_matrices: Index | None = None
 
 
-class SceneNodes(Read):
-    """The roots of a scene."""
-
+class _SceneRoots(Read):
     nodes: tuple[Index, ...] = ()
 
 
-class Camera(Read):
-    """A camera, which looks along -Z with Y up; angles are in radians."""
-
+class _Camera(Read):
     name: Name = ""
     yfov: Positive | None = _at("perspective", "yfov")
     aspect_ratio: Positive | None = _at("perspective", "aspectRatio")
@@ -233,19 +204,19 @@ class Document(Read):
     extensions_used: tuple[Name, ...] = ()
     extensions_required: tuple[Name, ...] = ()
     scene: Index = 0
-    scenes: Many[SceneNodes] = ()
+    scenes: Many[_SceneRoots] = ()
     nodes: Many[Node] = ()
-    meshes: Many[Mesh] = ()
+    meshes: Many[_Mesh] = ()
     accessors: Many[Accessor] = ()
-    buffer_views: Many[BufferView] = ()
-    buffers: Many[Buffer] = ()
+    buffer_views: Many[_BufferView] = ()
+    buffers: Many[Stored] = ()
     materials: Many[Material] = ()
-    textures: Many[Texture] = ()
-    images: Many[Image] = ()
+    textures: Many[_Texture] = ()
+    images: Many[Stored] = ()
     samplers: Many[Sampler] = ()
-    cameras: Many[Camera] = ()
-    skins: Many[Skin] = ()
-    lights: Many[PunctualLight] = _at(*LIGHTS, "lights", default=())
+    cameras: Many[_Camera] = ()
+    skins: Many[_Skin] = ()
+    lights: Many[PunctualLight] = _extension("KHR_lights_punctual", "lights", ())
 
 
 READ_KEYS = {
@@ -259,9 +230,7 @@ for _model in Read.__subclasses__():
         _alias = _field.validation_alias
         _path = [str(key) for key in (_alias.path if isinstance(_alias, AliasPath) else [_alias])]
         READ_KEYS.update(_path)
-        for _mark in _field.metadata:
-            if isinstance(_mark, Within):
-                RANGES[_path[-1]] = _mark
+        RANGES.update((_path[-1], mark) for mark in _field.metadata if isinstance(mark, Within))
 
 
 def checked_document(values: dict[str, Any], source: str) -> tuple[Document, list[str]]:
@@ -273,7 +242,7 @@ def checked_document(values: dict[str, Any], source: str) -> tuple[Document, lis
     names = list(_search(values))
     document = validate(Document, values, source)
     extensions = (*document.extensions_used, *document.extensions_required)
-    names += [_name(key) for key in extensions if key not in READ_KEYS]
+    names += [shorten(key, LONGEST_PART) for key in extensions if key not in READ_KEYS]
     if not all(material.double_sided for material in document.materials):
         names.append("backs of one-sided surfaces, which look like their fronts (doubleSided)")
     return document, names
@@ -297,21 +266,15 @@ def _search(values: dict[str, Any]) -> Iterator[str]:
                     yield f"{key} of {shown_value(value)}, taken as {shown_value(part[key])}"
             elif key not in READ_KEYS and not key.startswith("TEXCOORD_"):
                 if value not in NEUTRAL:
-                    yield _name(key)
+                    yield shorten(key, LONGEST_PART)
             elif isinstance(value, list | dict):
                 waiting.append(value)
-            elif (key, value) in UNREAD:
-                yield f"{UNREAD[key, value]} ({key})"
+            elif (key, value) in UNREAD_VALUES:
+                yield f"{key} {UNREAD_VALUES[key, value]}"
 
 
 def _nearest(value: Any, low: float, high: float) -> Any:
     """A number, or each number of a list, within bounds."""
-    numbers = [
-        min(max(number, low), high) if isinstance(number, int | float) else number
-        for number in (value if isinstance(value, list) else [value])
-    ]
-    return numbers if isinstance(value, list) else numbers[0]
-
-
-def _name(key: str) -> str:
-    return f"{UNREAD[key]} ({key})" if key in UNREAD else shorten(key, LONGEST_PART)
+    if isinstance(value, list):
+        return [_nearest(part, low, high) for part in value]
+    return min(max(value, low), high) if isinstance(value, int | float) else value

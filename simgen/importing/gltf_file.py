@@ -1,41 +1,57 @@
 """A glTF file and the arrays and pictures that it names (sections 3.6 and 4.4 of the specification)."""
 
 import base64
+import hashlib
 import json
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 from urllib.parse import unquote
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from simgen.assets.asset_files import LARGEST_TOTAL_BYTES, read_texture
+from simgen.assets.asset_files import read_texture
 from simgen.base.file_lookup import LARGEST_FILE_BYTES, LONGEST_NAME, asset
 from simgen.base.strict_models import shorten
 from simgen.importing.gltf_document import Document, checked_document
+from simgen.spec.scene import names_of_objects
 
-MAX_JSON_PARTS = 2_000_000
-"""Lists, tables and commas of a file's JSON; each takes some 100 bytes of memory."""
-MAGIC, JSON_CHUNK, BINARY_CHUNK = b"glTF", b"JSON", b"BIN\0"
 COMPRESSED = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 """Without these there are no meshes; what any other extension adds can be left out."""
 DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, eq=False)
 class GltfFile:
-    """A file's document, the names of what it says and that is not read, and the buffer behind its JSON."""
+    """A file's document, the buffer behind its JSON, and what becomes of it beside objects and lights."""
 
     path: Path
     document: Document
-    left_out: list[str]
+    left_out: dict[str, None]
+    """Names of what the file says and the scene does not have, in order and each once."""
     binary: bytes
+    images: dict[str, np.ndarray] = field(default_factory=dict)
+    """Pixels (H, W) or (H, W, 3), uint8 or uint16, by the file name that materials of the scene use."""
+    _names: dict[bytes, str] = field(default_factory=dict)
     _buffers: dict[int, np.ndarray] = field(default_factory=dict)
     _pictures: dict[int, np.ndarray] = field(default_factory=dict)
+
+    def lose(self, what: str) -> None:
+        """Name what the scene does not have."""
+        self.left_out[what] = None
+
+    def keep(self, name: str, pixels: np.ndarray) -> str:
+        """The file name of a picture, one for all that are the same; `name` is what it is called."""
+        key = hashlib.sha256(f"{pixels.dtype} {pixels.shape}".encode() + pixels.tobytes()).digest()
+        if key not in self._names:
+            taken = [file.removesuffix(".png") for file in self.images]
+            self._names[key] = f"{names_of_objects([name], taken)[0]}.png"
+            self.images[self._names[key]] = pixels
+        return self._names[key]
 
     def fault(self, text: str) -> InputError:
         """An error about this file."""
@@ -60,16 +76,12 @@ class GltfFile:
     def view(self, index: int) -> tuple[np.ndarray, int | None]:
         """The bytes (N,), uint8, of a buffer view, as far as the buffer goes, and their stride, if any."""
         view = self.item(self.document.buffer_views, index, "bufferViews")
-        if view.buffer not in self._buffers:
-            uri = self.item(self.document.buffers, view.buffer, "buffers").uri
-            binary = b"" if view.buffer else self.binary
-            self._buffers[view.buffer] = (
-                np.frombuffer(binary, np.uint8)
-                if uri is None
-                else self.content(uri, f"buffers[{view.buffer}]")
-            )
-        content = self._buffers[view.buffer]
-        return content[view.byte_offset : view.byte_offset + view.byte_length], view.byte_stride
+        number = view.buffer
+        if number not in self._buffers:
+            uri = self.item(self.document.buffers, number, "buffers").uri
+            own = np.frombuffer(b"" if number else self.binary, np.uint8)
+            self._buffers[number] = own if uri is None else self.content(uri, f"buffers[{number}]")
+        return self._buffers[number][view.byte_offset :][: view.byte_length], view.byte_stride
 
     def picture(self, index: int) -> np.ndarray:
         """Pixels of an image, (H, W, 3) or with alpha (H, W, 4), uint8 or uint16, as they are stored.
@@ -83,11 +95,9 @@ class GltfFile:
                 path = Path(folder) / "picture"
                 path.write_bytes(content.tobytes())
                 try:
-                    self._pictures[index] = read_texture(path, alpha=True, as_stored=True)
+                    self._pictures[index] = read_texture(path, for_gltf=True)
                 except InputError as fault:
                     raise self.fault(f"{name}: {str(fault).removeprefix(f'{path}: ')}") from None
-            if sum(pixels.nbytes for pixels in self._pictures.values()) > LARGEST_TOTAL_BYTES:
-                raise self.fault(f"its images take more than {LARGEST_TOTAL_BYTES} bytes; make them smaller")
         return self._pictures[index]
 
     def numbers(self, index: int, kind: str, most: int) -> np.ndarray:
@@ -97,24 +107,22 @@ class GltfFile:
         accessor.
         """
         accessor, name = self.item(self.document.accessors, index, "accessors"), f"accessors[{index}]"
-        if accessor.type != kind or accessor.count > most or accessor.sparse is not None:
+        count = accessor.count
+        if accessor.type != kind or count > most or accessor.sparse is not None:
             raise self.fault(
-                f"{name}: expected at most {most} elements of {kind} that are not sparse, got "
-                f"{accessor.count} of {accessor.type}"
+                f"{name}: expected at most {most} elements of {kind} that are not sparse, got {count} of "
+                f"{accessor.type}"
             )
         dtype, size = np.dtype(DTYPES[accessor.component_type]), SIZES[kind]
         if accessor.buffer_view is None:
-            return np.zeros((accessor.count, size), dtype)
+            return np.zeros((count, size), dtype)
         content, stride = self.view(accessor.buffer_view)
         steps = stride or size * dtype.itemsize, dtype.itemsize
         try:
-            values = np.ndarray(
-                (accessor.count, size), dtype, content.data, accessor.byte_offset, steps
-            ).copy()
+            values = np.ndarray((count, size), dtype, content.data, accessor.byte_offset, steps).copy()
         except (TypeError, ValueError):
             raise self.fault(
-                f"{name}: its {accessor.count} elements do not fit into the {len(content)} bytes of "
-                f"bufferViews[{accessor.buffer_view}]"
+                f"{name}: its {count} elements do not fit into bufferViews[{accessor.buffer_view}]"
             ) from None
         if not np.isfinite(values).all():
             raise self.fault(f"{name}: has numbers that are nan or infinite")
@@ -129,41 +137,31 @@ def read_gltf(path: Path) -> GltfFile:
     Raises `InputError` for a file that is none or is too large, that is not as the specification says, and
     whose meshes are compressed.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
-    if path.stat().st_size > LARGEST_FILE_BYTES:
-        raise InputError(f"{path}: has {path.stat().st_size} bytes; at most {LARGEST_FILE_BYTES} are read")
-    content = path.read_bytes()
-    text, binary = _chunks(path, content) if content.startswith(MAGIC) else (content, b"")
-    document, left_out = checked_document(_json(path, text), str(path))
-    compressed = sorted(COMPRESSED & {*document.extensions_required})
-    if compressed:
-        raise InputError(f"{path}: needs {', '.join(compressed)}; export it without compression")
-    return GltfFile(path, document, left_out, binary)
-
-
-def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
-    """JSON and binary part of a .glb file (section 4 of the specification)."""
-    chunks = {JSON_CHUNK: b"", BINARY_CHUNK: b""}
-    at = 12
-    while at + 8 <= len(content):
-        end = at + 8 + int.from_bytes(content[at : at + 4], "little")
-        if end > len(content):
-            raise InputError(f"{path}: cut off; a part ends at byte {end}, of {len(content)}")
-        chunks[content[at + 4 : at + 8]] = content[at + 8 : end]
-        at = end
-    return chunks[JSON_CHUNK], chunks[BINARY_CHUNK]
-
-
-def _json(path: Path, text: bytes) -> dict[str, Any]:
-    if sum(text.count(letter) for letter in (b"[", b"{", b",")) > MAX_JSON_PARTS:
-        raise InputError(
-            f"{path}: its JSON has more than {MAX_JSON_PARTS} parts; join meshes or drop animations"
-        )
+    if not path.is_file() or path.stat().st_size > LARGEST_FILE_BYTES:
+        raise InputError(f"{path}: there is no such file of at most {LARGEST_FILE_BYTES} bytes")
+    text, binary = _chunks(path, path.read_bytes())
     try:
         values = json.loads(text.decode("utf-8-sig"))
     except (RecursionError, ValueError) as fault:
         raise InputError(f"{path}: not a glTF file: {shorten(str(fault))}") from None
     if not isinstance(values, dict):
         raise InputError(f"{path}: not a glTF file: its JSON is no table")
-    return values
+    document, left_out = checked_document(values, str(path))
+    compressed = sorted(COMPRESSED & {*document.extensions_required})
+    if compressed:
+        raise InputError(f"{path}: needs {', '.join(compressed)}; export it without compression")
+    return GltfFile(path, document, dict.fromkeys(left_out), binary)
+
+
+def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes]:
+    """JSON and binary part of a .gltf or .glb file (section 4 of the specification)."""
+    if not content.startswith(b"glTF"):
+        return content, b""
+    chunks, at = {b"JSON": b"", b"BIN\0": b""}, 12
+    while at + 8 <= len(content):
+        end = at + 8 + int.from_bytes(content[at : at + 4], "little")
+        if end > len(content):
+            raise InputError(f"{path}: cut off; a part ends at byte {end}, of {len(content)}")
+        chunks[content[at + 4 : at + 8]] = content[at + 8 : end]
+        at = end
+    return chunks[b"JSON"], chunks[b"BIN\0"]

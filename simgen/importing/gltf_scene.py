@@ -3,22 +3,23 @@
 The file is in metres, X right, Y up, Z towards who looks; its cameras and lights look along -Z.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pcii.base.errors import InputError
 from simgen.assets.triangles import MOST_FACES, MOST_VERTICES, Triangles
-from simgen.importing.foreign_scene import ForeignScene, Part
 from simgen.importing.gltf_document import Node, Primitive, PunctualLight
 from simgen.importing.gltf_file import GltfFile, read_gltf
 from simgen.importing.gltf_materials import Surface, light_values
 from simgen.spec.scene import MOST_OBJECTS
 
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From axes with Y up that look along -Z to Y down and +Z, and back."""
+UPRIGHT = np.diag([1.0, -1.0, -1.0, 1.0])
+"""From X right, Y up, Z towards who looks, as models stand, to X right, Y down, Z forward; and back."""
 MIN_EDGE_DEG = 0.1
 """A spot's light falls off within this angle at least."""
 MIN_SIZE, MAX_SIZE = 1e-9, 1e9
@@ -28,29 +29,239 @@ MAX_TRIANGLES = 1 << 24
 """Of all objects; the renderer makes those of each instance anew, and needs 100 bytes for each."""
 TRIANGLES, FAN = 4, 6
 """Modes of primitives, as OpenGL numbers them; strips are between them, points and lines below."""
-EmissionUnit = Literal["nit", "watt"]
-CD_M2_PER_EMISSION: dict[EmissionUnit, float] = {"nit": 1.0, "watt": 683.0}
-"""Luminance of an emission of 1, which is in cd/m^2, as the specification says, or in W/(sr m^2). Blender's
-exporter writes watts of lights times 683 lm/W, whatever their colour, but emission as it is."""
+COPIED = {"TRANSLATION": (0.0, 0.0, 0.0), "ROTATION": (0.0, 0.0, 0.0, 1.0), "SCALE": (1.0, 1.0, 1.0)}
+"""Attributes of the copies of a mesh, and what they are by default."""
 MAY_BE_IN_WATTS = (
     "the ratio of surfaces that shine to lights, 683 times too small for a file of Blender's lighting mode "
     "Standard: give --emission-unit watt"
 )
 
 
-def foreign_gltf(path: Path, metres_per_unit: float, emission_unit: EmissionUnit) -> ForeignScene:
-    """Read a .gltf or .glb file. Raises `InputError` for one that is wrong, or that cannot be read."""
-    gltf = read_gltf(path)
-    scene = ForeignScene(path, mm=1000 * metres_per_unit, upright=FLIP)
-    for what in gltf.left_out:
-        scene.lose(what)
-    places = dict(_placed_nodes(gltf))
-    reader = _Reader(gltf, scene, CD_M2_PER_EMISSION[emission_unit], places)
-    for index, matrix in places.items():
-        reader.add(gltf.document.nodes[index], index, matrix)
-    if emission_unit == "nit" and scene.lamps and any("emission" in part.material for part in scene.parts):
-        scene.lose(MAY_BE_IN_WATTS)
-    return scene
+class Part(NamedTuple):
+    """One object: triangles in their own axes, and a matrix (4, 4) from these to the axes of the file.
+
+    Parts with the same triangles share a file, which is called by the `stem` of the first. The material is as
+    in a scene.toml.
+    """
+
+    name: str
+    matrix: np.ndarray
+    triangles: Triangles
+    stem: str
+    material: dict[str, Any]
+
+
+class GltfScene:
+    """All that is taken from a .gltf or .glb file.
+
+    Matrices are (4, 4) float64, of columns (x, y, z, 1), from own axes to those of the file; an emission of 1
+    in the file has the luminance `cd_m2_per_emission`. Raises `InputError` for a file that is wrong, or that
+    cannot be read.
+    """
+
+    def __init__(self, path: Path, unit_mm: float, cd_m2_per_emission: float) -> None:
+        self.gltf, self.unit_mm = read_gltf(path), unit_mm
+        self.parts: list[Part] = []
+        self.lamps: list[tuple[np.ndarray, dict[str, Any]]] = []
+        """Lights that stand at the origin of their axes and shine along +Z: matrix, and values as in a
+        scene.toml but for position, target and direction."""
+        self.cameras: dict[str, tuple[np.ndarray, float | None]] = {}
+        """By name: matrix from axes X right, Y down, Z forward, and horizontal angle of view in degrees."""
+        self._surface = cache(partial(Surface, self.gltf, cd_m2_per_emission))
+        self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
+        self._triangles = 0
+        self._places = dict(_placed_nodes(self.gltf))
+        for index in self._places:
+            self._add_node(index)
+        if cd_m2_per_emission == 1 and self.lamps and any("emission" in part.material for part in self.parts):
+            self.gltf.lose(MAY_BE_IN_WATTS)
+
+    def bounds(self, matrix: np.ndarray) -> np.ndarray:
+        """The bounding box (2, 3) of all parts, smallest and largest, in axes to which a matrix leads."""
+        ends = []
+        for part in self.parts:
+            to_axes = matrix @ part.matrix
+            points = part.triangles.positions.astype(np.float64) @ to_axes[:3, :3].T + to_axes[:3, 3]
+            ends += [points.min(axis=0), points.max(axis=0)]
+        return np.array([np.min(ends, axis=0), np.max(ends, axis=0)])
+
+    def placement(
+        self, camera: str | None, place_at_mm: Sequence[float] | None, fit_mm: float | None
+    ) -> tuple[np.ndarray, str | None]:
+        """The matrix from the file's axes to the world's, in mm, and the camera that stands at its origin.
+
+        A camera of the file becomes the virtual centre, or the middle of the scene's bounding box comes to
+        `place_at_mm`, upright. `fit_mm` makes the longest side of that box so long. Raises `InputError` for a
+        scene without a surface, and unless one camera or a place is chosen.
+        """
+        if not self.parts:
+            reasons = "".join(f"; not represented: {what}" for what in self.gltf.left_out)
+            raise InputError(f"{self.gltf.path}: there is no surface in it{reasons}")
+        box = self.bounds(UPRIGHT)
+        scale = self.unit_mm if fit_mm is None else fit_mm / float(np.ptp(box, axis=0).max())
+        to_world = np.eye(4)
+        if place_at_mm is not None:
+            to_world[:3, :3] = scale * UPRIGHT[:3, :3]
+            to_world[:3, 3] = np.array(place_at_mm) - scale * box.mean(axis=0)
+            return to_world, None
+        if camera is None and len(self.cameras) == 1:
+            (camera,) = self.cameras
+        if camera not in self.cameras:
+            if self.cameras:
+                raise InputError(
+                    f"--camera: {self.gltf.path} has the cameras {', '.join(self.cameras)}; choose one"
+                )
+            x, y, z = scale * np.ptp(box, axis=0)
+            raise InputError(
+                f"--place-at-mm: {self.gltf.path} has no camera; say where the middle of its {x:.4g} x "
+                f"{y:.4g} x {z:.4g} mm stands, such as --place-at-mm 0 0 {round(2 * max(x, y) + z / 2, -1):g}"
+            )
+        # The camera's axes may also be scaled: Z forward is kept, then Y down.
+        matrix = self.cameras[camera][0]
+        forward = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+        right = np.cross(matrix[:3, 1], forward)
+        right /= np.linalg.norm(right)
+        to_world[:3, :3] = scale * np.stack([right, np.cross(forward, right), forward])
+        to_world[:3, 3] = -to_world[:3, :3] @ matrix[:3, 3]
+        return to_world, camera
+
+    def _add_node(self, index: int) -> None:
+        """The mesh, camera and light of a node."""
+        document, matrix = self.gltf.document, self._places[index]
+        node = document.nodes[index]
+        if node.mesh is not None:
+            copies = {"": np.eye(4)} if node.copies is None else self._copies(node.copies)
+            for ending, copy in copies.items():
+                self._add_mesh(node, node.mesh, matrix @ copy, index, ending)
+        if (node.camera is not None or node.light is not None) and not _can_stand(matrix):
+            self.gltf.lose(f"nodes[{index}], {NOWHERE}")
+            return
+        if node.camera is not None:
+            camera = self.gltf.item(document.cameras, node.camera, "cameras")
+            angle_deg = None
+            if camera.yfov is not None and camera.aspect_ratio is not None:
+                half = np.tan(camera.yfov / 2) * camera.aspect_ratio
+                angle_deg = float(np.degrees(2 * np.arctan(half)))
+            name = node.name or camera.name or f"camera-{node.camera}"
+            name = f"{name}-{index}" if name in self.cameras else name
+            self.cameras[name] = matrix @ UPRIGHT, angle_deg
+        if node.light is not None:
+            light = self.gltf.item(document.lights, node.light, "lights")
+            if light.intensity > 0 and any(light.color):
+                self.lamps.append((matrix @ UPRIGHT, _lamp(light)))
+
+    def _copies(self, attributes: dict[str, int]) -> dict[str, np.ndarray]:
+        """Matrices (4, 4) of a mesh's copies in the node's axes, by ending (EXT_mesh_gpu_instancing)."""
+        columns = {
+            name: self.gltf.numbers(attributes[name], f"VEC{len(default)}", MOST_OBJECTS)
+            for name, default in COPIED.items()
+            if name in attributes
+        }
+        count = min(map(len, columns.values()), default=1)
+        columns = {name: np.tile(default, (count, 1)) for name, default in COPIED.items()} | columns
+        matrices = _matrices(*(column[:count] for column in columns.values()))
+        return {f"-{number}": matrix for number, matrix in enumerate(matrices, start=1)}
+
+    def _add_mesh(self, node: Node, number: int, matrix: np.ndarray, index: int, copy: str) -> None:
+        mesh = self.gltf.item(self.gltf.document.meshes, number, "meshes")
+        if node.skin is not None:
+            matrix = np.eye(4)
+        name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
+        if not _can_stand(matrix):
+            self.gltf.lose(f"'{name}', {NOWHERE}")
+            return
+        for part, primitive in enumerate(mesh.primitives):
+            key = number, part, node.skin
+            if key not in self._primitives:
+                self._primitives[key] = self._translated(primitive, node.skin, f"meshes[{number}]")
+            if (translated := self._primitives[key]) is None:
+                continue
+            (triangles, material), ending = translated, ""
+            if len(mesh.primitives) > 1:
+                materials = self.gltf.document.materials
+                of = "" if primitive.material is None else materials[primitive.material].name
+                ending = f"-{of or part + 1}"
+            stem = f"{mesh.name or node.name or name}{ending}"
+            self.parts.append(Part(f"{name}{ending}", matrix, triangles, stem, material))
+            self._triangles += len(triangles.faces)
+            if len(self.parts) > MOST_OBJECTS or self._triangles > MAX_TRIANGLES:
+                raise self.gltf.fault(
+                    f"has more than {MOST_OBJECTS} objects or {MAX_TRIANGLES} triangles; join objects of one "
+                    "material, and simplify meshes"
+                )
+
+    def _translated(
+        self, primitive: Primitive, skin: int | None, where: str
+    ) -> tuple[Triangles, dict[str, Any]] | None:
+        """Triangles and material of a primitive, None if there is no surface."""
+        if primitive.mode < TRIANGLES:
+            self.gltf.lose("points and lines, which have no surface")
+            return None
+        surface = self._surface(primitive.material, True)
+        if f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:
+            surface = self._surface(primitive.material, False)
+        if not surface.values:
+            return None
+        triangles = self._triangles_of(primitive, surface, skin, where)
+        material = surface.material_on(triangles)
+        return None if material is None else (triangles, material)
+
+    def _triangles_of(
+        self, primitive: Primitive, surface: Surface, skin: int | None, where: str
+    ) -> Triangles:
+        """A primitive as triangles in its own axes and unit, or in the file's axes if it has a skin."""
+        positions = self._attribute(primitive, "POSITION", "VEC3", where)
+        count, normals, uv = len(positions), None, None
+        if "NORMAL" in primitive.attributes:
+            normals = self._attribute(primitive, "NORMAL", "VEC3", where, count)
+            if not normals.any(axis=1).all():
+                normals = None  # an exporter's normals of faces without area
+        if surface.texcoord is not None:
+            uv = self._attribute(primitive, f"TEXCOORD_{surface.texcoord}", "VEC2", where, count)
+            # The file's run down from the picture's upper left, ours up from its lower left.
+            uv = np.column_stack([uv.astype(np.float64), np.ones(count)]) @ surface.uv_matrix[:2].T
+            uv = uv * [1, -1] + [0, 1]
+        if skin is not None:
+            moved = self._skinned(skin, primitive, count, where)
+            positions = np.einsum("nab,nb->na", moved[:, :3, :3], positions) + moved[:, :3, 3]
+            normals = None if normals is None else np.einsum("nab,nb->na", moved[:, :3, :3], normals)
+        corners = np.arange(count)
+        if primitive.indices is not None:
+            corners = self.gltf.numbers(primitive.indices, "SCALAR", 3 * MOST_FACES)[:, 0].astype(np.int64)
+        faces = _faces(corners, primitive.mode)
+        flat = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+        try:
+            return Triangles.checked(positions, faces[~flat], normals, uv)
+        except ValueError as fault:
+            raise self.gltf.fault(f"{where}: {fault}") from None
+
+    def _attribute(
+        self, primitive: Primitive, name: str, kind: str, where: str, count: int | None = None
+    ) -> np.ndarray:
+        """The values (N, C) of a primitive's vertices, `count` of them if that is known."""
+        if name not in primitive.attributes:
+            raise self.gltf.fault(f"{where}: has no {name}")
+        values = self.gltf.numbers(primitive.attributes[name], kind, MOST_VERTICES)
+        if count is not None and len(values) != count:
+            raise self.gltf.fault(f"{where}: has {len(values)} elements of {name}, and {count} of POSITION")
+        return values
+
+    def _skinned(self, skin: int, primitive: Primitive, count: int, where: str) -> np.ndarray:
+        """Matrices (N, 4, 4) that bring each vertex of a skinned mesh to where its joints stand.
+
+        Section 3.7.3.3: the place of the node itself is of no account.
+        """
+        values = self.gltf.item(self.gltf.document.skins, skin, "skins")
+        joints = np.array([self._places.get(joint, np.eye(4)) for joint in values.joints])
+        if values.inverse_bind_matrices is not None:
+            inverse = self.gltf.numbers(values.inverse_bind_matrices, "MAT4", len(joints))
+            joints = joints[: len(inverse)] @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
+        which = self._attribute(primitive, "JOINTS_0", "VEC4", where, count)
+        weight = self._attribute(primitive, "WEIGHTS_0", "VEC4", where, count)
+        if which.dtype.kind != "u" or which.max() >= len(joints):
+            raise self.gltf.fault(f"{where}: JOINTS_0: expected whole numbers below {len(joints)}")
+        share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
+        return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
 
 
 def _placed_nodes(gltf: GltfFile) -> Iterator[tuple[int, np.ndarray]]:
@@ -59,11 +270,10 @@ def _placed_nodes(gltf: GltfFile) -> Iterator[tuple[int, np.ndarray]]:
     Raises `InputError` for nodes that are missing, within themselves, or within two others.
     """
     nodes, scenes = gltf.document.nodes, gltf.document.scenes
+    children = {child for node in nodes for child in node.children}
+    roots = tuple(index for index in range(len(nodes)) if index not in children)
     if scenes:
         roots = gltf.item(scenes, gltf.document.scene, "scenes").nodes
-    else:
-        children = {child for node in nodes for child in node.children}
-        roots = tuple(index for index in range(len(nodes)) if index not in children)
     waiting = [(root, np.eye(4)) for root in reversed(roots)]
     visited = set[int]()
     while waiting:
@@ -98,175 +308,16 @@ def _can_stand(matrix: np.ndarray) -> bool:
     return sizes.min() >= MIN_SIZE and abs(np.linalg.det(matrix[:3, :3] / sizes)) >= MIN_SIZE
 
 
-class _Reader:
-    """What the nodes hold, put into the scene."""
-
-    def __init__(
-        self, gltf: GltfFile, scene: ForeignScene, cd_m2_per_emission: float, places: dict[int, np.ndarray]
-    ) -> None:
-        self.gltf, self.scene, self.places = gltf, scene, places
-        self.cd_m2_per_emission = cd_m2_per_emission
-        self._surfaces: dict[tuple[int | None, bool], Surface] = {}
-        self._primitives: dict[tuple[int, int, int | None], tuple[Triangles, dict[str, Any]] | None] = {}
-        self._triangles = 0
-
-    def add(self, node: Node, index: int, matrix: np.ndarray) -> None:
-        """The mesh, camera and light of a node."""
-        document = self.gltf.document
-        if node.mesh is not None:
-            copies = [np.eye(4)] if node.copies is None else self._copies(node.copies)
-            for number, copy in enumerate(copies):
-                ending = "" if node.copies is None else f"-{number + 1}"
-                self._add_mesh(node, node.mesh, matrix @ copy, index, ending)
-        if (node.camera is not None or node.light is not None) and not _can_stand(matrix):
-            self.scene.lose(f"nodes[{index}], {NOWHERE}")
-            return
-        if node.camera is not None:
-            camera = self.gltf.item(document.cameras, node.camera, "cameras")
-            angle_deg = None
-            if camera.yfov is not None and camera.aspect_ratio is not None:
-                half = np.tan(camera.yfov / 2) * camera.aspect_ratio
-                angle_deg = float(np.degrees(2 * np.arctan(half)))
-            name = node.name or camera.name or f"camera-{node.camera}"
-            name = f"{name}-{index}" if name in self.scene.cameras else name
-            self.scene.cameras[name] = matrix @ FLIP, angle_deg
-        if node.light is not None:
-            light = self.gltf.item(document.lights, node.light, "lights")
-            if light.intensity > 0 and any(light.color):
-                self.scene.lamps.append((matrix @ FLIP, _lamp(light)))
-
-    def _copies(self, attributes: dict[str, int]) -> np.ndarray:
-        """Matrices (N, 4, 4) of the copies of a mesh, in the node's axes (EXT_mesh_gpu_instancing)."""
-        kinds = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
-        columns = {
-            name: self.gltf.numbers(attributes[name], kind, MOST_OBJECTS)
-            for name, kind in kinds.items()
-            if name in attributes
-        }
-        count = min((len(column) for column in columns.values()), default=1)
-        values = {name: np.zeros((count, 4 if kind == "VEC4" else 3)) for name, kind in kinds.items()}
-        values["SCALE"] += 1
-        values |= {name: column[:count].astype(np.float64) for name, column in columns.items()}
-        return _matrices(*values.values())
-
-    def _add_mesh(self, node: Node, number: int, matrix: np.ndarray, index: int, copy: str) -> None:
-        mesh = self.gltf.item(self.gltf.document.meshes, number, "meshes")
-        if node.skin is not None:
-            matrix = np.eye(4)
-        name = f"{node.name or mesh.name or f'node-{index}'}{copy}"
-        stem = mesh.name or node.name or name
-        if not _can_stand(matrix):
-            self.scene.lose(f"'{name}', {NOWHERE}")
-            return
-        for part, primitive in enumerate(mesh.primitives):
-            key = number, part, node.skin
-            if key not in self._primitives:
-                self._primitives[key] = self._translated(primitive, node.skin, f"meshes[{number}]")
-            if (translated := self._primitives[key]) is None:
-                continue
-            ending = ""
-            if len(mesh.primitives) > 1:
-                materials = self.gltf.document.materials
-                of = "" if primitive.material is None else materials[primitive.material].name
-                ending = f"-{of or part + 1}"
-            triangles, material = translated
-            self.scene.parts.append(Part(f"{name}{ending}", matrix, triangles, f"{stem}{ending}", material))
-            self._triangles += len(triangles.faces)
-            if len(self.scene.parts) > MOST_OBJECTS or self._triangles > MAX_TRIANGLES:
-                raise self.gltf.fault(
-                    f"has more than {MOST_OBJECTS} objects or {MAX_TRIANGLES} triangles; join objects of one "
-                    "material, and simplify meshes"
-                )
-
-    def _translated(
-        self, primitive: Primitive, skin: int | None, where: str
-    ) -> tuple[Triangles, dict[str, Any]] | None:
-        """Triangles and material of a primitive, None if there is no surface."""
-        if primitive.mode < TRIANGLES:
-            self.scene.lose("points and lines, which have no surface")
-            return None
-        surface = self._surface(primitive.material, pictures=True)
-        if f"TEXCOORD_{surface.texcoord or 0}" not in primitive.attributes:
-            surface = self._surface(primitive.material, pictures=False)
-        if surface.values is None:
-            return None
-        triangles = self._triangles_of(primitive, surface, skin, where)
-        material = surface.material_on(triangles)
-        return None if material is None else (triangles, material)
-
-    def _surface(self, material: int | None, *, pictures: bool) -> Surface:
-        key = material, pictures
-        if key not in self._surfaces:
-            self._surfaces[key] = Surface(self.gltf, self.scene, material, self.cd_m2_per_emission, pictures)
-        return self._surfaces[key]
-
-    def _triangles_of(
-        self, primitive: Primitive, surface: Surface, skin: int | None, where: str
-    ) -> Triangles:
-        """A primitive as triangles in its own axes and unit, or in the file's axes if it has a skin."""
-        positions = self._attribute(primitive, "POSITION", "VEC3", where)
-        normals = uv = None
-        if "NORMAL" in primitive.attributes:
-            normals = self._attribute(primitive, "NORMAL", "VEC3", where, len(positions))
-            if not normals.any(axis=1).all():
-                normals = None  # an exporter's normals of faces without area
-        if surface.texcoord is not None:
-            uv = self._attribute(primitive, f"TEXCOORD_{surface.texcoord}", "VEC2", where, len(positions))
-            # The file's run down from the picture's upper left, ours up from its lower left.
-            uv = np.column_stack([uv.astype(np.float64), np.ones(len(uv))]) @ surface.uv_matrix[:2].T
-            uv = uv * [1, -1] + [0, 1]
-        if skin is not None:
-            moved = self._skinned(skin, primitive, len(positions), where)
-            positions = np.einsum("nab,nb->na", moved[:, :3, :3], positions) + moved[:, :3, 3]
-            normals = None if normals is None else np.einsum("nab,nb->na", moved[:, :3, :3], normals)
-        corners = np.arange(len(positions))
-        if primitive.indices is not None:
-            corners = self.gltf.numbers(primitive.indices, "SCALAR", 3 * MOST_FACES)[:, 0].astype(np.int64)
-        faces = _faces(corners, primitive.mode)
-        flat = (faces[:, 0] == faces[:, 1]) | (faces[:, 1] == faces[:, 2]) | (faces[:, 2] == faces[:, 0])
-        try:
-            return Triangles.checked(positions, faces[~flat], normals, uv)
-        except ValueError as fault:
-            raise self.gltf.fault(f"{where}: {fault}") from None
-
-    def _attribute(
-        self, primitive: Primitive, name: str, kind: str, where: str, count: int | None = None
-    ) -> np.ndarray:
-        """The values (N, C) of a primitive's vertices, `count` of them if that is known."""
-        if name not in primitive.attributes:
-            raise self.gltf.fault(f"{where}: has no {name}")
-        values = self.gltf.numbers(primitive.attributes[name], kind, MOST_VERTICES)
-        if count is not None and len(values) != count:
-            raise self.gltf.fault(f"{where}: has {len(values)} elements of {name}, and {count} of POSITION")
-        return values
-
-    def _skinned(self, skin: int, primitive: Primitive, count: int, where: str) -> np.ndarray:
-        """Matrices (N, 4, 4) that bring each vertex of a skinned mesh to where its joints stand.
-
-        Section 3.7.3.3: the place of the node itself is of no account.
-        """
-        values = self.gltf.item(self.gltf.document.skins, skin, "skins")
-        joints = np.array([self.places.get(joint, np.eye(4)) for joint in values.joints])
-        if values.inverse_bind_matrices is not None:
-            inverse = self.gltf.numbers(values.inverse_bind_matrices, "MAT4", len(joints))
-            joints = joints[: len(inverse)] @ inverse.reshape(-1, 4, 4).transpose(0, 2, 1)
-        which = self._attribute(primitive, "JOINTS_0", "VEC4", where, count)
-        weight = self._attribute(primitive, "WEIGHTS_0", "VEC4", where, count)
-        if which.dtype.kind != "u" or which.max() >= len(joints):
-            raise self.gltf.fault(f"{where}: JOINTS_0: expected whole numbers below {len(joints)}")
-        share = weight / np.maximum(weight.sum(axis=1, keepdims=True), np.finfo(np.float32).tiny)
-        return np.einsum("nj,njab->nab", share, joints[which.astype(np.int64)])
-
-
 def _faces(corners: np.ndarray, mode: int) -> np.ndarray:
     """Triangles (M, 3) of the corners of a primitive."""
     if mode == TRIANGLES:
         return corners[: len(corners) // 3 * 3].reshape(-1, 3)
-    first = np.arange(max(len(corners) - 2, 0))
+    first, second, third = corners[:-2], corners[1:-1], corners[2:]
     if mode == FAN:
-        return np.stack([corners[first + 1], corners[first + 2], np.full(len(first), corners[0])], axis=-1)
-    odd = first % 2  # of a strip every other triangle turns the other way
-    return np.stack([corners[first], corners[first + 1 + odd], corners[first + 2 - odd]], axis=-1)
+        return np.column_stack([second, third, np.broadcast_to(corners[:1], third.shape)])
+    # Of a strip every other triangle turns the other way.
+    is_odd = np.arange(len(first)) % 2 == 1
+    return np.column_stack([first, np.where(is_odd, third, second), np.where(is_odd, second, third)])
 
 
 def _lamp(light: PunctualLight) -> dict[str, Any]:

@@ -15,45 +15,43 @@ from pcii.store.safe_files import new_folder_safely
 from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate
-from simgen.importing.foreign_scene import ForeignScene, Part
-from simgen.importing.gltf_scene import CD_M2_PER_EMISSION, EmissionUnit, foreign_gltf
+from simgen.importing.gltf_scene import GltfScene, Part
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
 from simgen.spec.scene import Scene, names_of_objects
 
-SQUARE = 1e-5
+MIN_SHEAR = 1e-5
 """Axes of a matrix whose cosine is less than this are square to each other."""
-FAR_MM = 100.0
-"""How far before a spot its target is written."""
-EVEN_LIGHT = {"type": "uniform", "luminance_cd_m2": 100.0}
-"""For files without any light."""
+TARGET_MM = 100.0
+"""Distance of a spot's target from the spot."""
 MAX_TITLE = 200
-MAX_LEFT_OUT = 100
-"""Of what is left out so many are named, and the others counted."""
 Unit = Literal["mm", "cm", "m", "in", "ft"]
-METRES: dict[str, float] = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254, "ft": 0.3048}
-MITSUBA = ".xml"
+MM_PER_UNIT: dict[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}
+EmissionUnit = Literal["nit", "watt"]
+CD_M2_PER_EMISSION: dict[str, float] = {"nit": 1.0, "watt": 683.0}
+"""Luminance of an emission of 1, which is in cd/m^2, as the specification says, or in W/(sr m^2). Blender's
+exporter writes watts of lights times 683 lm/W, whatever their colour, but emission as it is."""
 Meshes = dict[tuple[int, bytes], tuple[str, Triangles]]
 """File and triangles by the id of the part's triangles and the bytes of the matrix that moves them."""
 
 
 @dataclass(frozen=True)
 class ImportedScene:
-    """What was written, and what of the file is not used. A scene by reference is counted in files alone."""
+    """What an import wrote, and what of the file it does not use; of a Mitsuba scene only its files."""
 
     folder: Path
     left_out: tuple[str, ...]
     """Names of what the file says and the scene does not have."""
+    files: tuple[str, ...] = ()
+    """Files that a Mitsuba scene consists of."""
     objects: int = 0
     triangles: int = 0
     lights: int = 0
-    size_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    size_mm: tuple[float, ...] = (0.0, 0.0, 0.0)
     """Of the bounding box of all objects along X, Y and Z."""
     camera: str | None = None
     """The one that became the virtual centre."""
     camera_angle_deg: float | None = None
     """Its horizontal angle of view."""
-    files: tuple[str, ...] = ()
-    """Files that a scene by reference consists of."""
 
     def lines(self) -> Iterator[str]:
         """The same for people."""
@@ -92,36 +90,27 @@ def import_scene(
     """
     path, folder = Path(file), Path(out)
     suffix = path.suffix.lower()
-    if suffix not in (".glb", ".gltf", MITSUBA):
+    if suffix not in (".glb", ".gltf", ".xml"):
         raise InputError(f"{path}: expected a glTF file (.glb or .gltf) or a Mitsuba scene (.xml)")
-    if unit not in METRES:
-        raise InputError(f"--unit: expected one of {', '.join(METRES)}, got {unit!r}")
-    if emission_unit not in CD_M2_PER_EMISSION or (suffix == MITSUBA and emission_unit != "nit"):
-        raise InputError(f"--emission-unit: expected nit, or watt for a glTF file, got {emission_unit!r}")
-    if fit_mm is not None and not 0 < fit_mm < float("inf"):
-        raise InputError(f"--fit-mm: expected a length above 0, got {fit_mm:g}")
-    if place_at_mm is not None and not np.isfinite(place_at_mm).all():
-        raise InputError("--place-at-mm: expected three finite numbers")
-    if place_at_mm is not None and camera is not None:
-        raise InputError("--camera: it says where the scene stands, as does --place-at-mm; give one of them")
+    if unit not in MM_PER_UNIT:
+        raise InputError(f"unit: expected one of {', '.join(MM_PER_UNIT)}, got {unit!r}")
+    if emission_unit not in CD_M2_PER_EMISSION or (suffix == ".xml" and emission_unit != "nit"):
+        raise InputError(f"emission_unit: expected nit, or watt for a glTF file, got {emission_unit!r}")
     if folder.exists():
         raise InputError(f"{folder}: is there already; choose another folder or remove it")
-    if suffix == MITSUBA:
-        place = {"unit_mm": 1000 * METRES[unit], "camera": camera, "fit_mm": fit_mm}
-        if place_at_mm is not None:
-            place["place_at_mm"] = tuple(place_at_mm)
-        return _copy_reference(path, MitsubaFile(file=path.name, **place), folder)
-    scene = foreign_gltf(path, METRES[unit], emission_unit)
-    return _write_scene(scene, *scene.placement(camera, place_at_mm, fit_mm), folder)
+    values = {"file": path.name, "unit_mm": MM_PER_UNIT[unit], "camera": camera, "fit_mm": fit_mm}
+    values["place_at_mm"] = None if place_at_mm is None else tuple(place_at_mm)
+    reference = validate(MitsubaFile, {k: v for k, v in values.items() if v is not None}, "import-scene")
+    if suffix == ".xml":
+        return _copy_reference(path, reference, folder)
+    scene = GltfScene(path, reference.unit_mm, CD_M2_PER_EMISSION[emission_unit])
+    return _write_scene(scene, *scene.placement(camera, reference.place_at_mm, fit_mm), folder)
 
 
-def _copy_reference(path: Path, file: MitsubaFile, out: Path) -> ImportedScene:
-    """Make the folder of a scene that refers to a Mitsuba file, a copy with all files that it names.
-
-    Raises `InputError` for a file that names others outside its folder, or that are missing.
-    """
+def _copy_reference(path: Path, reference: MitsubaFile, out: Path) -> ImportedScene:
+    """Make the folder of a scene that refers to a Mitsuba file, a copy with all files that it names."""
     names = (path.name, *files_named_by(path.parent, path.name))
-    scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=file)
+    scene = Scene(title=shorten(path.stem, MAX_TITLE), mitsuba=reference)
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
         (new / "scene.toml").write_bytes(toml_text(scene, [f"Refers to {path.name}."]).encode())
@@ -129,45 +118,37 @@ def _copy_reference(path: Path, file: MitsubaFile, out: Path) -> ImportedScene:
             (new / name).parent.mkdir(parents=True, exist_ok=True)
             (new / name).write_bytes((path.parent / name).read_bytes())
     left_out = ("sensors but for where they stand, films, samplers and integrators: recipes have them",)
-    return ImportedScene(out, left_out, files=names)
+    return ImportedScene(out, left_out, names)
 
 
-def _write_scene(scene: ForeignScene, to_world: np.ndarray, camera: str | None, out: Path) -> ImportedScene:
+def _write_scene(scene: GltfScene, to_world: np.ndarray, camera: str | None, out: Path) -> ImportedScene:
     """Write the folder of a translated scene."""
-    meshes: Meshes = {}
+    gltf, meshes = scene.gltf, Meshes()
     names = names_of_objects([part.name for part in scene.parts])
     objects = [_object(part, name, to_world, meshes) for part, name in zip(scene.parts, names, strict=True)]
-    growth = float(np.linalg.norm(to_world[:3, 0])) / scene.mm
+    growth = float(np.linalg.norm(to_world[:3, 0])) / scene.unit_mm
     lights = [_light(to_world @ matrix, values, growth) for matrix, values in scene.lamps]
     if not lights and not any("emission" in part.material for part in scene.parts):
-        lights.append(EVEN_LIGHT)
-        scene.lose("the file has no light: the scene is lit evenly from all around")
-    left_out = (*scene.left_out,)
-    if len(left_out) > MAX_LEFT_OUT:
-        left_out = (*left_out[:MAX_LEFT_OUT], f"{len(left_out) - MAX_LEFT_OUT} more")
-    values = {"title": shorten(scene.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
-    written = validate(Scene, values, f"{scene.path}: the scene made of it")
-    comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in left_out)]
-    text = toml_text(written, comments).encode()
+        lights.append({"type": "uniform", "luminance_cd_m2": 100.0})
+        gltf.lose("the file has no light: the scene is lit evenly from all around")
+    values = {"title": shorten(gltf.path.stem, MAX_TITLE), "objects": objects, "lights": lights}
+    valid = validate(Scene, values, f"{gltf.path}: the scene made of it")
+    comments = ["Imported; lengths in mm.", *(f"Not represented: {what}." for what in gltf.left_out)]
+    text = toml_text(valid, comments).encode()
     if len(text) > LARGEST_TOML_BYTES:
-        raise InputError(f"{scene.path}: its scene.toml would have more than {LARGEST_TOML_BYTES} bytes")
+        raise InputError(f"{gltf.path}: its scene.toml would have more than {LARGEST_TOML_BYTES} bytes")
     out.parent.mkdir(parents=True, exist_ok=True)
     with new_folder_safely(out) as new:
         (new / "scene.toml").write_bytes(text)
         for name, mesh in meshes.values():
             (new / name).write_bytes(ply_bytes(mesh))
-        for name, pixels in scene.images.items():
+        for name, pixels in gltf.images.items():
             write_png(new / name, pixels)
-    x, y, z = np.ptp(scene.bounds(to_world), axis=0)
+    triangles = sum(len(part.triangles.faces) for part in scene.parts)
+    size_mm = tuple(np.ptp(scene.bounds(to_world), axis=0).tolist())
+    angle_deg = None if camera is None else scene.cameras[camera][1]
     return ImportedScene(
-        out,
-        left_out,
-        objects=len(objects),
-        triangles=sum(len(part.triangles.faces) for part in scene.parts),
-        lights=len(lights),
-        size_mm=(float(x), float(y), float(z)),
-        camera=camera,
-        camera_angle_deg=None if camera is None else scene.cameras[camera][1],
+        out, tuple(gltf.left_out), (), len(objects), triangles, len(lights), size_mm, camera, angle_deg
     )
 
 
@@ -175,8 +156,7 @@ def _mesh_file(part: Part, matrix: np.ndarray | None, meshes: Meshes) -> str:
     """The file of a part's mesh, moved by a matrix (3, 3) if there is one; the same meshes have one file."""
     key = id(part.triangles), b"" if matrix is None else matrix.tobytes()
     if key not in meshes:
-        taken = {file.removesuffix(".ply") for file, _ in meshes.values()}
-        mesh = part.triangles
+        mesh, names = part.triangles, [file.removesuffix(".ply") for file, _ in meshes.values()]
         if matrix is not None:
             normals = None if mesh.normals is None else mesh.normals @ np.linalg.inv(matrix)
             faces = mesh.faces if np.linalg.det(matrix) > 0 else mesh.faces[:, ::-1]
@@ -184,7 +164,7 @@ def _mesh_file(part: Part, matrix: np.ndarray | None, meshes: Meshes) -> str:
                 mesh = Triangles.checked(mesh.positions @ matrix.T, faces, normals, mesh.texcoords)
             except ValueError as fault:
                 raise InputError(f"the mesh '{part.stem}' {fault}") from None
-        meshes[key] = f"{names_of_objects([part.stem], taken)[0]}.ply", mesh
+        meshes[key] = f"{names_of_objects([part.stem], names)[0]}.ply", mesh
     return meshes[key][0]
 
 
@@ -193,42 +173,38 @@ def _object(part: Part, name: str, to_world: np.ndarray, meshes: Meshes) -> dict
     linear = matrix[:3, :3]
     scales = np.linalg.norm(linear, axis=0)
     rotation = linear / scales
-    is_sheared = np.abs(rotation.T @ rotation - np.eye(3)).max() > SQUARE
+    is_sheared = np.abs(rotation.T @ rotation - np.eye(3)).max() > MIN_SHEAR
     if is_sheared:  # which a rotation and scales cannot make: the mesh is moved
         rotation, scales = np.eye(3), np.ones(3)
     elif np.linalg.det(rotation) < 0:
         rotation, scales = rotation * [-1, 1, 1], scales * [-1, 1, 1]
-    alike = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Y by a right angle: of the turns about X and Z only one is needed
+    with warnings.catch_warnings(action="ignore"):  # Y by a right angle: X and Z turn about the same axis
         angles_deg = Rotation.from_matrix(rotation).as_euler("xyz", degrees=True)
+    file, scale = _mesh_file(part, linear if is_sheared else None, meshes), [*map(_significant, scales)]
+    is_even = np.ptp(scales) <= 1e-6 * np.abs(scales).max()
     return {
         "name": name,
         "position_mm": _rounded(matrix[:3, 3], 6),
         "rotation_deg": _rounded(angles_deg, 9),
-        "shape": {
-            "type": "mesh",
-            "file": _mesh_file(part, linear if is_sheared else None, meshes),
-            "scale": _significant(scales[0]) if alike else [_significant(scale) for scale in scales],
-        },
+        "shape": {"type": "mesh", "file": file, "scale": scale[0] if is_even else scale},
         "material": part.material,
     }
 
 
 def _light(matrix: np.ndarray, values: dict[str, Any], growth: float) -> dict[str, Any]:
     """A lamp of a scene that was made larger is as much brighter: surfaces keep their brightness."""
-    forward = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    position_mm, forward = matrix[:3, 3], matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
     if values["type"] == "directional":
         return values | {"direction": _rounded(forward, 9)}
-    place = {"position_mm": _rounded(matrix[:3, 3], 6)}
+    place = {"position_mm": _rounded(position_mm, 6)}
     if values["type"] == "spot":
-        place["target_mm"] = _rounded(matrix[:3, 3] + FAR_MM * forward, 6)
+        place["target_mm"] = _rounded(position_mm + TARGET_MM * forward, 6)
     return values | place | {"intensity_cd": _significant(values["intensity_cd"] * growth**2)}
 
 
 def _rounded(values: np.ndarray, digits: int) -> list[float]:
     """Numbers without -0."""
-    return [round(float(value), digits) + 0.0 for value in values]
+    return (np.round(values, digits) + 0.0).tolist()
 
 
 def _significant(value: float) -> float:

@@ -14,8 +14,7 @@ from simgen.photons.candidates import Accepted, FilmPoints, Setup, chances, noth
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import NEXT_LAYERS, Majorant
 from simgen.renderer.backend import doubles, floats, gathered, load_drjit, opaque, signed, unsigned
-from simgen.renderer.mitsuba_camera import film_rays
-from simgen.renderer.path_tracing import FirstHits, hit_first, radiance_along
+from simgen.renderer.path_tracing import FirstHits, film_rays, hit_first, radiance_along
 from simgen.renderer.wavelengths import Light, light_of, of_colour
 from simgen.sensor.photon_table import PhotonTable
 

@@ -4,12 +4,11 @@ backend           The renderer behind everything: the one place that loads Mitsu
                   arrays to them.
 emission          What shines: lamps and objects as Mitsuba's emitters, and the light that they give a plane.
 intersection      Rays by the million, NumPy in and NumPy out.
-mitsuba_camera    Cameras as Mitsuba's sensors, and rays through points of their films.
 mitsuba_reference A Mitsuba scene by reference: Mitsuba builds all that the file names, as it stands.
 mitsuba_scene     From a validated scene to Mitsuba's: only this package names plugins, never a scene file.
 mitsuba_shapes    Where things stand in the renderer's axes, and their shapes.
 mitsuba_surfaces  Materials as Mitsuba's surfaces, colours and spectra as its textures.
-path_tracing      Light paths of many camera rays at once: what is hit first, and unbiased radiance.
-radiance          Dense radiance of one view: every pixel, by path tracing.
+path_tracing      Camera rays and light paths, many at once: what is hit first, and unbiased radiance.
+radiance          Dense radiance of one view: cameras as Mitsuba's sensors, every pixel by path tracing.
 wavelengths       How rays carry light: as three colours, or as four wavelengths for a pixel's filter.
 """

@@ -1,10 +1,9 @@
 """The renderer behind everything: the one place that loads Mitsuba and Dr.Jit, and gives arrays to them.
 
 Dr.Jit compiles its kernels with the system's LLVM library: with LLVM 14 the import fails, with 15 and 16 the
-first kernel aborts the process. So each library is tried in a subprocess, which may die, and only one that
-works is loaded here. Order: CUDA, the newest LLVM from 17 on, and Mitsuba's scalar mode, which needs neither.
-`SIMGEN_BACKEND` = cuda, llvm or scalar allows only one of them. Answers are cached under a key that changes
-with the libraries.
+first kernel aborts the process. So each library is tried in a subprocess, and only one that works is loaded
+here. Order: CUDA, the newest LLVM, and Mitsuba's scalar mode, which needs neither; `SIMGEN_BACKEND` = cuda,
+llvm or scalar allows only one. Answers are cached under a key that changes with the libraries.
 """
 
 import contextlib
@@ -19,18 +18,17 @@ import sys
 import threading
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.base.file_lookup import cached
 
-Kind = Literal["cuda", "llvm", "scalar"]
-VARIANTS: dict[Kind, str] = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
+VARIANTS = {"cuda": "cuda_ad_rgb", "llvm": "llvm_ad_rgb", "scalar": "scalar_rgb"}
 LIBRARY_FOLDERS = ("usr/lib", "usr/lib64", "usr/local/lib", "usr/lib/*-linux-gnu", "usr/lib/llvm-*/lib")
 """Where LLVM is looked for, from the root, besides LD_LIBRARY_PATH."""
 PROBE_LIMIT_S = 120
@@ -38,8 +36,7 @@ ALIGNMENT_BYTES = 64
 
 # A kernel with minimum, a gather and a ray: what LLVM 15 and 16 die of, and what rendering needs.
 _PROBE = """
-import sys
-import mitsuba as mi
+import sys, numpy, mitsuba as mi
 mi.set_variant(sys.argv[1])
 scene = mi.load_dict({
     "type": "scene",
@@ -48,20 +45,20 @@ scene = mi.load_dict({
     "light": {"type": "constant"},
     "ball": {"type": "sphere", "center": [0, 0, 3]},
 })
-import numpy
 assert numpy.isfinite(numpy.array(mi.render(scene, spp=1, seed=1))).all()
 """
 
 
 @dataclass(frozen=True)
 class Backend:
-    """One way to render on this machine, and what a trial of it showed."""
+    """One way to render on this machine, and what a trial of it showed.
 
-    kind: Kind
+    `variant` is Mitsuba's name of it for light of three colours, `library` the file that it needs, if any.
+    """
+
+    kind: str
     variant: str
-    """Mitsuba's name of it, for light of three colours."""
     library: str | None
-    """Path of the shared library that it needs; None for scalar mode."""
     works: bool
     detail: str
 
@@ -83,18 +80,17 @@ def choose() -> Backend:
     if request not in ("", *VARIANTS):
         raise InputError(f"SIMGEN_BACKEND: use one of {', '.join(VARIANTS)}, not {request!r}")
     failures: list[str] = []
-    for kind in VARIANTS:
-        for candidate in _candidates(kind) if request in ("", kind) else ():
-            if candidate.works:
-                return candidate
-            failures.append(candidate.detail)
+    for candidate in _candidates(request):
+        if candidate.works:
+            return candidate
+        failures.append(candidate.detail)
     reasons = "; ".join(failures) or "there is no such library"
     raise InputError(f"SIMGEN_BACKEND: {request} does not work here: {reasons}")
 
 
 def survey() -> list[Backend]:
     """Every backend of this machine with what its trial showed, best first; for `simgen doctor`."""
-    return [candidate for kind in VARIANTS for candidate in _candidates(kind)]
+    return list(_candidates())
 
 
 def advice() -> str | None:
@@ -181,8 +177,7 @@ def use_threads(count: int) -> None:
 def shape_numbers(scene: Any) -> list[int]:
     """The number by which the `shape_index` output names each shape of a Mitsuba scene, in its order.
 
-    Scalar mode counts from 1. Compiled modes use a registry that is filled in parallel and goes on
-    counting from scene to scene, so that the numbers follow no order. A miss is 0 in both.
+    Scalar mode counts from 1; the numbers of compiled modes follow no order. A miss is 0 in both.
     """
     mi = _mitsuba()
     if is_scalar(mi):
@@ -191,24 +186,27 @@ def shape_numbers(scene: Any) -> list[int]:
     return [int(number) for number in numbers]
 
 
-def unsigned(mi: Any, values: np.ndarray) -> Any:
-    """Whole numbers from 0 as a flat array of 32 bits, of a compiled backend."""
-    return _upload(mi.UInt32, values, np.uint32)
+def _upload(kind: str, dtype: Any, mi: Any, values: np.ndarray) -> Any:
+    """Numbers as a flat array of a compiled backend, from a copy that begins at a multiple of 64 bytes.
+
+    Where the backend reads NumPy's memory in place its alignment is compiled into the kernel, and NumPy's own
+    is a matter of chance: each combination that a kernel's arrays have would wait for a compiler.
+    """
+    flat = np.ascontiguousarray(values, dtype=dtype).ravel()
+    if flat.size == 1:  # its address would be compiled into the kernel
+        return opaque(getattr(mi, kind), flat[0].item())
+    memory = np.empty(flat.nbytes + ALIGNMENT_BYTES, np.uint8)
+    begin = -memory.ctypes.data % ALIGNMENT_BYTES
+    copy = memory[begin : begin + flat.nbytes].view(flat.dtype)
+    copy[...] = flat
+    return getattr(mi, kind)(copy)
 
 
-def signed(mi: Any, values: np.ndarray) -> Any:
-    """Whole numbers as a flat array of 32 bits, of a compiled backend."""
-    return _upload(mi.Int32, values, np.int32)
-
-
-def floats(mi: Any, values: np.ndarray) -> Any:
-    """Numbers as a flat array in single precision, of a compiled backend."""
-    return _upload(mi.Float, values, np.float32)
-
-
-def doubles(mi: Any, values: np.ndarray) -> Any:
-    """Numbers as a flat array in double precision, of a compiled backend."""
-    return _upload(mi.Float64, values, np.float64)
+unsigned = partial(_upload, "UInt32", np.uint32)
+signed = partial(_upload, "Int32", np.int32)
+floats = partial(_upload, "Float", np.float32)
+doubles = partial(_upload, "Float64", np.float64)
+"""Each makes a flat array of `mi` and `values` of any shape."""
 
 
 def vectors(mi: Any, kind: Any, rows: np.ndarray) -> Any:
@@ -226,64 +224,49 @@ def gathered(array: Any, index: Any, active: Any = True) -> Any:
     return load_drjit().gather(type(array), array, index, active)
 
 
-def _upload(kind: Any, values: np.ndarray, dtype: Any) -> Any:
-    """The array from a copy that begins at a multiple of `ALIGNMENT_BYTES`.
-
-    Where the backend reads NumPy's memory in place its alignment is compiled into the kernel, and NumPy's own
-    is a matter of chance: each combination that a kernel's arrays have would wait for a compiler.
-    """
-    flat = np.ascontiguousarray(values, dtype=dtype).ravel()
-    if flat.size == 1:  # its address would be compiled into the kernel
-        return opaque(kind, flat[0].item())
-    memory = np.empty(flat.nbytes + ALIGNMENT_BYTES, np.uint8)
-    begin = -memory.ctypes.data % ALIGNMENT_BYTES
-    copy = memory[begin : begin + flat.nbytes].view(flat.dtype)
-    copy[...] = flat
-    return kind(copy)
-
-
-def _candidates(kind: Kind) -> Iterator[Backend]:
-    """The backends of one kind, each tried, best first."""
+def _candidates(request: str = "") -> Iterator[Backend]:
+    """The backends of this machine, or those of one kind, each tried, best first."""
     missing = [name for name in ("mitsuba", "drjit") if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(
             f"{' and '.join(missing)}: not installed, and needed for rendering; type in the source tree:  "
             "pip install '.[render]'"
         )
-    if kind == "scalar":
-        yield Backend(kind, VARIANTS[kind], None, True, "scalar mode needs no library")
-    elif kind == "llvm":
-        for path in _llvm_libraries():
-            yield _trial(kind, str(path), f"LLVM {_llvm_version(path) or ''}".strip())
-    elif library := ctypes.util.find_library("cuda"):
-        yield _trial(kind, library, "CUDA")
+    if request in ("", "cuda") and (driver := ctypes.util.find_library("cuda")):
+        yield _trial("cuda", driver, "CUDA")
+    for path in _llvm_libraries() if request in ("", "llvm") else ():
+        yield _trial("llvm", str(path), f"LLVM {_llvm_version(path) or ''}".strip())
+    if request in ("", "scalar"):
+        yield Backend("scalar", VARIANTS["scalar"], None, True, "scalar mode needs no library")
 
 
-def _trial(kind: Kind, library: str, name: str) -> Backend:
-    """Run the probe kernel in a subprocess, or read what it showed before."""
-    return cached(
-        "backend",
-        _cache_key(kind, library),
-        lambda: dict(zip(("works", "detail"), _probe(kind, library), strict=True)),
-        lambda answer: Backend(
-            kind, VARIANTS[kind], library, bool(answer["works"]), f"{name} {answer['detail']}"
-        ),
-    )
+def _trial(kind: str, library: str, name: str) -> Backend:
+    """What the probe kernel showed in a subprocess, now or when libraries and devices were the same."""
+
+    def read(answer: dict[str, Any]) -> Backend:
+        detail = f"{name} {answer['detail']}"
+        return Backend(kind, VARIANTS[kind], library, bool(answer["works"]), detail)
+
+    key = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
+    if (driver := Path("/proc/driver/nvidia/version")).exists() and kind == "cuda":
+        key += [driver.read_text(), os.environ.get("CUDA_VISIBLE_DEVICES", "")]
+    if (path := Path(library).resolve()).exists():
+        key += [str(path), str(path.stat().st_size), str(path.stat().st_mtime_ns)]
+    return cached("backend", key, lambda: _probe(kind, library), read)
 
 
-def _probe(kind: Kind, library: str) -> tuple[bool, str]:
+def _probe(kind: str, library: str) -> dict[str, Any]:
     environment = os.environ | ({"DRJIT_LIBLLVM_PATH": library} if kind == "llvm" else {})
     command = [sys.executable, "-c", _PROBE, VARIANTS[kind]]
     try:
         run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_LIMIT_S)
     except subprocess.TimeoutExpired:
-        return False, f"did not answer within {PROBE_LIMIT_S} s"
-    if run.returncode == 0:
-        return True, "works"
+        return {"works": False, "detail": f"did not answer within {PROBE_LIMIT_S} s"}
     if run.returncode < 0:
-        return False, f"ended the trial process with signal {-run.returncode}"
+        return {"works": False, "detail": f"ended the trial process with signal {-run.returncode}"}
     last_line = (run.stderr.strip().splitlines() or ["no message"])[-1]
-    return False, f"failed: {last_line[:200]}"
+    detail = f"failed: {last_line[:200]}" if run.returncode else "works"
+    return {"works": run.returncode == 0, "detail": detail}
 
 
 def _llvm_libraries() -> list[Path]:
@@ -301,15 +284,3 @@ def _llvm_version(library: Path) -> int:
     """Major version from the library's file name, 0 if it does not say."""
     digits = re.match(r"libLLVM(?:-|\.so\.)(\d+)", library.resolve().name)
     return int(digits[1]) if digits else 0
-
-
-def _cache_key(kind: Kind, library: str) -> list[str]:
-    """What decides on the probe's answer: the libraries, the interpreter and the devices."""
-    parts = [kind, library, sys.version, platform.node(), version("mitsuba"), version("drjit")]
-    if (path := Path(library).resolve()).exists():
-        parts += [str(path), str(path.stat().st_size), str(path.stat().st_mtime_ns)]
-    if kind == "cuda":
-        driver = Path("/proc/driver/nvidia/version")
-        parts += [driver.read_text() if driver.exists() else "", os.environ.get("CUDA_VISIBLE_DEVICES", "")]
-        parts += map(str, Path("/dev").glob("nvidia*"))
-    return parts

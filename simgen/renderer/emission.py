@@ -1,10 +1,9 @@
 """What shines: lamps and objects as Mitsuba's emitters, the light that they give a plane, and where they are.
 
-Radiance is linear sRGB scaled such that its luminance, 0.2126 R + 0.7152 G + 0.0722 B, is in cd/m^2; for
-spectra see `spectra`.
+Radiance is linear sRGB whose luminance, 0.2126 R + 0.7152 G + 0.0722 B, is in cd/m^2, or see `spectra`.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,20 +12,11 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.assets.asset_files import Assets
-from simgen.assets.triangles import bears_pictures_once, card_triangles, globe, surface_points, triangles_of
-from simgen.renderer.backend import is_spectral
+from simgen.assets.triangles import Triangles, bears_pictures_once, globe, surface_points, triangles_of
+from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
 from simgen.renderer.mitsuba_shapes import WorldFrame, check_texcoords, pose_of, solid_parts
 from simgen.renderer.mitsuba_surfaces import light_spectrum, linear_bitmap, radiance_plugin, texture_plugin
-from simgen.spec.lights import (
-    AreaLight,
-    DirectionalLight,
-    EnvironmentLight,
-    Illuminant,
-    Light,
-    PointLight,
-    SpotLight,
-    UniformLight,
-)
+from simgen.spec import lights
 from simgen.spec.scene import Scene, SceneObject
 from simgen.spec.shapes import Card, Sphere
 from simgen.spectral.filters import Filters
@@ -42,12 +32,11 @@ BALL_ROWS = 16
 
 @dataclass(frozen=True, eq=False)
 class ShiningSurface:
-    """A surface that shines on the side of its normals, evenly in all directions, as triangles.
+    """A surface of an object (0: of a lamp) that shines on the side of its normals, evenly in all directions.
 
-    `corners_mm` (M, 3, 3), in the world, turn about their normals as Mitsuba's do. `radiance` (C,) is in the
-    unit of rendered views, C = 3 where light is linear sRGB; with a `picture` (H, W, 3) it is multiplied by
-    the pixel at `texcoords` (M, 3, 2), linear in between as Mitsuba has it. `number` is that of the object, 0
-    for a lamp. Of a `ball` (centre, radius, and the columns of its pose) the triangles are only near.
+    Its triangles `corners_mm` (M, 3, 3), in the world, turn about their normals as Mitsuba's do. `radiance`
+    (C,) is in the unit of rendered views; with a `picture` (H, W, 3) it is multiplied by the pixel at
+    `texcoords` (M, 3, 2), linear in between. Of a `ball` (centre, radius, pose) the triangles are only near.
     """
 
     number: int
@@ -63,50 +52,43 @@ def shining_surfaces(
 ) -> Iterator[ShiningSurface]:
     """All that shines and can be seen: lamps with a surface, and objects."""
 
-    def radiance(luminance_cd_m2: float, illuminant: Illuminant) -> np.ndarray:
+    def radiance(luminance_cd_m2: float, illuminant: lights.Illuminant) -> np.ndarray:
         if filters is None:
             return np.array(radiance_plugin(mi, gain * luminance_cd_m2, illuminant)["value"])
         spectrum = gain * luminance_cd_m2 * light_spectrum(mi, illuminant)
         return integral(filters.sensitivity * spectrum)
 
-    def corners_mm(positions: np.ndarray, faces: np.ndarray, pose: np.ndarray) -> np.ndarray:
-        return (positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3])[faces]
+    def corners_mm(mesh: Triangles, pose: np.ndarray) -> np.ndarray:
+        return (mesh.positions.astype(np.float64) @ pose[:3, :3].T + pose[:3, 3])[mesh.faces]
 
-    square = card_triangles(2.0, 2.0)
     for light in scene.lights:
-        if isinstance(light, AreaLight):
+        if isinstance(light, lights.AreaLight):
             pose = area_light_pose(light) * [1, -1, -1, 1]  # a card faces -Z, Mitsuba's rectangle +Z
-            corners = corners_mm(square.positions, square.faces, pose)
+            corners = corners_mm(triangles_of(Card(width_mm=2.0, height_mm=2.0), {}), pose)
             yield ShiningSurface(0, corners, radiance(light.luminance_cd_m2, light.illuminant))
     for number, thing in enumerate(scene.objects, start=1):
         emission, shape = thing.material.emission, thing.shape
         if emission is None:
             continue
-        pose, ball, picture, texcoords = _matrix(mi, thing), None, None, None
+        pose = np.array(pose_of(mi, thing).matrix, dtype=np.float64)
+        triangles, ball = solid_parts(shape, thing.material, assets), None
         if isinstance(shape, Sphere):
             triangles, ball = globe(shape.radius_mm, BALL_ROWS), (pose[:3, 3], shape.radius_mm, pose[:3, :3])
-        else:
-            triangles = solid_parts(shape, thing.material, assets)
-        if emission.texture is None:
-            own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
-        else:
+        own_radiance = radiance(emission.luminance_cd_m2, emission.illuminant)
+        picture, texcoords = None, None
+        if emission.texture is not None:
             assert triangles.texcoords is not None
             own_radiance = np.full(3, gain * emission.luminance_cd_m2)
             picture = assets.image(emission.texture)
             texcoords = triangles.texcoords.astype(np.float64)[triangles.faces]
-        corners = corners_mm(triangles.positions, triangles.faces, pose)
-        yield ShiningSurface(number, corners, own_radiance, picture, texcoords, ball)
-
-
-def _matrix(mi: Any, thing: SceneObject) -> np.ndarray:
-    return np.array(pose_of(mi, thing).matrix, dtype=np.float64)
+        yield ShiningSurface(number, corners_mm(triangles, pose), own_radiance, picture, texcoords, ball)
 
 
 def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) -> dict[str, Any] | None:
     """The emitter of an object that is `gain` times as bright as it says; None if it does not shine.
 
-    Raises `InputError` for a texture in spectral mode, and for one on a shape that bears parts of it several
-    times: such a lamp is aimed at by the brightness of its image, so each of its pixels must have one place.
+    Raises `InputError` for a texture in spectral mode, and for one of which a pixel has no place or several:
+    such a lamp is aimed at by the brightness of its image.
     """
     emission, shape, where = thing.material.emission, thing.shape, "material.emission.texture"
     if emission is None:
@@ -115,75 +97,60 @@ def emission_plugin(mi: Any, thing: SceneObject, assets: Assets, gain: float) ->
     if emission.texture is None:
         return {"type": "area", "radiance": radiance_plugin(mi, luminance, emission.illuminant)}
     if is_spectral(mi):
-        raise InputError(
-            f"{where}: images shine only where light is linear sRGB; give the luminance alone, or a recipe "
-            "without sensor.camera"
-        )
-    check_texcoords(where, "give the luminance alone", shape, assets)
+        raise InputError(f"{where}: images shine only in linear sRGB; leave it or sensor.camera out")
+    check_texcoords(where, shape, assets)
     if not (isinstance(shape, Card | Sphere) or bears_pictures_once(triangles_of(shape, assets.meshes))):
         raise InputError(
-            f"{where}: the shape bears parts of the picture several times, or reaches beyond it; give the "
-            "luminance alone, or texture coordinates from 0 to 1 of which each is used once"
+            f"{where}: the shape bears parts of the picture several times or reaches beyond it; use each "
+            "texture coordinate from 0 to 1 once"
         )
     pixels = assets.image(emission.texture) * np.float32(luminance)
     return {"type": "area", "radiance": texture_plugin(mi, pixels, shape, raw=True)}
 
 
 def light_plugin(
-    mi: Any, light: Light, gain: float, surroundings: np.ndarray | None, frame: WorldFrame
+    mi: Any, light: lights.Light, gain: float, surroundings: np.ndarray | None, frame: WorldFrame
 ) -> dict[str, Any]:
-    """The Mitsuba emitter of a light that is `gain` times as bright as it says.
-
-    `surroundings` (H, W, 3) are the pixels of an environment light's image; `frame` is that of the renderer.
-    """
+    """The Mitsuba emitter of a light, `gain` times as bright; `surroundings` (H, W, 3) are of its image."""
     T = mi.ScalarTransform4f
     per_cd = 1e6 * frame.unit**2  # cd = cd/m^2 m^2, with lengths in the renderer's unit
+
+    def bright(value: float, per_unit: float = 1.0) -> dict[str, Any]:
+        return radiance_plugin(mi, gain * value * per_unit, getattr(light, "illuminant", DAYLIGHT))
+
     match light:
-        case UniformLight():
-            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
-            return {"type": "constant", "radiance": radiance}
-        case PointLight():
-            intensity = radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant)
+        case lights.UniformLight():
+            return {"type": "constant", "radiance": bright(light.luminance_cd_m2)}
+        case lights.PointLight():
             position = frame.points(np.array(light.position_mm)).tolist()
-            return {"type": "point", "position": position, "intensity": intensity}
-        case SpotLight():
-            return {
-                "type": "spot",
-                "to_world": T(frame.rigid_pose(_lamp_pose(light))),
-                "intensity": radiance_plugin(mi, gain * light.intensity_cd * per_cd, light.illuminant),
-                "beam_width": light.beam_deg,
-                "cutoff_angle": light.cutoff_deg,
-            }
-        case DirectionalLight():
-            irradiance = radiance_plugin(mi, gain * light.illuminance_lux, light.illuminant)
-            direction = frame.directions(np.array(light.direction)).tolist()
-            return {"type": "directional", "direction": direction, "irradiance": irradiance}
-        case EnvironmentLight():
+            return {"type": "point", "position": position, "intensity": bright(light.intensity_cd, per_cd)}
+        case lights.SpotLight():
+            angles = {"beam_width": light.beam_deg, "cutoff_angle": light.cutoff_deg}
+            to_world, intensity = T(frame.rigid_pose(_lamp_pose(light))), bright(light.intensity_cd, per_cd)
+            return {"type": "spot", "to_world": to_world, "intensity": intensity} | angles
+        case lights.DirectionalLight():
+            direction, irradiance = frame.directions(np.array(light.direction)), bright(light.illuminance_lux)
+            return {"type": "directional", "direction": direction.tolist(), "irradiance": irradiance}
+        case lights.EnvironmentLight():
+            bitmap = linear_bitmap(mi, np.ascontiguousarray(surroundings, dtype=np.float32))
             # Mitsuba's map has +Y on top, +Z in its middle and -X in its right half; half a turn about Z
             # brings what is above to -Y and what is right to +X.
-            to_world = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
-            return {
-                "type": "envmap",
-                "bitmap": linear_bitmap(mi, np.ascontiguousarray(surroundings, dtype=np.float32)),
-                "scale": gain * light.luminance_cd_m2,
-                "to_world": WorldFrame(frame.rotation).pose(mi, to_world),
-            }
-        case AreaLight():
-            radiance = radiance_plugin(mi, gain * light.luminance_cd_m2, light.illuminant)
-            return {
-                "type": "rectangle",
-                "to_world": frame.pose(mi, T(area_light_pose(light))),
-                "emitter": {"type": "area", "radiance": radiance},
-                "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}},
-            }
+            turned = T().rotate([0, 1, 0], light.turn_deg) @ T().rotate([0, 0, 1], 180)
+            to_world, scale = WorldFrame(frame.rotation).pose(mi, turned), gain * light.luminance_cd_m2
+            return {"type": "envmap", "bitmap": bitmap, "scale": scale, "to_world": to_world}
+        case lights.AreaLight():
+            black = {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}}
+            emitter = {"type": "area", "radiance": bright(light.luminance_cd_m2)}
+            to_world = frame.pose(mi, T(area_light_pose(light)))
+            return {"type": "rectangle", "to_world": to_world, "emitter": emitter, "bsdf": black}
 
 
-def area_light_pose(light: AreaLight) -> np.ndarray:
+def area_light_pose(light: lights.AreaLight) -> np.ndarray:
     """From the square [-1, 1] x [-1, 1] at z = 0, which shines towards +z, to the lamp; (4, 4)."""
     return _lamp_pose(light) * [light.width_mm / 2, light.height_mm / 2, 1, 1]
 
 
-def _lamp_pose(light: AreaLight | SpotLight) -> np.ndarray:
+def _lamp_pose(light: lights.AreaLight | lights.SpotLight) -> np.ndarray:
     """From a lamp at the origin that shines towards +z to where it stands and what it faces; (4, 4)."""
     towards = np.subtract(light.target_mm, light.position_mm)
     towards = towards / np.linalg.norm(towards)
@@ -191,9 +158,23 @@ def _lamp_pose(light: AreaLight | SpotLight) -> np.ndarray:
     left = np.cross(up, towards)
     left /= np.linalg.norm(left)
     pose = np.eye(4)
-    pose[:3, 0], pose[:3, 1] = left, np.cross(towards, left)
-    pose[:3, 2], pose[:3, 3] = towards, light.position_mm
+    pose[:3] = np.column_stack([left, np.cross(towards, left), towards, light.position_mm])
     return pose
+
+
+def sample_light(
+    mi: Any, light: Any, numbers: np.ndarray, position: Sequence[float] = (0.0, 0.0, 0.0)
+) -> tuple[np.ndarray, np.ndarray]:
+    """Directions (N, 3) from a position to a light of Mitsuba for random numbers (N, 2), in the renderer's
+    axes, and radiance (N, C) over their density."""
+    place = mi.Interaction3f() if is_scalar(mi) else load_drjit().zeros(mi.Interaction3f, len(numbers))
+    place.p = position
+    if is_scalar(mi):
+        pairs = [light.sample_direction(place, mi.Point2f(pair)) for pair in numbers.tolist()]
+        towards = np.array([np.ravel(sample.d) for sample, _ in pairs])
+        return towards, np.array([np.ravel(weight) for _, weight in pairs])
+    sample, weight = light.sample_direction(place, vectors(mi, mi.Point2f, numbers))
+    return np.array(sample.d, dtype=np.float64).T, np.array(weight).T
 
 
 def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
@@ -204,40 +185,31 @@ def main_spectrum(mi: Any, scene: Scene) -> np.ndarray:
 
 
 def level_gain(
-    mi: Any,
-    scene: Scene,
-    assets: Assets,
-    surroundings: np.ndarray | None,
-    referenced_lux: Callable[[float], float],
+    mi: Any, scene: Scene, assets: Assets, surroundings: np.ndarray | None, referenced_lux: float
 ) -> float:
     """By how much to make all that shines brighter for a plane to get the scene's level; 1 without a level.
 
-    `referenced_lux` gives what lights of a Mitsuba file send to a depth. Raises `InputError` if there is no
-    light on the plane.
+    `referenced_lux` is what a Mitsuba file's lights send there. Raises `InputError` if it gets no light.
     """
     if scene.level is None:
         return 1.0
     z_mm = scene.level.z_mm
     lux = sum(illuminance_lux(light, z_mm, surroundings) for light in scene.lights)
-    lux += sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects) + referenced_lux(z_mm)
+    lux += sum(object_lux(mi, thing, z_mm, assets) for thing in scene.objects) + referenced_lux
     if not lux > 0:
         raise InputError(f"level: nothing shines on a surface at z_mm = {z_mm:g} that faces the cameras")
     return scene.level.illuminance_lux / lux
 
 
 def object_lux(mi: Any, thing: SceneObject, z_mm: float, assets: Assets) -> float:
-    """Illuminance, in lux, that an object gives a surface at (0, 0, z) that faces the cameras.
-
-    As of lights (see `illuminance_lux`): nothing stands in the way, not even the object itself.
-    """
+    """Illuminance, in lux, that an object gives a surface as in `illuminance_lux`; it never hides itself."""
     emission = thing.material.emission
     if emission is None:
         return 0.0
     points = surface_points(solid_parts(thing.shape, thing.material, assets), POINTS)
-    matrix = _matrix(mi, thing)[:3]
+    matrix = np.array(pose_of(mi, thing).matrix, dtype=np.float64)[:3]
     towards = points.position @ matrix[:, :3].T + matrix[:, 3] - [0.0, 0.0, z_mm]
-    at_lamp = np.maximum(-(points.normal @ matrix[:, :3].T * towards).sum(axis=1), 0)
-    shares = points.area * np.maximum(-towards[:, 2], 0) * at_lamp / (towards**2).sum(axis=1) ** 2
+    shares = _shares(points.area, towards, points.normal @ matrix[:, :3].T)
     if emission.texture is not None:
         assert points.texcoord is not None
         pixels = assets.image(emission.texture)
@@ -247,61 +219,55 @@ def object_lux(mi: Any, thing: SceneObject, z_mm: float, assets: Assets) -> floa
     return float(emission.luminance_cd_m2 * shares.sum())
 
 
-def illuminance_lux(light: Light, z_mm: float, surroundings: np.ndarray | None) -> float:
-    """Illuminance, in lux, that a light gives a surface at (0, 0, z) that faces the cameras.
+def _shares(area: np.ndarray, towards: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Area times cos a cos b / d^2 (N,) of parts of a lamp, for a surface that faces the cameras."""
+    at_lamp = np.maximum(-(normal * towards).sum(axis=1), 0)
+    return area * np.maximum(-towards[:, 2], 0) * at_lamp / (towards**2).sum(axis=1) ** 2
 
-    That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at the
-    lamp; nothing stands in the way.
+
+def illuminance_lux(light: lights.Light, z_mm: float, surroundings: np.ndarray | None) -> float:
+    """Illuminance, in lux, of a surface at (0, 0, z) that faces the cameras, with nothing in a light's way.
+
+    That is the integral of L cos a cos b / d^2 over the lamp, a and b the angles at the surface and at it.
     """
     point = np.array([0.0, 0.0, z_mm])
     match light:
-        case UniformLight():
+        case lights.UniformLight():
             return float(np.pi * light.luminance_cd_m2)
-        case PointLight() | SpotLight():
+        case lights.PointLight() | lights.SpotLight():
             towards = np.subtract(light.position_mm, point)
             distance, share = np.linalg.norm(towards), 1.0
-            if isinstance(light, SpotLight):
+            if isinstance(light, lights.SpotLight):
                 cosine = np.clip(-towards / distance @ _lamp_pose(light)[:3, 2], -1, 1)
                 beyond_deg = light.cutoff_deg - np.degrees(np.arccos(cosine))
                 share = np.clip(beyond_deg / (light.cutoff_deg - light.beam_deg), 0, 1)
             return float(share * light.intensity_cd * 1e6 * max(-towards[2], 0) / distance**3)
-        case DirectionalLight():
-            along = light.direction[2] / np.linalg.norm(light.direction)
-            return float(light.illuminance_lux * max(along, 0))
-        case EnvironmentLight():
+        case lights.DirectionalLight():
+            return float(light.illuminance_lux * max(light.direction[2] / np.linalg.norm(light.direction), 0))
+        case lights.EnvironmentLight():
             assert surroundings is not None
             return light.luminance_cd_m2 * _lux_from_around(light, surroundings)
-        case AreaLight():
+        case lights.AreaLight():
             pose, (node, weight) = area_light_pose(light), np.polynomial.legendre.leggauss(NODES)
             x, y = np.meshgrid(node, node)
-            places = pose[:3, :3] @ np.stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + pose[:3, 3:]
-            towards = places - point[:, None]
-            squared = (towards**2).sum(axis=0)
-            at_surface, at_lamp = np.maximum(-towards[2], 0), np.maximum(-pose[:3, 2] @ towards, 0)
-            shares = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
-            return float(light.luminance_cd_m2 * (shares * at_surface * at_lamp / squared**2).sum())
+            towards = np.column_stack([x.ravel(), y.ravel()]) @ pose[:3, :2].T + pose[:3, 3] - point
+            area = np.outer(weight, weight).ravel() * (light.width_mm * light.height_mm / 4)
+            return float(light.luminance_cd_m2 * _shares(area, towards, pose[:3, 2]).sum())
 
 
-def _lux_from_around(light: EnvironmentLight, pixels: np.ndarray) -> float:
-    """The integral of the image's luminance times the cosine over the half space behind the cameras.
-
-    Like the renderer, between pixels it is linear: the rows lie at polar angles from 0 to pi.
-    """
+def _lux_from_around(light: lights.EnvironmentLight, pixels: np.ndarray) -> float:
+    """The integral of the image's luminance times the cosine over the half space behind the cameras."""
     height, width = pixels.shape[:2]
-    down, right = _midpoints(height), _midpoints(width)
+    # Midpoints of equal parts of the unit interval, 8 a pixel or more.
+    down, right = ((np.arange(n) + 0.5) / n for n in np.maximum([8 * height, 8 * width], 4096))
     longitude = (right - 0.5) * 2 * np.pi + np.radians(light.turn_deg)
-    # The area on the sphere has one factor sin(polar), the cosine sin(polar) cos(longitude) another.
+    # The area on the sphere has one factor sin(polar), the cosine sin(polar) cos(longitude) another. Like the
+    # renderer's, the image is linear between pixels, and its rows lie at polar angles from 0 to pi.
     row_weight = np.sin(down * np.pi) ** 2 * (np.pi / down.size)
     col_weight = np.maximum(-np.cos(longitude), 0) * (2 * np.pi / right.size)
     of_rows = _divide_weights(down * (height - 1), row_weight, height)
     of_columns = _divide_weights(right * width - 0.5, col_weight, width)
     return float(of_rows @ (pixels @ LUMINANCE) @ of_columns)
-
-
-def _midpoints(pixels: int) -> np.ndarray:
-    """Midpoints of equal parts of the unit interval, 8 a pixel or more."""
-    number = max(8 * pixels, 4096)
-    return (np.arange(number) + 0.5) / number
 
 
 def _divide_weights(position_px: np.ndarray, weight: np.ndarray, pixels: int) -> np.ndarray:

@@ -16,46 +16,34 @@ PART = 1 << 14
 
 def first_objects(render_scene: RenderScene, origin_mm: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Object id (N,) int16, 0 for none, of what rays from one origin (3,) in directions (N, 3) hit first."""
-    unit = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-    origins = np.broadcast_to(origin_mm, unit.shape)
-    return np.maximum(_objects_hit(render_scene, origins, unit, np.full(len(unit), np.inf)), 0)
+    origins_mm = np.broadcast_to(origin_mm, direction.shape)
+    return np.maximum(_objects_hit(render_scene, origins_mm, direction, np.inf), 0)
 
 
 def standing_before(
     render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray, shy_of_target: float
 ) -> np.ndarray:
-    """Object id (N,) int16 of what stands between origins and targets (N, 3): 0 of no object, -1 for nothing.
-
-    Rays stop `shy_of_target` of their length before the target.
-    """
+    """Object id (N,) int16 of what stands between origins and targets (N, 3), 0 of no object, -1 for nothing;
+    rays stop `shy_of_target` of their length before the target."""
     if not len(origin_mm):
         return np.zeros(0, dtype=np.int16)
-    unit, length_mm = _towards(origin_mm, target_mm)
-    return _objects_hit(render_scene, origin_mm, unit, length_mm * (1 - shy_of_target))
+    return _objects_hit(render_scene, origin_mm, target_mm - origin_mm, 1 - shy_of_target)
 
 
 def blocked(render_scene: RenderScene, origin_mm: np.ndarray, target_mm: np.ndarray) -> np.ndarray:
     """Whether something stands between origins (N, 3) and one target (3,), (N,) bool."""
-    unit, length_mm = _towards(origin_mm, target_mm)
-    rays = _rays(render_scene, origin_mm, unit, length_mm * (1 - SHY_OF_TARGET))
+    rays = _rays(render_scene, origin_mm, target_mm - origin_mm, 1 - SHY_OF_TARGET)
     ray_test = render_scene.scene.ray_test
     if is_scalar(render_scene.mi):
         return np.fromiter(map(ray_test, rays), dtype=bool, count=len(origin_mm))
     return np.array(ray_test(rays))
 
 
-def _towards(origin_mm: np.ndarray, target_mm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit directions (N, 3) and distances (N,) from origins to targets."""
-    away_mm = target_mm - origin_mm
-    length_mm = np.linalg.norm(away_mm, axis=-1)
-    return away_mm / length_mm[:, None], length_mm
-
-
 def _objects_hit(
-    render_scene: RenderScene, origin_mm: np.ndarray, unit: np.ndarray, length_mm: np.ndarray
+    render_scene: RenderScene, origin_mm: np.ndarray, away_mm: np.ndarray, share: float
 ) -> np.ndarray:
     """Object id (N,) int16 of what rays hit first: 0 of no object, -1 for nothing."""
-    rays, scene = _rays(render_scene, origin_mm, unit, length_mm), render_scene.scene
+    rays, scene = _rays(render_scene, origin_mm, away_mm, share), render_scene.scene
     if is_scalar(render_scene.mi):
         ids = objects_by_shape(render_scene)
         hits = (scene.ray_intersect(render_scene.mi.RayDifferential3f(ray)) for ray in rays)
@@ -66,13 +54,14 @@ def _objects_hit(
     return np.where(shape > 0, render_scene.object_of_shape[shape], np.int16(-1))
 
 
-def _rays(render_scene: RenderScene, origin_mm: np.ndarray, unit: np.ndarray, length_mm: np.ndarray) -> Any:
-    """Rays of the world in the renderer: one array of them, or in scalar mode one after the other."""
-    mi, frame = render_scene.mi, render_scene.frame
-    origin, unit, length = frame.points(origin_mm), frame.directions(unit), length_mm * frame.unit
+def _rays(render_scene: RenderScene, origin_mm: np.ndarray, away_mm: np.ndarray, share: float) -> Any:
+    """Rays along vectors of the world as long as a share of them; in scalar mode one after the other."""
+    mi, frame, length_mm = render_scene.mi, render_scene.frame, np.linalg.norm(away_mm, axis=-1)
+    origin, unit = frame.points(origin_mm), frame.directions(away_mm / length_mm[:, None])
+    length = length_mm * share * frame.unit
     if is_scalar(mi):
         rows = rows_of(np.column_stack([origin, unit, length]))
-        return (mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6]), row[6], 0.0, []) for row in rows)
+        return (mi.Ray3f(mi.Ray3f(mi.Point3f(row[:3]), mi.Vector3f(row[3:6])), row[6]) for row in rows)
     ray = mi.Ray3f(vectors(mi, mi.Point3f, origin), vectors(mi, mi.Vector3f, unit))
     ray.maxt = floats(mi, length)
     return ray

@@ -1,7 +1,6 @@
-"""A Mitsuba scene by reference: its own parser reads it, and Mitsuba builds all that it names, as it stands.
+"""A Mitsuba scene by reference: Mitsuba reads and builds all that it names, as it stands.
 
-What is read of it here is where its axes are (see `WorldFrame`), the names of its shapes, what of it shines,
-and what single photons cannot be drawn from.
+What is read of it here is where its axes are (see `WorldFrame`), the names of its shapes and what shines.
 """
 
 import re
@@ -15,9 +14,9 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
 from simgen.base.strict_models import shorten, suggestion
-from simgen.renderer.backend import is_scalar, is_spectral, load_drjit, vectors
-from simgen.renderer.emission import ShiningSurface
-from simgen.renderer.mitsuba_shapes import WorldFrame
+from simgen.renderer.backend import is_scalar, is_spectral, load_drjit
+from simgen.renderer.emission import ShiningSurface, sample_light
+from simgen.renderer.mitsuba_shapes import WorldFrame, across_faces
 from simgen.spec.mitsuba_file import MitsubaFile, files_named_by
 from simgen.spec.scene import names_of_objects
 from simgen.spectral.filters import Filters
@@ -51,25 +50,15 @@ class Reference:
 
         Nothing stands in the way, as of the lights of a scene.toml. Raises `InputError` in spectral variants.
         """
-        mi = self.mi
-        if is_spectral(mi):
+        if is_spectral(self.mi):
             raise InputError("level: it needs light in linear sRGB; leave it or sensor.camera out")
         numbers, total = np.random.default_rng(0).random((LIGHT_SAMPLES, 2)), 0.0
-        seen_from = (
-            mi.Interaction3f() if is_scalar(mi) else load_drjit().zeros(mi.Interaction3f, len(numbers))
-        )
-        seen_from.p = self.frame.points(np.array([0.0, 0.0, z_mm])).tolist()
-        scene = _instantiate(mi, *_parse(mi, self.path), self.path)  # whose lights go with it
+        position = self.frame.points(np.array([0.0, 0.0, z_mm])).tolist()
+        scene = _instantiate(self.mi, *_parse(self.mi, self.path), self.path)  # whose lights go with it
         for light in scene.emitters():
-            if is_scalar(mi):
-                pairs = [light.sample_direction(seen_from, mi.Point2f(pair)) for pair in numbers.tolist()]
-                towards = np.array([np.ravel(sample.d) for sample, _ in pairs])
-                radiance = np.array([np.ravel(weight)[:3] for _, weight in pairs])
-            else:
-                sample, weight = light.sample_direction(seen_from, vectors(mi, mi.Point2f, numbers))
-                towards, radiance = np.array(sample.d).T, np.array(weight).T[:, :3]
+            towards, radiance = sample_light(self.mi, light, numbers, position)
             cosine = np.maximum(-self.frame.world_directions(towards)[:, 2], 0)
-            total += float((radiance @ LUMINANCE * cosine).mean())
+            total += float((radiance[:, :3] @ LUMINANCE * cosine).mean())
         return total
 
     def build(self, own: Mapping[str, Any], integrator: dict[str, Any], gain: float) -> Any:
@@ -79,44 +68,34 @@ class Reference:
         """
         mi = self.mi
         config, state = _parse(mi, self.path)
-        root, names = state.root.props, iter(self.names)
-        for key, number in _children(mi, state.root).items():
-            node = state.nodes[number]
+        root, ids = state.root.props, iter(self.names)
+        for key, node in _children(mi, state).items():
             if _kind(node) in ("Sensor", "Integrator"):
                 del root[key]
             elif _is_object(node):
-                node.props.set_id(next(names))
+                node.props.set_id(next(ids))
         for name, plugin in own.items():
             root[name] = mi.load_dict(plugin) if isinstance(plugin, dict) else plugin
             root[name].set_id(name)
         root["integrator"] = mi.load_dict(integrator)
         scene = _instantiate(mi, config, state, self.path)
-        if gain != 1:
-            for light in scene.emitters():
-                if (light.get_shape() or light).id() not in own:
-                    self._brighten(light, gain)
+        for light in scene.emitters() if gain != 1 else ():
+            if (light.get_shape() or light).id() in own:
+                continue
+            values = mi.traverse(light)
+            names = [name for name in values.keys() if BRIGHTNESS.fullmatch(name)]  # noqa: SIM118 (no dict)
+            if not names:
+                raise InputError(f"level: {self.path} has lights that cannot be made brighter; leave it out")
+            # A light with a scale has a radiance beside it, and each of them alone makes it brighter.
+            for name in ["scale"] if "scale" in names else names:
+                values[name] = values[name] * gain
+            values.update()
         return scene
 
-    def _brighten(self, light: Any, gain: float) -> None:
-        values = self.mi.traverse(light)
-        names = [name for name in values.keys() if BRIGHTNESS.fullmatch(name)]  # noqa: SIM118 (no dict)
-        if not names:
-            raise InputError(
-                f"level: {self.path} has lights that cannot be made brighter, such as pictures that shine; "
-                "leave the level out"
-            )
-        # A light with a scale has a radiance beside it, and each of them alone makes it brighter.
-        for name in ["scale"] if "scale" in names else names:
-            values[name] = values[name] * gain
-        values.update()
-
     def shining_surfaces(
-        self, scene: Any, first_number: int, filters: Filters | None
+        self, scene: Any, ids: Mapping[str, int], filters: Filters | None
     ) -> tuple[list[ShiningSurface], str]:
-        """What of the file's shapes shines, and a clause on why it cannot be drawn from, "" if it can.
-
-        `scene` is that of `build`; the file's objects have numbers from `first_number` on.
-        """
+        """What of the shapes in `build`'s scene shines, and a clause on why it cannot be drawn from or ""."""
         mi, surfaces = self.mi, list[ShiningSurface]()
         for shape in scene.shapes():
             if shape.id() not in self.names or not shape.is_emitter():
@@ -125,28 +104,25 @@ class Reference:
             triangles = _flat_triangles(shape) if shape.is_mesh() else None
             if triangles is None or mi.has_flag(light.flags(), mi.EmitterFlags.SpatiallyVarying):
                 return [], f"'{shape.id()}' shines with a picture or is no mesh of flat faces"
-            number = first_number + self.names.index(shape.id())
-            corners_mm = self.frame.points_mm(triangles)
-            surfaces.append(ShiningSurface(number, corners_mm, _radiance(mi, light, filters)))
+            corners_mm, radiance = self.frame.points_mm(triangles), _radiance(mi, light, filters)
+            surfaces.append(ShiningSurface(ids[shape.id()], corners_mm, radiance))
         return ([], "a medium scatters light") if self.has_media else (surfaces, "")
 
 
 def reference_to(mi: Any, file: MitsubaFile, folder: Path) -> Reference:
     """A Mitsuba scene of the scene's folder, standing where `file` says.
 
-    Raises `InputError` for a file that names what lies elsewhere, for what Mitsuba cannot read, and for a
-    camera that is not there.
+    Raises `InputError` for a file that names what lies elsewhere, cannot be read, or has no such camera.
     """
     path = folder / file.file
     list(files_named_by(folder, file.file))  # refuses what leads outside, before Mitsuba sees the file
     _, state = _parse(mi, path)
-    shapes = filter(_is_object, (state.nodes[number] for number in _children(mi, state.root).values()))
-    names = names_of_objects(
-        [node.props.id() or Path(_properties(node).get("filename", "")).stem for node in shapes]
-    )
-    kinds = {_kind(node) for node in state.nodes} | {node.props.plugin_name() for node in state.nodes}
-    frame = _frame(mi, file, path, state)
-    return Reference(mi, path, frame, tuple(names), "Medium" in kinds, "instance" in kinds)
+    shapes = filter(_is_object, _children(mi, state).values())
+    ids = [node.props.id() or Path(_properties(node).get("filename", "")).stem for node in shapes]
+    has_media = any(_kind(node) == "Medium" for node in state.nodes)
+    has_instances = any(node.props.plugin_name() == "instance" for node in state.nodes)
+    frame, names = _frame(mi, file, path, state), tuple(names_of_objects(ids))
+    return Reference(mi, path, frame, names, has_media, has_instances)
 
 
 def _parse(mi: Any, path: Path) -> tuple[Any, Any]:
@@ -159,7 +135,7 @@ def _parse(mi: Any, path: Path) -> tuple[Any, Any]:
         parser.transform_upgrade(config, state)
         parser.transform_resolve(config, state)
     except RuntimeError as fault:
-        raise InputError(f"{path}: Mitsuba cannot read it: {_sentence(fault)}") from None
+        raise _refusal(path, "read", fault) from None
     for node in state.nodes:
         name = _properties(node).get("filename")
         if isinstance(name, str):
@@ -171,12 +147,13 @@ def _instantiate(mi: Any, config: Any, state: Any, path: Path) -> Any:
     try:
         return mi.parser.instantiate(config, state)
     except RuntimeError as fault:
-        raise InputError(f"{path}: Mitsuba cannot build it: {_sentence(fault)}") from None
+        raise _refusal(path, "build", fault) from None
 
 
-def _sentence(fault: BaseException) -> str:
-    """What Mitsuba says, without the place in its own source."""
-    return shorten(re.sub(r"\[[\w.]+\.(?:cpp|h):\d+\] ?", "", str(fault)).strip())
+def _refusal(path: Path, verb: str, fault: BaseException) -> InputError:
+    """With what Mitsuba says, without the place in its own source."""
+    sentence = shorten(re.sub(r"\[[\w.]+\.(?:cpp|h):\d+\] ?", "", str(fault)).strip())
+    return InputError(f"{path}: Mitsuba cannot {verb} it: {sentence}")
 
 
 def _kind(node: Any) -> str:
@@ -187,16 +164,17 @@ def _is_object(node: Any) -> bool:
     return _kind(node) == "Shape" and node.props.plugin_name() != "shapegroup"
 
 
-def _children(mi: Any, node: Any) -> dict[str, int]:
-    """Numbers of the nodes that a node refers to, by key."""
+def _children(mi: Any, state: Any) -> dict[str, Any]:
+    """The nodes that a tree's root refers to, by key."""
     of_kind = mi.Properties.ResolvedReference
-    return {key: value.index() for key, value in _properties(node).items() if isinstance(value, of_kind)}
+    values = _properties(state.root).items()
+    return {key: state.nodes[value.index()] for key, value in values if isinstance(value, of_kind)}
 
 
 def _properties(node: Any) -> dict[str, Any]:
-    """Parameters of a node by name. A look at one is no use of it: Mitsuba names those that are not used."""
+    """Parameters of a node by name."""
     values = dict(node.props.items())
-    for name in values:
+    for name in values:  # Mitsuba refuses those that nobody has queried
         node.props.mark_queried(name, False)
     return values
 
@@ -205,11 +183,10 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
     """Where the world's axes are in those of the file."""
     unit, middle = 1 / file.unit_mm, np.zeros(3)
     if file.place_at_mm is not None or file.fit_mm is not None:
-        bounds = [shape.bbox() for shape in _instantiate(mi, *_parse(mi, path), path).shapes()]
-        if not bounds:
+        scene = _instantiate(mi, *_parse(mi, path), path)
+        if not scene.shapes():
             raise InputError(f"{path}: there is no shape in it")
-        box = np.array([(np.ravel(one.min), np.ravel(one.max)) for one in bounds])
-        low, high = box[:, 0].min(axis=0), box[:, 1].max(axis=0)
+        low, high = np.ravel(scene.bbox().min), np.ravel(scene.bbox().max)
         middle = (low + high) / 2
         if file.fit_mm is not None:
             unit = float((high - low).max()) / file.fit_mm
@@ -220,7 +197,7 @@ def _frame(mi: Any, file: MitsubaFile, path: Path, state: Any) -> WorldFrame:
         raise InputError(f"{path}: there is no sensor {file.camera!r}{suggestion(file.camera, cameras)}")
     if file.camera is None and len(cameras) != 1:
         raise InputError(f"{path}: it has {len(cameras)} sensors; give mitsuba.camera or mitsuba.place_at_mm")
-    node = cameras[file.camera] if file.camera is not None else next(iter(cameras.values()))
+    node = cameras[next(iter(cameras)) if file.camera is None else file.camera]
     transform = node.props.get("to_world", None)
     pose = np.eye(4) if transform is None else np.array(transform.matrix, dtype=np.float64)
     forward = pose[:3, 2] / np.linalg.norm(pose[:3, 2])
@@ -235,7 +212,7 @@ def _flat_triangles(mesh: Any) -> np.ndarray | None:
     faces = np.array(mesh.faces_buffer()).reshape(-1, 3)
     corners = np.array(mesh.vertex_positions_buffer(), dtype=np.float64).reshape(-1, 3)[faces]
     if mesh.has_vertex_normals() and not mesh.has_face_normals():
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        across = across_faces(corners)
         across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
         normals = np.array(mesh.vertex_normals_buffer(), dtype=np.float64).reshape(-1, 3)[faces]
         if np.abs(normals - across[:, None]).max() > FLAT:
@@ -245,15 +222,12 @@ def _flat_triangles(mesh: Any) -> np.ndarray | None:
 
 def _radiance(mi: Any, light: Any, filters: Filters | None) -> np.ndarray:
     """Radiance (C,) of a light that is the same everywhere, in the unit of rendered views."""
-
-    def radiance_at(wavelengths_nm: list[float]) -> np.ndarray:
-        hit = mi.SurfaceInteraction3f() if is_scalar(mi) else load_drjit().zeros(mi.SurfaceInteraction3f, 1)
-        hit.wi = [0.0, 0.0, 1.0]
-        if wavelengths_nm:
-            hit.wavelengths = wavelengths_nm
-        return np.ravel(light.eval(hit))
-
+    hit = mi.SurfaceInteraction3f() if is_scalar(mi) else load_drjit().zeros(mi.SurfaceInteraction3f, 1)
+    hit.wi = [0.0, 0.0, 1.0]
     if filters is None:
-        return radiance_at([]).astype(np.float64)
-    spectrum = [radiance_at([float(nm)] * 4)[0] for nm in WAVELENGTH_NM]
-    return integral(filters.sensitivity * np.array(spectrum))
+        return np.ravel(light.eval(hit)).astype(np.float64)
+    spectrum = np.empty(WAVELENGTH_NM.size)
+    for number, wavelength_nm in enumerate(WAVELENGTH_NM.tolist()):
+        hit.wavelengths = [wavelength_nm] * 4
+        spectrum[number] = np.ravel(light.eval(hit))[0]
+    return integral(filters.sensitivity * spectrum)

@@ -1,8 +1,7 @@
 """Where things stand in the renderer, and their shapes: Mitsuba's sphere and rectangle, or meshes.
 
-A Mitsuba file that a scene refers to is rendered as it is: cameras, and what else stands in the scene, are
-brought to its axes. To move the file's shapes would be wrong, since not all of Mitsuba's plugins are right in
-every pose (in 3.9 a turned `sdfgrid` is cut off, and curves keep their radius when they are scaled).
+Cameras and objects are brought to the axes of a Mitsuba file that a scene refers to: not all of Mitsuba's
+plugins could be moved (in 3.9 a turned `sdfgrid` is cut off, and scaled curves keep their radius).
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,23 +19,18 @@ from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Card, Mesh, Shape, Sphere
 
 SMALL_BALL_SHARE = 0.02
-"""A ball that shines is a mesh if its radius is a smaller share of the farthest distance in the scene.
-Mitsuba aims at its own sphere through a solid angle that loses its digits in single precision: at a radius
-of 0.01 of the distance the light is right to 4e-4, at 0.001 to 3e-2."""
-BALL_MESH_ROWS = 32
-LEAST_BALL_MESH_ROWS = 6
-STEPS_PER_EDGE = 100
-"""Steps of single precision that an edge of such a mesh takes at least, so that its area is right to 1e-4."""
-LEAST_STEPS_PER_EDGE = 8
-"""The same of the coarsest mesh; a smaller ball is refused."""
+"""A ball that shines is a mesh if its radius is a smaller share of the scene's size. Mitsuba aims at its own
+sphere in single precision: at a radius of 0.01 of the distance light is right to 4e-4, at 0.001 to 3e-2."""
+BALL_MESH_ROWS = 6, 32
+"""The least and largest number of rows of such a mesh."""
+STEPS_PER_EDGE = 8, 100
+"""Steps of single precision along an edge of it: below the first a ball is refused, from the second on its
+area is right to 1e-4."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorldFrame:
-    """The similarity from the world (X right, Y down, Z forward, mm) to the renderer's axes and unit.
-
-    A point p_mm is at `unit` R p_mm + `origin`, with `rotation` R. The default is the world itself.
-    """
+    """The similarity from the world to the renderer's axes and unit: p_mm is at `unit` R p_mm + `origin`."""
 
     rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
     unit: float = 1.0
@@ -67,9 +61,8 @@ class WorldFrame:
         """Planar depth of the renderer's own points, as one of its arrays or as a number."""
         if self.is_world:
             return point.z
-        x, y, z = (float(part) for part in self.rotation[:, 2] / self.unit)
         # The origin is subtracted first: far points are large numbers.
-        a, b, c = (float(part) for part in self.origin)
+        (x, y, z), (a, b, c) = (self.rotation[:, 2] / self.unit).tolist(), self.origin.tolist()
         return x * (point.x - a) + y * (point.y - b) + z * (point.z - c)
 
     def rigid_pose(self, pose: np.ndarray) -> np.ndarray:
@@ -89,56 +82,51 @@ class WorldFrame:
 
 def pose_of(mi: Any, thing: SceneObject) -> Any:
     """From the shape's own axes to the world's."""
-    T = mi.ScalarTransform4f
-    pose = T().translate(list(thing.position_mm))
-    for axis, degrees in zip(((0, 0, 1), (0, 1, 0), (1, 0, 0)), thing.rotation_deg[::-1], strict=True):
-        pose = pose @ T().rotate(list(axis), degrees)
-    return pose
+    T, (x, y, z) = mi.ScalarTransform4f, thing.rotation_deg
+    pose = T().translate(list(thing.position_mm)) @ T().rotate([0, 0, 1], z)
+    return pose @ T().rotate([0, 1, 0], y) @ T().rotate([1, 0, 0], x)
 
 
 def shape_plugin(
-    mi: Any,
-    thing: SceneObject,
-    assets: Assets,
-    surface: Any,
-    emitter: dict[str, Any] | None,
-    reach_mm: float,
-    frame: WorldFrame,
+    mi: Any, thing: SceneObject, assets: Assets, parts: dict[str, Any], reach_mm: float, frame: WorldFrame
 ) -> Any:
-    """The Mitsuba shape (or the plugin that makes it) of an object with a Mitsuba surface and emitter.
+    """The Mitsuba shape (or the plugin that makes it) of an object; `parts` are its bsdf and emitter.
 
-    No two things of the scene are farther from each other than `reach_mm`. Raises `InputError` for a ball
-    that shines and is smaller than single precision can tell where it stands.
+    The scene is at most `reach_mm` large. Raises `InputError` for a ball that is too small to shine.
     """
     T, pose, shape = mi.ScalarTransform4f, frame.pose(mi, pose_of(mi, thing)), thing.shape
-    parts = {"bsdf": surface} | ({} if emitter is None else {"emitter": mi.load_dict(emitter)})
-    matrix = np.array(pose.matrix, dtype=np.float64)
-    is_whole = thing.material.opacity is None
+    matrix, is_whole = np.array(pose.matrix, dtype=np.float64), thing.material.opacity is None
     if isinstance(shape, Card) and is_whole:
         to_world = pose @ card_pose(mi, shape.width_mm, shape.height_mm)
         return {"type": "rectangle", "to_world": to_world} | parts
     if isinstance(shape, Sphere) and is_whole:
-        if emitter is not None and shape.radius_mm < SMALL_BALL_SHARE * reach_mm:
+        if "emitter" in parts and shape.radius_mm < SMALL_BALL_SHARE * reach_mm:
             return _mesh(mi, _small_ball(shape.radius_mm, matrix[:3, 3] / frame.unit), matrix, parts)
-        return {"type": "sphere", "to_world": pose @ globe_pose(mi) @ T().scale(shape.radius_mm)} | parts
+        # Mitsuba's has the first row of a texture about +Z and its middle at -X, a globe at -Y and -Z.
+        globe_pose = T([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+        return {"type": "sphere", "to_world": pose @ globe_pose @ T().scale(shape.radius_mm)} | parts
     return _mesh(mi, solid_parts(shape, thing.material, assets), matrix, parts)
 
 
 def _small_ball(radius_mm: float, position_mm: np.ndarray) -> Triangles:
     """A ball of the sphere's area at this position, as fine as single precision allows."""
+    (fewest, most), (least_steps, steps) = BALL_MESH_ROWS, STEPS_PER_EDGE
     step_mm = float(np.spacing(np.float32(np.abs(position_mm).max() + radius_mm)))
-    least_mm = LEAST_STEPS_PER_EDGE * LEAST_BALL_MESH_ROWS * step_mm / np.pi
+    least_mm = least_steps * fewest * step_mm / np.pi
     if radius_mm < least_mm:
         raise InputError(
             f"shape.radius_mm: {radius_mm:g} is too small to shine at {np.linalg.norm(position_mm):.4g} mm "
             f"from the cameras; it must be at least {least_mm:.2g}"
         )
-    rows = int(np.pi * radius_mm / (STEPS_PER_EDGE * step_mm))
-    ball = globe(radius_mm, min(max(rows, LEAST_BALL_MESH_ROWS), BALL_MESH_ROWS))
-    corner = ball.positions.astype(np.float64)[ball.faces]
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    ball = globe(radius_mm, min(max(int(np.pi * radius_mm / (steps * step_mm)), fewest), most))
+    across = across_faces(ball.positions.astype(np.float64)[ball.faces])
     share = np.linalg.norm(across, axis=1).sum() / 2 / (4 * np.pi * radius_mm**2)
     return replace(ball, positions=(ball.positions / np.sqrt(share)).astype(np.float32))
+
+
+def across_faces(corners: np.ndarray) -> np.ndarray:
+    """Normals (M, 3) of triangles (M, 3, 3), as long as twice their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
@@ -152,7 +140,7 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
     where = "material.opacity"
     if isinstance(shape, Sphere):
         raise InputError(f"{where}: it cannot be laid on a sphere; give a mesh")
-    check_texcoords(where, "leave it out", shape, assets)
+    check_texcoords(where, shape, assets)
     try:
         rest = cut_out(triangles, assets.numbers(material.opacity, where)[..., 0], tiled=material.tiled)
     except ValueError as fault:
@@ -162,30 +150,16 @@ def solid_parts(shape: Shape, material: Material, assets: Assets) -> Triangles:
     return rest
 
 
-def check_texcoords(where: str, instead: str, shape: Shape, assets: Assets) -> None:
+def check_texcoords(where: str, shape: Shape, assets: Assets) -> None:
     """`InputError` for a picture on a mesh that does not say where it lies."""
     if isinstance(shape, Mesh) and assets.meshes[shape.file].texcoords is None:
-        raise InputError(
-            f"{where}: it cannot be laid on {shape.file!r}, which has no texture coordinates; "
-            f"add them to the file, or {instead}"
-        )
+        raise InputError(f"{where}: {shape.file!r} has no texture coordinates; add them, or leave it out")
 
 
 def card_pose(mi: Any, width_mm: float, height_mm: float) -> Any:
-    """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces the cameras (-Z).
-
-    Turning about X by 180 degrees brings the normal to -Z and the top row of a texture up, to -Y.
-    """
+    """Mitsuba's rectangle (2 x 2, normal +Z, v upwards) as a card that faces -Z, with v towards -Y."""
     T = mi.ScalarTransform4f
     return T().rotate([1, 0, 0], 180) @ T().scale([width_mm / 2, height_mm / 2, 1])
-
-
-def globe_pose(mi: Any) -> Any:
-    """Mitsuba's sphere (first row of a texture about +Z, its middle column at -X) as a globe.
-
-    The first row comes to -Y, which is up, and the middle to -Z, towards the cameras.
-    """
-    return mi.ScalarTransform4f([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
 def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, Any]) -> Any:
@@ -194,22 +168,17 @@ def _mesh(mi: Any, triangles: Triangles, matrix: np.ndarray, parts: dict[str, An
     for name, plugin in parts.items():
         properties[name] = plugin
     # The renderer aims at lamps as if their faces were flat; with smoothed normals it would be off.
-    normals = None if "emitter" in parts else triangles.normals
+    normals, texcoords = None if "emitter" in parts else triangles.normals, triangles.texcoords
+    positions = triangles.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     mesh = mi.Mesh(
-        "mesh",
-        len(triangles.positions),
-        len(triangles.faces),
-        props=properties,
-        has_vertex_normals=normals is not None,
-        has_vertex_texcoords=triangles.texcoords is not None,
+        "mesh", len(positions), len(triangles.faces), properties, normals is not None, texcoords is not None
     )
     values = mi.traverse(mesh)
-    positions = triangles.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     values["vertex_positions"] = positions.astype(np.float32).ravel()
     values["faces"] = triangles.faces.astype(np.uint32).ravel()
     if normals is not None:
         values["vertex_normals"] = (normals @ matrix[:3, :3].T).astype(np.float32).ravel()
-    if triangles.texcoords is not None:  # Mitsuba's v runs down a picture
-        values["vertex_texcoords"] = (triangles.texcoords * [1, -1] + [0, 1]).astype(np.float32).ravel()
+    if texcoords is not None:  # Mitsuba's v runs down a picture
+        values["vertex_texcoords"] = (texcoords * [1, -1] + [0, 1]).astype(np.float32).ravel()
     values.update()
     return mesh

@@ -13,27 +13,11 @@ from simgen.assets.asset_files import Assets
 from simgen.assets.texture_pixels import paint
 from simgen.renderer.backend import is_spectral
 from simgen.renderer.mitsuba_shapes import check_texcoords
+from simgen.spec.lights import Illuminant
 from simgen.spec.materials import Glass, Material, Matt, Metal, Plastic, Principled, Reflectance, is_clear
 from simgen.spec.scene import SceneObject
 from simgen.spec.shapes import Box, Card, Cylinder, Mesh, Shape, Sphere
-from simgen.spectral.spectra import (
-    DAYLIGHT,
-    WAVELENGTH_NM,
-    illuminant,
-    integral,
-    linear_srgb,
-    observer,
-    patch,
-    resampled,
-    tint,
-)
-
-Triple = tuple[float, float, float]
-
-
-def matt_plugin(reflectance: dict[str, Any]) -> dict[str, Any]:
-    """A surface that scatters light evenly (Lambert), on both sides."""
-    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
+from simgen.spectral import spectra
 
 
 def paint_patterns(things: Sequence[SceneObject]) -> Iterator[np.ndarray | None]:
@@ -58,55 +42,40 @@ def surface_plugin(
 ) -> dict[str, Any]:
     """The surface of an object of this shape, on both sides; `pattern` are its pixels if it carries one."""
 
-    def texture(pixels: np.ndarray, raw: bool = True) -> dict[str, Any]:
+    def texture(where: str, pixels: np.ndarray, raw: bool = True) -> dict[str, Any]:
+        check_texcoords(where, shape, assets)
         return texture_plugin(mi, pixels, shape, raw=raw, tiled=material.tiled)
 
     def reflectance() -> dict[str, Any]:
-        if material.texture is None:
-            assert material.reflectance is not None
+        if material.reflectance is not None:
             return reflectance_plugin(mi, material.reflectance)
-        check_texcoords("material.texture", "give the material a reflectance instead", shape, assets)
         pixels = assets.image(material.texture) if isinstance(material.texture, str) else pattern
         assert pixels is not None
         # Pixels are linear, so they are colours as they stand, which spectral variants make spectra.
-        return texture(pixels, raw=not is_spectral(mi))
+        return texture("material.texture", pixels, raw=not is_spectral(mi))
 
     def number_or_texture(field: str) -> float | dict[str, Any]:
         value, where = getattr(material.finish, field), f"material.finish.{field}"
-        if not isinstance(value, str):
-            return value
-        check_texcoords(where, "give a number instead", shape, assets)
-        return texture(assets.numbers(value, where))
+        return texture(where, assets.numbers(value, where)) if isinstance(value, str) else value
 
     match material.finish:
         case Matt():
             surface = {"type": "diffuse", "reflectance": reflectance()}
         case Plastic(roughness=alpha):
-            surface = {
-                "type": "roughplastic",
-                "distribution": "ggx",
-                "alpha": alpha,
-                "diffuse_reflectance": reflectance(),
-            }
+            surface = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha}
+            surface["diffuse_reflectance"] = reflectance()
         case Metal(name=name, roughness=alpha):
             surface = {"type": "roughconductor", "distribution": "ggx", "alpha": alpha, "material": name}
         case Glass(refractive_index=index):
             pane = isinstance(shape, Card)
             surface = {"type": "thindielectric" if pane else "dielectric", "int_ior": index, "ext_ior": 1.0}
         case Principled(refractive_index=index, clearcoat_gloss=gloss):
-            surface = {
-                "type": "principled",
-                "base_color": reflectance(),
-                "eta": index,
-                "metallic": number_or_texture("metallic"),
-                "roughness": number_or_texture("roughness"),
-                "spec_trans": number_or_texture("transmission"),
-                "clearcoat": number_or_texture("clearcoat"),
-                "clearcoat_gloss": gloss,
-            }
+            surface = {"type": "principled", "base_color": reflectance(), "eta": index}
+            surface |= {field: number_or_texture(field) for field in ("metallic", "roughness")}
+            surface["spec_trans"] = number_or_texture("transmission")
+            surface |= {"clearcoat": number_or_texture("clearcoat"), "clearcoat_gloss": gloss}
     if material.normal_map is not None:
-        check_texcoords("material.normal_map", "leave it out", shape, assets)
-        tilts = texture(assets.stored(material.normal_map))
+        tilts = texture("material.normal_map", assets.stored(material.normal_map))
         surface = {"type": "normalmap", "normalmap": tilts, "bsdf": surface}
     return surface if is_clear(material.finish) else {"type": "twosided", "bsdf": surface}
 
@@ -120,13 +89,9 @@ def texture_plugin(
     pixels = np.ascontiguousarray(pixels)
     # A bitmap is converted, which takes as long as tracing 500 000 paths; only that can become spectra.
     source: dict[str, Any] = {"data": mi.TensorXf(pixels)} if raw else {"bitmap": linear_bitmap(mi, pixels)}
-    return source | {
-        "type": "bitmap",
-        "raw": raw,
-        "filter_type": "bilinear",
-        # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
-        "wrap_mode": "repeat" if tiled or isinstance(shape, Sphere) else "clamp",
-    }
+    # Around a sphere a texture closes on itself; elsewhere its borders must not mix.
+    wrap_mode = "repeat" if tiled or isinstance(shape, Sphere) else "clamp"
+    return source | {"type": "bitmap", "raw": raw, "filter_type": "bilinear", "wrap_mode": wrap_mode}
 
 
 def linear_bitmap(mi: Any, pixels: np.ndarray) -> Any:
@@ -154,46 +119,43 @@ def reflectance_plugin(mi: Any, reflectance: Reflectance) -> dict[str, Any]:
     if isinstance(reflectance, tuple):
         return {"type": "rgb", "value": srgb_to_linear(np.array(reflectance)).tolist()}
     if isinstance(reflectance, str):
-        spectrum = patch(reflectance)
+        spectrum = spectra.patch(reflectance)
     else:
-        spectrum = resampled(reflectance.wavelength_nm, reflectance.value)
+        spectrum = spectra.resampled(reflectance.wavelength_nm, reflectance.value)
     if is_spectral(mi):
         return spectrum_plugin(spectrum)
-    return {"type": "rgb", "value": linear_srgb(spectrum).tolist()}
+    return {"type": "rgb", "value": spectra.linear_srgb(spectrum).tolist()}
 
 
-def radiance_plugin(mi: Any, luminance_cd_m2: float, colour: str | Triple) -> dict[str, Any]:
+def radiance_plugin(mi: Any, luminance_cd_m2: float, colour: Illuminant) -> dict[str, Any]:
     """Light of this luminance in cd/m^2, with a CIE illuminant's spectrum or colour, or of an sRGB colour."""
     if is_spectral(mi):
         return spectrum_plugin(luminance_cd_m2 * light_spectrum(mi, colour))
     if isinstance(colour, str):
-        rgb = tint(colour)
+        rgb = spectra.tint(colour)
     else:
         rgb = srgb_to_linear(np.array(colour))
         rgb /= LUMINANCE @ rgb
     return {"type": "rgb", "value": (luminance_cd_m2 * rgb).tolist()}
 
 
-def light_spectrum(mi: Any, colour: str | Triple) -> np.ndarray:
+def light_spectrum(mi: Any, colour: Illuminant) -> np.ndarray:
     """The spectrum (N,) at luminance 1 of a CIE illuminant, or of an sRGB colour.
 
-    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019), as the
-    renderer makes it of reflectances.
+    A colour is daylight D65 behind a filter with the smooth spectrum of Jakob and Hanika (2019).
     """
     if isinstance(colour, str):
-        return illuminant(colour)
+        return spectra.illuminant(colour)
     rgb = srgb_to_linear(np.array(colour))
-    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), WAVELENGTH_NM)
-    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * illuminant(DAYLIGHT)
-    luminosity = observer()[1]
-    return filtered * (integral(luminosity * illuminant(DAYLIGHT)) / integral(luminosity * filtered))
+    slope = np.polyval(np.array(mi.srgb_model_fetch((rgb / rgb.max()).tolist())), spectra.WAVELENGTH_NM)
+    filtered = (0.5 + slope / (2 * np.sqrt(1 + slope**2))) * spectra.illuminant(spectra.DAYLIGHT)
+    luminosity = spectra.observer()[1]
+    luminance = spectra.integral(luminosity * spectra.illuminant(spectra.DAYLIGHT))
+    return filtered * (luminance / spectra.integral(luminosity * filtered))
 
 
 def spectrum_plugin(values: np.ndarray) -> dict[str, Any]:
     """Values (N,) at evenly spaced wavelengths."""
-    return {
-        "type": "regular",
-        "wavelength_min": float(WAVELENGTH_NM[0]),
-        "wavelength_max": float(WAVELENGTH_NM[-1]),
-        "values": ", ".join(map(repr, values.tolist())),
-    }
+    first, last = spectra.WAVELENGTH_NM[[0, -1]].tolist()
+    numbers = ", ".join(map(repr, values.tolist()))
+    return {"type": "regular", "wavelength_min": first, "wavelength_max": last, "values": numbers}

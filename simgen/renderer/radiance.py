@@ -1,6 +1,7 @@
 """Dense radiance of one view: every pixel, by path tracing."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterator
 from itertools import count
 from typing import Any
 
@@ -10,8 +11,8 @@ from pcii.base.errors import InputError
 from simgen.cameras.rig import Camera, Cameras, as_rig
 from simgen.renderer.backend import shape_numbers
 from simgen.renderer.intersection import first_objects
-from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene, not_finite
+from simgen.renderer.mitsuba_shapes import WorldFrame
 from simgen.renderer.mitsuba_surfaces import spectrum_plugin
 
 LEAST_STEP_PX = 8
@@ -19,14 +20,39 @@ LEAST_STEP_PX = 8
 Window = tuple[slice, slice]
 """Rows and columns of a film."""
 SEED_STEP = 0x9E3779B9
-"""Between seeds of parts of one view: 2^32 over the golden ratio, whose multiples stay far apart (modulo
-2^32), so that no part has the seed of another view's."""
+"""Between seeds of parts of one view: 2^32 over the golden ratio, whose multiples stay far apart."""
 PARTS = (*(4**power for power in range(15, 1, -1)), 8, 4, 2, 1)
-"""Numbers of samples that are rendered at a time.
+"""Numbers of samples that are rendered at a time: powers of two, since others are added in an order that is
+left to chance, and such that the sampler has exactly so many cells (of 32 it makes 5 x 7, and 35 samples)."""
+NEAR_CLIP_MM, FAR_CLIP_MM = 0.01, 1e7
+"""Nothing nearer or farther is seen in rendered views."""
 
-They are powers of two, since others the renderer adds in an order that is left to chance, and such that the
-sampler divides a pixel into exactly so many cells: of 32 it makes 5 x 7, and 35 samples.
-"""
+
+def sensor_plugin(mi: Any, camera: Camera, sampler: dict[str, Any], frame: WorldFrame) -> dict[str, Any]:
+    """A camera as Mitsuba's sensor, whose own axes point left, up and forward."""
+    grid, pose = camera.grid, np.eye(4)
+    pose[:3, :3], pose[:3, 3] = camera.rotation * (-1.0, -1.0, 1.0), camera.position_mm
+    film = {"type": "hdrfilm", "width": grid.width, "height": grid.height, "pixel_format": "rgb"}
+    film["component_format"] = "float32"  # the default, float16, turns 1e6 into infinity
+    film["rfilter"] = {"type": "box"}  # the only filter whose sums repeat bit for bit
+    plugin = {
+        "type": "perspective",
+        "fov": 2 * math.degrees(math.atan(grid.width * grid.pixel_mm / (2 * grid.focal_mm))),
+        "fov_axis": "x",
+        "near_clip": NEAR_CLIP_MM * frame.unit,
+        "far_clip": FAR_CLIP_MM * frame.unit,
+        "to_world": mi.ScalarTransform4f(frame.rigid_pose(pose) + 0.0),  # adding 0 turns -0 into 0
+        "film": film,
+        "sampler": sampler,
+    }
+    if camera.lens is not None:
+        plugin["type"] = "thinlens"
+        plugin["aperture_radius"] = camera.lens.aperture_mm / 2 * frame.unit
+        plugin["focus_distance"] = camera.lens.focus_mm * frame.unit
+    else:  # in shares of the film, and positive where the axis is left of (above) the film's centre
+        plugin["principal_point_offset_x"] = -camera.shift_px[0] / grid.width
+        plugin["principal_point_offset_y"] = -camera.shift_px[1] / grid.height
+    return plugin
 
 
 def render_view(
@@ -42,13 +68,11 @@ def render_view(
 ) -> np.ndarray:
     """Linear radiance (H, W, C), float32, of camera (k, l): sRGB whose luminance is in cd/m^2.
 
-    In spectral mode: what pixels of each of the camera's colours see, in the unit of `filters`.
-
-    The mean of `samples_per_pixel` paths through each pixel's square, or of `background_samples` outside the
-    windows that objects are in; the same bytes for the same seed on the same backend. Views need different
-    seeds: with one seed their noise is the same. The paths of a pixel are spread evenly over it and over the
-    lamps (correlated multi-jittered sampling, Kensler 2013), which at 4 or 8 paths has the error of four
-    times as many `independent` ones. Raises `InputError` for radiance that is not finite.
+    In spectral mode: what pixels of each of the camera's colours see, in the unit of `filters`. It is the
+    mean of `samples_per_pixel` paths through each pixel's square, or of `background_samples` outside the
+    windows that objects are in. Views of one seed have the same noise. The paths of a pixel are spread evenly
+    over it and over the lamps (correlated multi-jittered sampling, Kensler 2013), which at 4 or 8 paths has
+    the error of four times as many `independent` ones. Raises `InputError` for radiance that is not finite.
     """
     camera = as_rig(cameras).camera(k, l)
     sampler = {"type": "independent" if independent else "multijitter"}
@@ -57,10 +81,8 @@ def render_view(
     if background_samples is not None:
         windows, saved = windows_of_objects(render_scene, camera, samples_per_pixel, background_samples)
         if saved <= 0:
-            background_samples = None
-    if background_samples is None:
-        return _mean_of_paths(render_scene, camera, sampler, samples_per_pixel, seeds)
-    image = _mean_of_paths(render_scene, camera, sampler, background_samples, seeds)
+            windows, background_samples = [], None
+    image = _mean_of_paths(render_scene, camera, sampler, background_samples or samples_per_pixel, seeds)
     for rows, cols in windows:
         part = camera.of_window(rows, cols)
         image[rows, cols] = _mean_of_paths(render_scene, part, sampler, samples_per_pixel, seeds)
@@ -75,31 +97,25 @@ def _mean_of_paths(
     plugin = sensor_plugin(mi, camera, sampler, render_scene.frame)
     if render_scene.filters is not None:
         # A channel for each colour's sensitivity, instead of R, G, B.
-        curves = enumerate(render_scene.filters.sensitivity)
-        bands = {f"band{number}": spectrum_plugin(curve) for number, curve in curves}
-        film = {name: value for name, value in plugin["film"].items() if name != "pixel_format"}
-        plugin["film"] = film | {"type": "specfilm"} | bands
+        del plugin["film"]["pixel_format"]
+        plugin["film"]["type"] = "specfilm"
+        for number, curve in enumerate(render_scene.filters.sensitivity):
+            plugin["film"][f"band{number}"] = spectrum_plugin(curve)
     sensor = mi.load_dict(plugin)
     total, rest = np.zeros(()), samples
     for part in PARTS:
         while rest >= part:
             image = np.array(mi.render(render_scene.scene, sensor=sensor, spp=part, seed=next(seeds)))
-            _require_finite(render_scene, camera, image)
+            is_finite = np.isfinite(image).all(axis=2)
+            if not is_finite.all():
+                towards = camera.towards(*np.argwhere(~is_finite)[:1].T)
+                number = first_objects(render_scene, camera.position_mm, towards)[0]
+                raise InputError(not_finite(render_scene, int(number)))
             if part == samples:
                 return image
             total = total + part * image.astype(np.float64)
             rest -= part
     return (total / samples).astype(np.float32)
-
-
-def _require_finite(render_scene: RenderScene, camera: Camera, image: np.ndarray) -> None:
-    """`InputError` that names the object in a pixel whose radiance is no finite number."""
-    if np.isfinite(image).all():
-        return
-    row, col = np.argwhere(~np.isfinite(image).all(axis=2))[0]
-    towards = camera.towards(np.array([row]), np.array([col]))
-    number = first_objects(render_scene, camera.position_mm, towards)[0]
-    raise InputError(not_finite(render_scene, int(number)))
 
 
 def windows_of_objects(
@@ -112,16 +128,14 @@ def windows_of_objects(
     corners = [[box.corner(number) for number in range(8)] for box in boxes]
     corners_mm = render_scene.frame.points_mm(np.array(corners, dtype=np.float64).reshape(-1, 8, 3))
     windows, pixels = object_windows(camera, corners_mm), camera.grid.height * camera.grid.width
-    paths = background_samples * pixels + samples_per_pixel * covered_px(windows)
-    return windows, samples_per_pixel * pixels - paths
+    covered = sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
+    return windows, (samples_per_pixel - background_samples) * pixels - samples_per_pixel * covered
 
 
 def object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
-    """Windows that do not overlap, outside of which the camera sees none of the objects in boxes.
+    """Windows that do not overlap, outside of which the camera sees none of the boxes with corners (N, 8, 3).
 
-    `corners_mm` (N, 8, 3) are the corners of each object's bounding box. A window covers the projection of
-    one box, or of several whose windows overlap. The whole film is the only window if a box reaches behind
-    the camera, or if the camera has a lens, which blurs.
+    The whole film is the only one if a box reaches behind the camera, or if the camera has a lens.
     """
     size = np.array([camera.grid.height, camera.grid.width])
     z_mm = ((corners_mm - camera.position_mm) @ camera.rotation)[..., 2]
@@ -142,23 +156,17 @@ def object_windows(camera: Camera, corners_mm: np.ndarray) -> list[Window]:
     return windows
 
 
-def covered_px(windows: Iterable[Window]) -> int:
-    """How many pixels windows cover that do not overlap."""
-    return sum((rows.stop - rows.start) * (cols.stop - cols.start) for rows, cols in windows)
-
-
 def _window_around(first: np.ndarray, stop: np.ndarray, size: np.ndarray) -> Window:
     """A window on a film of this `size` around pixels from `first` to before `stop`; each (2,).
 
-    Its sides take few different lengths, four to an octave, since the renderer compiles its loops for each
-    size of picture.
+    Its sides have few lengths, four to an octave: the renderer compiles its loops for each size of picture.
     """
     sides = []
-    for begin, end, limit in zip(first.astype(int), stop.astype(int), size, strict=True):
-        step = max(1 << int(end - begin).bit_length() >> 3, LEAST_STEP_PX)
+    for begin, end, limit in np.stack([first, stop, size]).astype(int).T.tolist():
+        step = max(1 << (end - begin).bit_length() >> 3, LEAST_STEP_PX)
         length = min(-(-(end - begin) // step) * step, limit)
-        start = int(np.clip(begin, 0, limit - length))
-        sides.append(slice(start, start + int(length)))
+        start = min(max(begin, 0), limit - length)
+        sides.append(slice(start, start + length))
     return sides[0], sides[1]
 
 

@@ -1,23 +1,17 @@
-"""How rays carry light, for compiled backends: as three colours, or as four wavelengths for a pixel's filter.
-
-Everything here is on the renderer's side: Dr.Jit arrays with an element for each ray.
-"""
+"""How rays of compiled backends carry light: as three colours, or four wavelengths for a pixel's filter."""
 
 from collections.abc import Iterator
 from typing import Any
 
 from pcii.base.srgb import LUMINANCE
-from simgen.renderer.backend import floats, load_drjit
+from simgen.renderer.backend import floats, gathered, load_drjit
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spectral.filters import CELLS, HEROES, Filters
 from simgen.spectral.spectra import WAVELENGTH_NM
 
 
 class Light:
-    """What rays carry for pixels of a `colour` (its number): here linear sRGB, all colours at once.
-
-    `wavelength_sample` is what `wavelength_samples` gave the ray.
-    """
+    """What rays carry for pixels of a `colour` (its number): here linear sRGB, all colours at once."""
 
     def __init__(self, mi: Any, cfa: str | None) -> None:
         self.mi, self.cfa = mi, cfa
@@ -51,23 +45,21 @@ class SpectralLight(Light):
     def __init__(self, mi: Any, filters: Filters) -> None:
         self.mi, self.channels = mi, len(filters.sensitivity)
         self.cell_nm = mi.Float(filters.wavelength_nm.ravel())
-        self.sensitivity = floats(mi, filters.sensitivity)
-        self.light = floats(mi, filters.light)
-        self.white = floats(mi, filters.white)
+        curves = filters.sensitivity, filters.light, filters.white
+        self.sensitivity, self.light, self.white = (floats(mi, curve) for curve in curves)
 
     def wavelength_samples(self, sampler: Any, number: int) -> Any:
         return sampler.next_1d()
 
     def aim(self, ray: Any, colour: Any, wavelength_sample: Any) -> Any:
-        ray.wavelengths = self._draw(colour, wavelength_sample)[0]
+        ray.wavelengths, _ = self._draw(colour, wavelength_sample)
         return ray
 
     def spread(self, ambient: Any, colour: Any, wavelength_sample: Any) -> Any:
         # It has the spectrum of most of the light.
-        dr = load_drjit()
         wavelengths_nm, _ = self._draw(colour, wavelength_sample)
-        white = dr.gather(self.mi.Float, self.white, colour)
-        relative = dr.select(white > 0, of_colour(ambient, colour) / white, 0)
+        white = gathered(self.white, colour)
+        relative = load_drjit().select(white > 0, of_colour(ambient, colour) / white, 0)
         return self.mi.Spectrum(*(self._at(self.light, here_nm, 0) * relative for here_nm in wavelengths_nm))
 
     def colours_to_follow(self, colour: Any) -> Iterator[Any]:
@@ -75,20 +67,18 @@ class SpectralLight(Light):
             yield load_drjit().full(self.mi.UInt32, other, len(colour))
 
     def per_colour(self, radiance: Any, colour: Any, wavelength_sample: Any) -> list[Any]:
-        dr = load_drjit()
-        _, weight = self._draw(colour, wavelength_sample)
+        dr, (_, weight) = load_drjit(), self._draw(colour, wavelength_sample)
         total = dr.sum(radiance * weight)
         return [dr.select(colour == other, total, 0) for other in range(self.channels)]
 
     def _draw(self, colour: Any, wavelength_sample: Any) -> tuple[Any, Any]:
         """Wavelengths and their weights, as `Filters.draw` has them."""
-        mi, dr = self.mi, load_drjit()
-        wavelengths_nm, weight = [], []
+        mi, wavelengths_nm, weight = self.mi, [], []
         for hero in range(HEROES):
             place = (wavelength_sample + hero) * (CELLS / HEROES)
-            cell = dr.minimum(mi.UInt32(place), CELLS - 1)
+            cell = load_drjit().minimum(mi.UInt32(place), CELLS - 1)
             first = colour * (CELLS + 1) + cell
-            low, high = dr.gather(mi.Float, self.cell_nm, first), dr.gather(mi.Float, self.cell_nm, first + 1)
+            low, high = gathered(self.cell_nm, first), gathered(self.cell_nm, first + 1)
             here_nm = low + (high - low) * (place - mi.Float(cell))
             curve = self._at(self.sensitivity, here_nm, colour * WAVELENGTH_NM.size)
             wavelengths_nm.append(here_nm)
@@ -100,20 +90,20 @@ class SpectralLight(Light):
         mi, dr = self.mi, load_drjit()
         place = wavelength_nm - float(WAVELENGTH_NM[0])
         cell = dr.minimum(mi.UInt32(place), WAVELENGTH_NM.size - 2)
-        low, high = (dr.gather(mi.Float, table, start + cell + side) for side in (0, 1))
+        low, high = (gathered(table, start + cell + side) for side in (0, 1))
         return dr.lerp(low, high, place - mi.Float(cell))
 
 
 def light_of(render_scene: RenderScene, cfa: str | None) -> Light:
     """How rays carry light in this scene's variant."""
-    if render_scene.filters is None:
-        return Light(render_scene.mi, cfa)
-    return SpectralLight(render_scene.mi, render_scene.filters)
+    mi, filters = render_scene.mi, render_scene.filters
+    return Light(mi, cfa) if filters is None else SpectralLight(mi, filters)
 
 
 def of_colour(values: Any, colour: Any) -> Any:
     """Each element's value in its own colour, of `values` in all colours."""
-    dr, values = load_drjit(), list(values)
-    if len(values) == 1:
-        return values[0]
-    return dr.select(colour == 0, values[0], dr.select(colour == 1, values[1], values[2]))
+    first, *others = values
+    if not others:
+        return first
+    select = load_drjit().select
+    return select(colour == 0, first, select(colour == 1, *others))

@@ -138,17 +138,16 @@ def detect(
         dark = rng.integers(0, views * pixels, number)
         parts.append(_without_photon(grid, dark, np.ones(number, np.int64)))
     # One camera takes all views, so its faulty pixels are the same in each.
-    faulty = seeds.generator(seed, stage="faulty pixels")
-    shuffled = faulty.permutation(pixels) if sensor.hot_pixel_share or sensor.dead_pixel_share else None
-    if shuffled is not None and sensor.hot_pixel_share > 0:
-        hot = shuffled[: round(sensor.hot_pixel_share * pixels)]
+    faulty = seeds.generator(seed, stage="faulty pixels").permutation(pixels)
+    hot = faulty[: round(sensor.hot_pixel_share * pixels)]
+    if hot.size:
         n = rng.poisson(sensor.hot_pixel_counts, (views, hot.size))
         parts.append(_without_photon(grid, (np.arange(views)[:, None] * pixels + hot).ravel(), n.ravel()))
     counts = joined(parts)
-    if shuffled is not None and sensor.dead_pixel_share > 0:
-        dead = np.zeros(pixels, dtype=bool)
-        dead[shuffled[pixels - round(sensor.dead_pixel_share * pixels) :]] = True
-        counts = counts.take(~dead.reshape(grid.height, grid.width)[counts.i, counts.j])
+    if sensor.dead_pixel_share > 0:
+        works = np.ones(pixels, dtype=bool)
+        works[faulty[pixels - round(sensor.dead_pixel_share * pixels) :]] = False
+        counts = counts.take(works.reshape(grid.shape_HW)[counts.i, counts.j])
     return counts if counts.n.all() else counts.take(counts.n > 0)
 
 
@@ -255,11 +254,7 @@ def _cells(
 
 
 def full_light_image(
-    radiance: np.ndarray,
-    cfa: str | None,
-    photons_per_unit: float,
-    sensor: Sensor,
-    rng: np.random.Generator,
+    radiance: np.ndarray, cfa: str | None, photons_per_unit: float, sensor: Sensor, rng: np.random.Generator
 ) -> np.ndarray:
     """Radiance (H, W, C) as a camera would measure it, float32, in the same unit.
 

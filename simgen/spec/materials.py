@@ -12,16 +12,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from pcii.base.srgb import srgb_to_linear
 from simgen.base.file_lookup import ImageName
-from simgen.base.strict_models import (
-    Colour,
-    NonNegative,
-    Positive,
-    Real,
-    Share,
-    Strict,
-    Whole,
-    completed_by,
-)
+from simgen.base.strict_models import Colour, NonNegative, Positive, Real, Share, Strict, Whole, completed_by
 from simgen.spec.lights import Illuminant, string_or_value
 from simgen.spectral.spectra import WAVELENGTH_NM, known_patch, patch_names
 
@@ -118,21 +109,14 @@ class Noise(_Pattern):
 
     @model_validator(mode="after")
     def _stays_physical(self) -> Self:
-        means = srgb_to_linear(np.array(self.colour)).tolist()
-        if max(_share_outside(mean, self.contrast) for mean in means) > CLIPPED_SHARE:
-            raise ValueError(
-                f"contrast: {self.contrast:g} puts more than {CLIPPED_SHARE:.0%} of the values outside "
-                "0 to 1; it must be smaller with this colour"
-            )
+        for mean in srgb_to_linear(np.array(self.colour)).tolist():
+            width = math.sqrt(2) * mean * self.contrast  # of a normal distribution about the mean
+            if width > 0 and (math.erfc(mean / width) + math.erfc((1 - mean) / width)) / 2 > CLIPPED_SHARE:
+                raise ValueError(
+                    f"contrast: {self.contrast:g} puts more than {CLIPPED_SHARE:.0%} of the values outside "
+                    "0 to 1; it must be smaller with this colour"
+                )
         return self
-
-
-def _share_outside(mean: float, contrast: float) -> float:
-    """Share outside 0 to 1 of normal values about `mean` with a deviation of `contrast` times that."""
-    deviation = mean * contrast
-    if deviation == 0:
-        return 0.0
-    return sum(math.erfc(room / deviation / math.sqrt(2)) / 2 for room in (mean, 1 - mean))
 
 
 Texture = Annotated[Checks | Stripes | Star | Edge | Text | Noise, Field(discriminator="type")]

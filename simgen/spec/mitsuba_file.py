@@ -5,7 +5,6 @@ looks at the file first: all that it names has to be inside the scene's folder.
 """
 
 import re
-from collections.abc import Iterator
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Self
 from xml.parsers import expat
@@ -14,18 +13,14 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
 from simgen.base.file_lookup import AssetName, asset
-from simgen.base.strict_models import Length, Position, Strict, shorten, shown_value
+from simgen.base.strict_models import Length, Position, Strict, shown_value
 
-LARGEST_BYTES = 1 << 24
-MOST_ELEMENTS = 100_000
-DEEPEST = 100
+LARGEST_BYTES, MOST_ELEMENTS, DEEPEST = 1 << 24, 100_000, 100
 """Limits of all files together that make up a scene; Mitsuba's own parser has none."""
 
 
 class MitsubaName(AssetName):
     """A Mitsuba scene: XML."""
-
-    __slots__ = ()
 
 
 class MitsubaFile(Strict):
@@ -63,13 +58,13 @@ MitsubaScene = Annotated[
 """The same by the name of its file alone."""
 
 
-def files_named_by(folder: Path, name: str) -> Iterator[str]:
+def files_named_by(folder: Path, name: str) -> list[str]:
     """Names, relative to the folder, of the files that a Mitsuba scene `name` in it reads, itself left out.
 
     Raises `InputError` that names file and line: for what is not XML or too large, for entities, for a
     plugin that is no plain name, for files that are missing or outside the folder.
     """
-    yield from dict.fromkeys(_XmlPass(folder).read(name))
+    return list(dict.fromkeys(_XmlPass(folder).read(name)))
 
 
 class _XmlPass:
@@ -110,10 +105,7 @@ class _XmlPass:
             file = values.get("filename") or (values.get("value") if is_name else None)
             if file is None:
                 return
-            try:
-                asset(self.folder, file, f"{path}: line {parser.CurrentLineNumber}")
-            except InputError as fault:
-                raise InputError(shorten(str(fault))) from None
+            asset(self.folder, file, f"{path}: line {parser.CurrentLineNumber}")
             names.append(file)
             if tag == "include":
                 names.extend(self.read(file, depth))
@@ -133,7 +125,6 @@ class _XmlPass:
 
     def _completed(self, value: str) -> str:
         """An attribute with the values of `<default>` in the place of their `$names`, as Mitsuba has it."""
-        if "$" in value:
-            for name in sorted(self.defaults, key=len, reverse=True):
-                value = value.replace(f"${name}", self.defaults[name])
+        for name in sorted(self.defaults, key=len, reverse=True):
+            value = value.replace(f"${name}", self.defaults[name])
         return value

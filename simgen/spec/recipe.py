@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -12,7 +12,7 @@ from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from pcii.exchange.dataset_card import Terms
-from simgen.base.file_lookup import find, recipe_roots
+from simgen.base.file_lookup import find, find_all
 from simgen.base.strict_models import (
     LARGEST_MM,
     Count,
@@ -112,7 +112,7 @@ class Grid(Strict):
             raise ValueError(f"focal_mm: {least_mm:g} mm or more is needed for views of this size")
         if self.lens is not None and self.shear_px != (0, 0):
             raise ValueError(
-                "shear_px: the film behind a lens cannot be shifted; leave out shear_px or [grid.lens]"
+                "shear_px: the film behind a lens cannot be shifted; leave out shear_px or the lens"
             )
         return self
 
@@ -181,11 +181,6 @@ class Sensor(Strict):
     def readout(self) -> Readout:
         """Frames, and where a pixel stops in each."""
         return Readout(self.frames, self.bits)
-
-    @property
-    def is_spectral(self) -> bool:
-        """Whether light is traced as spectra."""
-        return self.camera is not None
 
 
 class Photons(Strict):
@@ -308,15 +303,11 @@ class Recipe(Strict):
         paths = self.render.samples_per_pixel * grid.height * grid.width
         if paths >= MOST_PATHS:
             raise ValueError(
-                f"render.samples_per_pixel: a view of {grid.height} x {grid.width} pixels has {paths} paths; "
-                f"fewer than {MOST_PATHS} can be rendered at once"
+                f"render.samples_per_pixel: a view has {paths} paths; fewer than {MOST_PATHS} can be rendered"
             )
         if exposure is None:
             if self.photons.scope == "exposure" or self.sensor.full_light is not None:
-                raise ValueError(
-                    "exposure: photons.scope = 'exposure' and sensor.full_light need this table with "
-                    "f_number and time_s"
-                )
+                raise ValueError("exposure: photons.scope = 'exposure' and sensor.full_light need this table")
         elif grid.lens is not None:
             expected_mm = grid.focal_mm / exposure.f_number
             if abs(grid.lens.aperture_mm / expected_mm - 1) > APERTURE_TOLERANCE:
@@ -329,7 +320,7 @@ class Recipe(Strict):
     @property
     def is_spectral(self) -> bool:
         """Whether light is traced as spectra."""
-        return self.sensor.is_spectral
+        return self.sensor.camera is not None
 
     @property
     def cfa(self) -> str | None:
@@ -356,22 +347,31 @@ def override(values: dict[str, Any], overrides: Sequence[str]) -> None:
             target[last] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             if value.startswith(("[", "{")):
-                raise InputError(
-                    f"--set: {text!r} is no TOML; words in a list need quotation marks"
-                ) from None
+                raise InputError(f"--set: {text!r}: words in a list need quotation marks") from None
             target[last] = value
 
 
-def load_recipe(
-    name_or_path: str, overrides: Sequence[str] = (), *, trust_python: bool = False
-) -> tuple[Recipe, Path]:
-    """A recipe by path or shipped name, with `key=value` overrides; and its folder.
+class RecipeFile(NamedTuple):
+    """A recipe as its TOML file and overrides say, and the folder beside which its scene is looked up."""
 
-    With another scene the recipe's title and analysis are dropped but for what the overrides say. Raises
-    `InputError` for a recipe that is missing or wrong.
+    recipe: Recipe
+    folder: Path
+
+
+def load_recipe(
+    name_or_path: str | Path, overrides: Sequence[str] = (), *, trust_python: bool = False
+) -> RecipeFile:
+    """A recipe by the name of one that ships or by path; `overrides` such as "photons.budget=300".
+
+    With another scene the recipe's title and analysis are dropped but for what the overrides say. A file that
+    names a Python function as its scene is read only if its author is trusted, `trust_python`. Raises
+    `pcii.InputError` for a recipe that is missing or wrong, with the field at fault.
+
+    >>> load_recipe("paper", ["photons.budget=300"]).recipe.photons.budget
+    300.0
     """
-    values, source, recipe_folder = read_recipe(name_or_path, overrides, trust_python=trust_python)
-    return validate(Recipe, values, source), recipe_folder
+    values, source, folder = read_recipe(str(name_or_path), overrides, trust_python=trust_python)
+    return RecipeFile(validate(Recipe, values, source), folder)
 
 
 def read_recipe(
@@ -379,13 +379,12 @@ def read_recipe(
 ) -> tuple[dict[str, Any], str, Path]:
     """What a recipe and its overrides say, before it is checked; what to call both; and the folder.
 
-    Raises `InputError` for a file that names a Python function, unless its author is trusted to run code:
-    overrides are the person's own.
+    Overrides may name a Python function whatever is trusted: they are the person's own.
     """
     path = recipe_file(name_or_path)
     if path is None:
-        names = {file.stem for root in recipe_roots() for file in root.glob("*.toml")}
-        raise InputError(f"recipe: there is no {name_or_path!r}{suggestion(Path(name_or_path).stem, names)}")
+        hint = suggestion(Path(name_or_path).stem, recipe_names())
+        raise InputError(f"recipe: there is no {name_or_path!r}{hint}")
     written = read_toml(path)
     if not trust_python and ":" in str(written.get("scene", "")):
         raise InputError(
@@ -406,5 +405,10 @@ def recipe_file(name_or_path: str) -> Path | None:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    shipped = find(recipe_roots, f"{name_or_path.removesuffix('.toml')}.toml")
+    shipped = find(f"data_recipes/{name_or_path.removesuffix('.toml')}.toml")
     return shipped if path.parent == Path() else None
+
+
+def recipe_names() -> list[str]:
+    """Names of the recipes that ship or stand in the working directory."""
+    return sorted({file.stem for file in find_all("data_recipes/*.toml")})

@@ -6,6 +6,7 @@ World axes: X right, Y down, Z forward, the cameras in the plane Z = 0 looking a
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -18,14 +19,13 @@ from simgen.base.file_lookup import AssetName, asset, named_files
 from simgen.base.strict_models import (
     LARGEST_MM,
     LARGEST_TOML_BYTES,
-    LONGEST_PART,
     Length,
     Position,
     Real,
     Strict,
     Title,
     Vector,
-    shorten,
+    shown_value,
     suggestion,
     toml_text,
     validate,
@@ -129,8 +129,8 @@ class Scene(Strict):
     @field_validator("objects")
     @classmethod
     def _names_differ(cls, objects: tuple[SceneObject, ...]) -> tuple[SceneObject, ...]:
-        for name, count in Counter(thing.name for thing in objects).items():
-            if count > 1:
+        for name, uses in Counter(thing.name for thing in objects).items():
+            if uses > 1:
                 raise ValueError(f"two objects are named '{name}'; give each its own name")
         return objects
 
@@ -156,7 +156,7 @@ class Scene(Strict):
             if thing.name == name:
                 return thing
         known = suggestion(str(name), [thing.name for thing in self.objects])
-        raise InputError(f"scene: there is no object {shorten(repr(name), LONGEST_PART)}{known}")
+        raise InputError(f"scene: there is no object {shown_value(name)}{known}")
 
     def change(self, **fields: Any) -> Self:
         """A scene with other values of these fields, such as `lights`, `title` or `folder`."""
@@ -213,9 +213,7 @@ class Scene(Strict):
         out, text = Path(folder), toml_text(self).encode()
         entries(out, "scene")  # refuses a file
         if len(text) > LARGEST_TOML_BYTES:
-            raise InputError(
-                f"{out}: a scene.toml may have {LARGEST_TOML_BYTES} bytes, and this scene's has {len(text)}"
-            )
+            raise InputError(f"{out}: a scene.toml may have {LARGEST_TOML_BYTES} bytes, and this has more")
         source = checked_folder(self)
         files = {name: asset(source, name, where).read_bytes() for where, name in scene_files(self)}
         add_files_safely(out, {**files, "scene.toml": text}, overwrite=overwrite)
@@ -242,18 +240,15 @@ def checked_folder(scene: Scene, source: str = "scene") -> Path:
 
 
 def names_of_objects(names: Sequence[str], taken: Iterable[str] = ()) -> list[str]:
-    """Names like these of a file, as objects have them, each different and none of those `taken`."""
+    """Names like these, but as objects may have them, each different and none of those `taken`."""
     unique: list[str] = []
     used = set(taken)
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-") or "object"
         stem = (plain if plain[0].isalpha() else f"object-{plain}")[: LONGEST_NAME - 6]
-        candidate, number = stem, 1
-        while candidate in used:
-            number += 1
-            candidate = f"{stem}-{number}"
-        used.add(candidate)
-        unique.append(candidate)
+        candidates = chain([stem], (f"{stem}-{number}" for number in count(2)))
+        unique.append(next(candidate for candidate in candidates if candidate not in used))
+        used.add(unique[-1])
     return unique
 
 

@@ -18,8 +18,8 @@ from random import Random
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import package_of, registered
-from simgen.base.file_lookup import find, scene_roots
-from simgen.base.strict_models import LONGEST_PART, read_toml, shorten, suggestion
+from simgen.base.file_lookup import find, find_all
+from simgen.base.strict_models import read_toml, shown_value, suggestion
 from simgen.spec.recipe import SEED_LIMIT
 from simgen.spec.scene import Scene, scene_of
 
@@ -58,18 +58,18 @@ def find_scene(name_or_path: str, recipe_folder: Path | None = None) -> Path | N
 
     Raises `InputError` with a suggestion if there is neither.
     """
-    paths = [folder / name_or_path for folder in (recipe_folder, Path()) if folder is not None]
     with suppress(OSError):  # of a name that is too long for a file
-        for candidate in (file for path in paths for file in (path, path / "scene.toml")):
-            if candidate.is_file():
-                return candidate
-        if shipped := find(scene_roots, f"{name_or_path}/scene.toml"):
+        for path in (folder / name_or_path for folder in (recipe_folder, Path()) if folder is not None):
+            for candidate in (path, path / "scene.toml"):
+                if candidate.is_file():
+                    return candidate
+        if shipped := find(f"scenes/{name_or_path}/scene.toml"):
             return shipped
     known = drawn_scenes()
     if ":" in name_or_path or name_or_path in known:
         return None
-    shown = shorten(repr(name_or_path), LONGEST_PART)
-    raise InputError(f"scene: there is no scene {shown}{suggestion(name_or_path, [*scene_names(), *known])}")
+    hint = suggestion(name_or_path, [*scene_names(), *known])
+    raise InputError(f"scene: there is no scene {shown_value(name_or_path)}{hint}")
 
 
 def is_scene(name_or_path: str) -> bool:
@@ -78,28 +78,22 @@ def is_scene(name_or_path: str) -> bool:
     if path.is_file():
         values = read_toml(path)
         return "scene" not in values and bool({"lights", "objects", "mitsuba"} & set(values))
-    if path.is_dir():
-        return True
-    try:
+    with suppress(InputError):
         find_scene(name_or_path)
-    except InputError:
-        return False
-    return True
+        return True
+    return path.is_dir()
 
 
 def scene_names() -> list[str]:
     """Names of the scenes that ship or stand in the working directory, drawn ones left out."""
-    return sorted({file.parent.name for root in scene_roots() for file in root.glob("*/scene.toml")})
+    return sorted({file.parent.name for file in find_all("scenes/*/scene.toml")})
 
 
 def _draw(name: str, recipe_folder: Path, number: int | None) -> tuple[Scene, Path]:
     """The scene that a function draws, its number in its title, and the folder of its files."""
-    if type(number) is not int or not 0 <= number < SEED_LIMIT:
-        raise InputError(
-            f"scene_number: {name} is drawn by number, from 0 to 2^63 - 1; say which one, such as "
-            "scene_number = 0 in a recipe or --scene 0"
-        )
     label = f"scene: {name!r}"
+    if type(number) is not int or not 0 <= number < SEED_LIMIT:
+        raise InputError(f"{label} is drawn by number; give a scene_number from 0 to 2^63 - 1")
     try:
         function = _function(name, recipe_folder)
         scene = function(Random(f"{function.__name__.removeprefix('drawn_')} {number}"))

@@ -7,6 +7,7 @@ A field that takes one value may have a list, any field `{ each = [...] }`, and 
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
+import numpy as np
 from pydantic import BaseModel
 
 from pcii.base.errors import InputError
@@ -72,11 +74,8 @@ class Sweep:
 
     def values(self, number: int) -> dict[str, Any]:
         """Value of each swept field of a dataset, the last field varying fastest."""
-        values = {}
-        for axis in reversed(self.axes):
-            number, place = divmod(number, len(axis.values))
-            values[axis.field] = axis.values[place]
-        return {field: values[field] for field in self.fields}
+        places = np.unravel_index(number, [len(axis.values) for axis in self.axes])
+        return {axis.field: axis.values[int(place)] for axis, place in zip(self.axes, places, strict=True)}
 
     def folder(self, number: int) -> str:
         """Name of a dataset's folder: its values, the same whatever other values there are."""
@@ -105,15 +104,14 @@ class Sweep:
     def check(self) -> None:
         """Raise `InputError` for a value with which there is no recipe, or no scene."""
         first = self.values(0)
-        scenes = [self._recipe_with(first).scene]
+        scenes = {self._recipe_with(first).scene}
         for axis in self.axes:
             # Of a range the ends decide: whole numbers are bounded from below and above.
             is_range = isinstance(axis.values, range)
-            for value in (axis.values[0], axis.values[-1]) if is_range else axis.values:
-                scenes.append(self._recipe_with(first | {axis.field: value}).scene)
-        if self.axes:
-            for scene in dict.fromkeys(scenes):
-                find_scene(scene, self.recipe_folder)
+            values = (axis.values[0], axis.values[-1]) if is_range else axis.values
+            scenes |= {self._recipe_with(first | {axis.field: value}).scene for value in values}
+        for scene in scenes:
+            find_scene(scene, self.recipe_folder)
 
 
 def load_sweep(
@@ -127,7 +125,7 @@ def load_sweep(
     """A recipe whose fields may have several values, by path or shipped name and `overrides` as for one.
 
     The name of a scene alone means a recipe that says nothing else, with the paper's cameras and photons.
-    `seeds` and `scenes` are so many seeds and draws of the scene, from the recipe's own on. Raises
+    `seeds` and `scenes` are the numbers of seeds and draws of the scene, from the recipe's own on. Raises
     `InputError` for a recipe that is missing or wrong, for a field without values, with the same value twice,
     or swept twice, and for more than `MOST_DATASETS`.
     """
@@ -141,12 +139,17 @@ def load_sweep(
                 raise InputError(f"{option}: expected a whole number from 1, got {count}")
             written[field] = {"range": [first, first + count]}
     swept = dict(sorted(_swept(written, Recipe, ""), key=lambda item: _ORDER.get(item[0], 0)))
-    labels = _labels(list(swept))
-    axes = tuple(Axis(field, _values(field, value, source), labels[field]) for field, value in swept.items())
-    for axis in axes:
+    # Folders call a field by the last part of its name, or by all of it where that is not unique.
+    short = {field: _SHORT_NAMES.get(field, field.rsplit(".", 1)[-1]) for field in swept}
+    uses = Counter(short.values())
+    axes: list[Axis] = []
+    for field, value in swept.items():
+        label = short[field] if uses[short[field]] == 1 else field.replace(".", "-")
+        axis = Axis(field, _values(field, value, source), label)
+        axes.append(axis)
         if len({axis.name_of(value) for value in axis.values}) < len(axis.values):
             raise InputError(f"{source}: {axis.field}: gives a value twice; each makes one dataset")
-    sweep = Sweep(written, axes, source, recipe_folder)
+    sweep = Sweep(written, tuple(axes), source, recipe_folder)
     if len(sweep) > MOST_DATASETS:
         raise InputError(f"{source}: {len(sweep)} datasets; at most {MOST_DATASETS} can be made at once")
     sweep.check()
@@ -213,12 +216,3 @@ def _values(field: str, written: Any, source: str) -> Sequence[Any]:
     if values[MOST_DATASETS:]:
         raise InputError(f"{source}: {field}: at most {MOST_DATASETS} values can be swept over")
     return values
-
-
-def _labels(fields: Sequence[str]) -> dict[str, str]:
-    """What names of folders call swept fields: the last part of the name, or all where that is not unique."""
-    short = {field: _SHORT_NAMES.get(field, field.rsplit(".", 1)[-1]) for field in fields}
-    names = list(short.values())
-    return {
-        field: name if names.count(name) == 1 else field.replace(".", "-") for field, name in short.items()
-    }

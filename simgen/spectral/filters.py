@@ -15,16 +15,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from simgen.base.strict_models import suggestion
-from simgen.spectral.spectra import (
-    PEAK_NM,
-    WAVELENGTH_NM,
-    colour_science,
-    integral,
-    measured,
-    observer,
-    resampled,
-)
+from simgen.spectral.spectra import WAVELENGTH_NM, colour_science, integral, measured, observer, resampled
 
+PEAK_NM = 555.0
+"""Where a lumen is 1/683 W."""
 HEROES = 4
 """Wavelengths that the renderer's spectral variants follow along one path."""
 CELLS = 512
@@ -81,11 +75,8 @@ class Filters:
         low = self.wavelength_nm[colour[:, None], cell].astype(np.float64)
         width = self.wavelength_nm[colour[:, None], cell + 1] - low
         drawn_nm = low + width * (place - cell)
-        weight = np.empty(drawn_nm.shape)
-        for number, curve in enumerate(self.sensitivity):
-            mask = colour == number
-            weight[mask] = np.interp(drawn_nm[mask], WAVELENGTH_NM, curve)
-        return drawn_nm, weight * width * (CELLS / HEROES)
+        seen = np.array([np.interp(drawn_nm, WAVELENGTH_NM, curve) for curve in self.sensitivity])
+        return drawn_nm, seen[colour, np.arange(len(colour))] * width * (CELLS / HEROES)
 
 
 def filters_for(curves: np.ndarray, light: np.ndarray) -> Filters:
@@ -134,11 +125,10 @@ def _read_csv(path: Path) -> tuple[np.ndarray, np.ndarray]:
     except (OSError, ValueError, csv.Error):
         head, table = [], np.zeros((0, 0))
     is_head = head == CSV_HEAD or (len(head) == 2 and head[0] == CSV_HEAD[0])
-    if not is_head or table.ndim != 2 or table.shape[1] != len(head):
+    is_table = is_head and table.ndim == 2 and table.shape[1] == len(head) and np.isfinite(table).all()
+    if not is_table or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
         raise InputError(
             f"{path}: expected the head {','.join(CSV_HEAD)}, or {CSV_HEAD[0]} and a name of one curve, and "
-            "rows of as many numbers"
+            "rows of as many numbers: growing wavelengths, and sensitivities that are finite and not negative"
         )
-    if not np.isfinite(table).all() or (table[:, 1:] < 0).any() or (np.diff(table[:, 0]) <= 0).any():
-        raise InputError(f"{path}: wavelengths must grow and sensitivities be finite and not negative")
     return table[:, 0], table[:, 1:]

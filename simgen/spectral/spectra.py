@@ -21,8 +21,6 @@ from simgen.base.strict_models import suggestion
 FROM_XYZ = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]])
 """From CIE XYZ to linear sRGB."""
 WAVELENGTH_NM = np.arange(380.0, 781.0)
-PEAK_NM = 555.0
-"""Where a lumen is 1/683 W."""
 DAYLIGHT = "D65"
 """The white of sRGB."""
 CHART = "ColorChecker N Ohta"
@@ -63,29 +61,28 @@ def measured(table: Any, *, outside: float | None = None) -> np.ndarray:
 def _standard() -> dict[str, dict[str, np.ndarray]]:
     """Spectra at `WAVELENGTH_NM` by kind and name; kept on the machine, since colour takes long to load."""
     depends_on = version("colour-science"), version("scipy"), Path(__file__).read_text()
-    return cached("spectra", depends_on, _from_colour_science, _as_arrays)
+
+    def as_arrays(values: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
+        return {kind: {name: np.array(values[kind][name]) for name in values[kind]} for kind in KINDS}
+
+    return cached("spectra", depends_on, _from_colour_science, as_arrays)
 
 
 def _from_colour_science() -> dict[str, dict[str, Any]]:
-    colour = colour_science()
+    colour, (first_nm, last_nm) = colour_science(), WAVELENGTH_NM[[0, -1]]
     tables = {
         OBSERVERS: {OBSERVER: colour.MSDS_CMFS[OBSERVER]},
-        ILLUMINANTS: {name: one for name, one in colour.SDS_ILLUMINANTS.items() if _covers_wavelengths(one)},
+        ILLUMINANTS: {
+            name: table
+            for name, table in colour.SDS_ILLUMINANTS.items()
+            if table.wavelengths[0] <= first_nm and table.wavelengths[-1] >= last_nm
+        },
         # Without the densities that follow the names of the grey ones.
         PATCHES: {name.split(" (")[0]: one for name, one in colour.SDS_COLOURCHECKERS[CHART].items()},
     }
     return {
         kind: {name: measured(table).tolist() for name, table in own.items()} for kind, own in tables.items()
     }
-
-
-def _as_arrays(values: dict[str, dict[str, Any]]) -> dict[str, dict[str, np.ndarray]]:
-    """The spectra as arrays; raises KeyError unless all kinds are there."""
-    return {kind: {name: np.array(values[kind][name]) for name in values[kind]} for kind in KINDS}
-
-
-def _covers_wavelengths(table: Any) -> bool:
-    return bool(table.wavelengths[0] <= WAVELENGTH_NM[0] and table.wavelengths[-1] >= WAVELENGTH_NM[-1])
 
 
 def illuminant_names() -> list[str]:

@@ -14,8 +14,8 @@ from pcii.base.progress import Report, silent
 from pcii.core.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, Cameras, Rig, as_rig, centre_camera
 from simgen.renderer.intersection import blocked, first_objects
-from simgen.renderer.mitsuba_camera import sensor_plugin
 from simgen.renderer.mitsuba_scene import RenderScene
+from simgen.renderer.radiance import sensor_plugin
 
 IN_FOCUS_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""
@@ -111,28 +111,18 @@ def coverage(render_scene: RenderScene, camera: Camera, object_id: np.ndarray) -
     pixel is sampled if it lies at the frame or one of its eight neighbours has another id, else its share is
     1: what is lost is only what passes between the centres of pixels.
     """
-    share = np.ones(object_id.shape, dtype=np.float32)
-    row, col = np.nonzero(_is_at_edge(object_id))
-    down, right = _lattice()
+    share, number = np.ones(object_id.shape, dtype=np.float32), np.arange(COVERAGE_SAMPLES)
+    down = (number + 0.5) / COVERAGE_SAMPLES - 0.5
+    right = (number * LATTICE_GENERATOR % COVERAGE_SAMPLES + 0.5) / COVERAGE_SAMPLES - 0.5
+    # No object has the id -1: what stands beyond the frame is another for all we know.
+    framed = np.pad(object_id, 1, constant_values=-1)
+    row, col = np.nonzero(over_squares(np.maximum, framed, 3) != over_squares(np.minimum, framed, 3))
     for start in range(0, row.size, PIXELS_AT_ONCE):
         i, j = row[start : start + PIXELS_AT_ONCE], col[start : start + PIXELS_AT_ONCE]
         rays = camera.towards(i[:, None] + down, j[:, None] + right).reshape(-1, 3)
         hit_id = first_objects(render_scene, camera.position_mm, rays).reshape(i.size, COVERAGE_SAMPLES)
         share[i, j] = (hit_id == object_id[i, j, None]).mean(axis=1)
     return share
-
-
-def _lattice() -> tuple[np.ndarray, np.ndarray]:
-    """Offsets (row, column) from a pixel's centre of points that are spread evenly over its square."""
-    number = np.arange(COVERAGE_SAMPLES)
-    row, col = number, number * LATTICE_GENERATOR % COVERAGE_SAMPLES
-    return (row + 0.5) / COVERAGE_SAMPLES - 0.5, (col + 0.5) / COVERAGE_SAMPLES - 0.5
-
-
-def _is_at_edge(object_id: np.ndarray) -> np.ndarray:
-    # No object has the id -1: what stands beyond the frame is another for all we know.
-    framed = np.pad(object_id, 1, constant_values=-1)
-    return over_squares(np.maximum, framed, 3) != over_squares(np.minimum, framed, 3)
 
 
 def visible_views(

@@ -1,6 +1,5 @@
 """The truth of a dataset on disk: every pass at the virtual centre, and of every view on request."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -24,32 +23,27 @@ from simgen.truth.first_hits import (
 RAYS = "visibility_rays"
 
 
-@dataclass(frozen=True)
-class TruthRequest:
-    """What is wanted of the truth: products, planes of which to say what is in focus, poses of cameras."""
-
-    products: Products
-    planes_mm: tuple[float, ...]
-    camera_poses: bool
-
-
 def write_truth(
-    request: TruthRequest, render_scene: RenderScene, rig: Rig, out: Path, report: Report
+    products: Products,
+    planes_mm: tuple[float, ...],
+    with_poses: bool,
+    render_scene: RenderScene,
+    rig: Rig,
+    out: Path,
+    report: Report,
 ) -> None:
-    """Write what is asked for, unless it is there already; one view in memory at a time."""
-    if (out / TRUTH).is_dir():
-        return
-    grid, products, planes = rig.grid, request.products, request.planes_mm
+    """Write these products, what is in focus at these planes, and poses of cameras; one view at a time."""
+    grid = rig.grid
     with new_group_safely(out / TRUTH, {}) as group:
         if products.truth:
             centre = first_hits_at_centre(render_scene, grid)
             for name in ("z_mm", "object_id", "normal"):
                 _store(group, name, getattr(centre, name))
             _store(group, "coverage", coverage(render_scene, centre_camera(grid), centre.object_id))
-            if planes:
-                _store(group, "in_focus", in_focus(grid, centre.z_mm, planes))
-                group.attrs["in_focus_z_mm"] = list(planes)
-            if request.camera_poses:
+            if planes_mm:
+                _store(group, "in_focus", in_focus(grid, centre.z_mm, planes_mm))
+                group.attrs["in_focus_z_mm"] = list(planes_mm)
+            if with_poses:
                 _store(group, "camera_position_mm", rig.position_mm)
                 _store(group, "camera_rotation", rig.rotation)
             if products.visibility:

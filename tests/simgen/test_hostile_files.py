@@ -62,7 +62,6 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "no coordinates": ("a.ply", ply().replace(b"float x", b"float q"), "no vertices with x, y and z"),
     "index of an OBJ": ("a.obj", obj("f 1 2 2000000000"), "line 5 that cannot be used: 'f 1 2 2000000000'"),
     "index 0": ("a.obj", obj("f 0 1 2"), "line 5"),
-    "call": ("a.obj", obj("call /etc/passwd"), "line 5 that cannot be used: 'call /etc/passwd'"),
     "empty": ("a.obj", b"", "has no faces"),
     "XML": ("scene.xml", b"<scene version='3.0.0'/>", "not named .ply or .obj"),
     "bomb": ("a.png", png(width=60_000, height=60_000, data=BOMB), "60000 x 60000 px, and at most 67108864"),
@@ -72,7 +71,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "two pictures": ("a.png", animation(), "holds 2 pictures"),
     "clear": ("a.png", picture("RGBA", "PNG"), "not opaque everywhere"),
     "CMYK": ("a.jpg", picture("CMYK", "JPEG"), "a CMYK picture"),
-    "real numbers": ("a.tif", picture("F", "TIFF"), "a picture of float32"),
+    "real numbers": ("a.tif", picture("F", "TIFF"), "channels of float32; save one page"),
     "no picture": ("a.png", b"", "not a PNG, JPEG or TIFF"),
     "huge directory": ("a.tif", b"II*\0\x08\0\0\0" + b"\xff" * 4000, "cannot be read"),
 }
@@ -174,13 +173,13 @@ def test_environments_that_cannot_shine(tmp_path: Path) -> None:
     (tmp_path / "large.exr").write_bytes(large)
     (tmp_path / "sky.hdr").write_bytes(b"#?RADIANCE\n")
     for path, message in (
-        (exr("nan.exr", np.nan * ones), "the value nan"),
-        (exr("negative.exr", -ones), "the value -1"),
-        (exr("grey.exr", ones[..., :1]), "4 x 8 pixels with 1 channels; .* twice as wide as high, with R, G"),
-        (exr("square.exr", ones[:, :4]), "4 x 4 pixels with 3 channels; .* twice as wide as high"),
+        (exr("nan.exr", np.nan * ones), "not finite"),
+        (exr("negative.exr", -ones), "negative"),
+        (exr("grey.exr", ones[..., :1]), "4 x 8 px, 1 channels .* R, G and B, twice as wide as high"),
+        (exr("square.exr", ones[:, :4]), "4 x 4 px, 3 channels .* twice as wide as high"),
         (tmp_path / "truncated.exr", "damaged or cut off"),
         (tmp_path / "large.exr", "100000 x 100000 px, and at most"),
-        (tmp_path / "sky.hdr", "convert it to OpenEXR"),
+        (tmp_path / "sky.hdr", "not an EXR picture"),
     ):
         with pytest.raises(InputError, match=message) as caught:
             read_environment(path)

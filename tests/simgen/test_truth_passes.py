@@ -1,5 +1,6 @@
 """Depth, normals, coverage, visibility and focus against what can be written down."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
 from pcii.metrics.true_masks import TrueFocus
 from simgen.cameras.rig import as_rig, centre_camera
-from simgen.renderer import backend, mitsuba_camera
+from simgen.renderer import backend, radiance
 from simgen.renderer.mitsuba_scene import build
 from simgen.truth import first_hits
 from simgen.truth.first_hits import (
@@ -29,6 +30,12 @@ from simgen.truth.first_hits import (
 pytestmark = pytest.mark.renders
 WHITE = {"reflectance": [1, 1, 1]}
 CENTRE, RADIUS = np.array([20.0, -15.0, 650.0]), 60.0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def variant_is_put_back() -> Iterator[None]:
+    yield
+    backend.load()
 
 
 def directions(of: CameraGrid, fine: int = 1) -> np.ndarray:
@@ -57,7 +64,7 @@ def test_depth_is_planar_in_every_view_whatever_the_near_clip(
     near_clip_mm: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The renderer's own depth counts from the near clip plane: 10 mm would be an error of 1.5 %.
-    monkeypatch.setattr(mitsuba_camera, "NEAR_CLIP_MM", near_clip_mm)
+    monkeypatch.setattr(radiance, "NEAR_CLIP_MM", near_clip_mm)
     of = grid(2, 2, 96, 120)
     rays = directions(of)
     scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)], backdrop_mm=None)
@@ -108,9 +115,10 @@ def test_the_virtual_centre_of_an_even_grid_stands_between_cameras(tmp_path: Pat
         assert np.abs(own - [30, 40]).min() > 2
 
 
-def test_coverage_is_the_area_that_the_object_has_of_the_pixel(tmp_path: Path) -> None:
+@pytest.mark.parametrize("spectral", [False, True], ids=["colours", "spectra"])
+def test_coverage_is_the_area_that_the_object_has_of_the_pixel(tmp_path: Path, spectral: bool) -> None:
     of = grid(1, 1, 48, 60, pixel_mm=0.1408)
-    scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)])
+    scene = built(tmp_path, [sphere("ball", (20.0, -15.0, 650.0), RADIUS)], spectral=spectral)
     ids = first_hits_at_centre(scene, of).object_id
     found = coverage(scene, centre_camera(of), ids)
     fine = np.isfinite(on_sphere(directions(of, 32))).reshape(48, 32, 60, 32)

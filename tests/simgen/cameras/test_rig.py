@@ -19,8 +19,8 @@ from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
-from simgen.renderer.mitsuba_camera import film_rays
 from simgen.renderer.mitsuba_scene import RenderScene, build
+from simgen.renderer.path_tracing import film_rays
 from simgen.renderer.radiance import render_view
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Lens, Photons, Recipe

@@ -17,7 +17,7 @@ from simgen.check.light import cost_findings, in_time, photon_findings, photons_
 from simgen.check.scene_probe import Facts, Finding, ObjectFacts, coarser, probe_scene
 from simgen.check.sight import sight_findings
 from simgen.check.targets import findings
-from simgen.dataset.prepared import Prepared, needs_of
+from simgen.dataset.prepared import Prepared
 from simgen.dataset.resources import in_bytes, peak_bytes, product_bytes
 from simgen.photons.counting_plan import Plan
 from simgen.spec.recipe import Recipe
@@ -52,7 +52,6 @@ def facts(*objects: ObjectFacts, recipe: dict[str, Any] | None = None, **more: A
         "hit_s": 1e-7,
         "is_compiled": True,
         "memory_bytes": 1e12,
-        "pixel_px": 2.0,
     }
     return Facts(target=target_of(recipe or {}, **scene), objects=objects, **(known | more))
 
@@ -240,10 +239,9 @@ def test_without_counts_or_light_there_is_nothing_to_say_of_photons() -> None:
 def test_sizes_memory_and_time_by_hand() -> None:
     recipe = {"products": {"radiance": "mosaic", "view_truth": True}, "render": {"samples_per_pixel": 2}}
     known, pixels = facts(recipe=recipe), 1024**2
-    needs = needs_of(known.target.recipe)
-    sizes = product_bytes(needs, known.plan)
+    sizes = product_bytes(known.target.recipe, known.plan)
     assert sizes == {"counts": 16 * 1e5, "radiance": 400 * pixels, "truth": 6 * 101 * pixels}
-    assert peak_bytes(needs, known.plan) == 4e8 + 165 * pixels  # truth is written view by view
+    assert peak_bytes(known.target.recipe, known.plan) == 4e8 + 165 * pixels  # truth is written view by view
     paths = 1e-7 * (101 * pixels + 200 * pixels)
     assert seconds(known) == pytest.approx(paths + 1e-7 * 1.5 / 0.065 * 1e5)
     plan = Plan(thins=False, samples=5, photons_per_view=1e9, why_rendered="mirrors shine")

@@ -128,7 +128,7 @@ def test_another_recipe_a_dataset_and_a_file_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="collection of another recipe"):
         generate_collection(sweep_of(recipe_file, 3, "grid.cols=2"), collection)
-    with pytest.raises(InputError, match="of other swept fields"):
+    with pytest.raises(InputError, match="another recipe"):
         generate_collection(load_sweep(str(recipe_file)), collection)
     with pytest.raises(InputError, match="holds a single dataset"):
         generate_collection(sweep_of(recipe_file), collection / "budget_100_seed_7")
@@ -159,7 +159,7 @@ def test_other_software_neither_extends_a_collection_nor_works_on_it(
     monkeypatch.setattr(software, "version", lambda name: "9.9" if name == "mitsuba" else original(name))
     with pytest.raises(InputError, match=r"holds the collection of other software.* is now 9\.9"):
         generate_collection(sweep_of(recipe_file, 4), collection)
-    with pytest.raises(InputError, match=r"other software \(mitsuba .* is now 9\.9\); install"):
+    with pytest.raises(InputError, match=r"other software.* \(mitsuba .* is now 9\.9\).* install"):
         job(0)
     assert list(tmp_path.iterdir()) == []
 

@@ -10,7 +10,7 @@ import tomli_w
 from pydantic import BaseModel
 
 from pcii.store import software
-from simgen.base.file_lookup import recipe_roots
+from simgen.base.file_lookup import find_all
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import Recipe, load_recipe
 from simgen.spec.scene import Scene
@@ -159,7 +159,7 @@ def test_how_a_recipe_and_a_scene_are_written_changes_nothing(near: Path) -> Non
 
 
 def test_defaults_may_be_written_out_in_every_recipe_that_ships() -> None:
-    files = [file for root in recipe_roots() for file in root.glob("*.toml")]
+    files = find_all("data_recipes/*.toml")
     assert len(files) > 20
     for file in files:
         recipe, near = load_recipe(str(file))

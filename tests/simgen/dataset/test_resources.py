@@ -10,8 +10,7 @@ import pytest
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from simgen.app import commands as cli
-from simgen.dataset.prepared import needs_of
-from simgen.dataset.resources import Needs, check_resources, peak_bytes, shortage
+from simgen.dataset.resources import check_resources, peak_bytes, shortage
 from simgen.photons.counting_plan import Plan
 from simgen.spec.recipe import Recipe
 
@@ -20,8 +19,8 @@ DEPTHS_MM = (500.0, 600.0, 3000.0)
 THINS = Plan(thins=True, samples=1, photons_per_view=1e3, depths_mm=DEPTHS_MM)
 
 
-def needs(**values: Any) -> Needs:
-    return needs_of(Recipe.model_validate({"scene": "two_objects", **values}))
+def recipe(**values: Any) -> Recipe:
+    return Recipe.model_validate({"scene": "two_objects", **values})
 
 
 TOO_MUCH: list[tuple[dict[str, Any], str]] = [
@@ -40,18 +39,18 @@ def test_what_does_not_fit_is_named_by_its_field(values: dict[str, Any], field: 
     plan = None if field == "grid.rows" else THINS  # whose photons grow with the views
     if field == "photons.budget":
         plan = replace(THINS, photons_per_view=1e6)
-    sentence = shortage(needs(**values), plan, ROOM)
+    sentence = shortage(recipe(**values), plan, ROOM)
     assert sentence is not None
     assert sentence.startswith(field)
     assert "this machine has 8 GB available" in sentence
 
 
 def test_ordinary_recipes_fit() -> None:
-    assert shortage(needs(), THINS, ROOM) is None
-    assert shortage(needs(sensor={"hot_pixel_share": 0.01, "dark_counts": 1e-3}), THINS, ROOM) is None
+    assert shortage(recipe(), THINS, ROOM) is None
+    assert shortage(recipe(sensor={"hot_pixel_share": 0.01, "dark_counts": 1e-3}), THINS, ROOM) is None
     # In rendered views there are no more photons than pixels: 100 x 1024 x 1024 of 200 B.
     bright = replace(THINS, thins=False, photons_per_view=1e15)
-    assert peak_bytes(needs(), bright) == 4e8 + 200 * 100 * 1024**2
+    assert peak_bytes(recipe(), bright) == 4e8 + 200 * 100 * 1024**2
 
 
 class Usage(NamedTuple):
@@ -63,11 +62,11 @@ class Usage(NamedTuple):
 def test_a_disk_that_is_too_small_is_named_unless_views_are_there(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    wanted = needs(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
+    wanted = recipe(products={"radiance": "rgb"})  # 100 views of 12.6 MB, of which half is written at least
     monkeypatch.setattr(shutil, "disk_usage", lambda _: Usage(6e8))
     with pytest.raises(InputError, match=r"products\.radiance: rendered views .* 630 MB .* has 600 MB left"):
         check_resources(wanted, None, tmp_path / "new" / "out")
-    check_resources(needs(), None, tmp_path / "out")
+    check_resources(recipe(), None, tmp_path / "out")
     (tmp_path / "radiance").mkdir()
     with (tmp_path / "radiance" / "view_00_00.exr").open("wb") as file:
         file.truncate(1 << 26)

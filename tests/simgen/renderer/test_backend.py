@@ -31,9 +31,10 @@ def trials(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the libraries that were tried: 19 works, others end the trial process."""
     names: list[str] = []
 
-    def probe(kind: str, library: str) -> tuple[bool, str]:
+    def probe(kind: str, library: str) -> dict[str, bool | str]:
         names.append(Path(library).name)
-        return (True, "works") if ".so.19" in library else (False, "ended with signal 6")
+        works = ".so.19" in library
+        return {"works": works, "detail": "works" if works else "ended with signal 6"}
 
     monkeypatch.setattr(backend, "_probe", probe)
     return names

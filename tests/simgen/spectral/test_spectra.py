@@ -126,7 +126,7 @@ def test_sensitivities_come_from_a_csv_file_too(tmp_path: Path) -> None:
         ("wavelength_nm,R,G,B\n400,1,2\n", "expected the head wavelength_nm,R,G,B"),
         ("wavelength_nm,B,G,R\n400,1,1,2\n500,1,1,1\n", "expected the head wavelength_nm,R,G,B"),
         ("wavelength_nm,R,G,B\n400,1,nan,2\n500,1,1,1\n", "finite"),
-        ("wavelength_nm,R,G,B\n500,1,1,2\n400,1,1,1\n", "grow"),
+        ("wavelength_nm,R,G,B\n500,1,1,2\n400,1,1,1\n", "growing"),
         ("wavelength_nm,R,G,B\n400,0,1,2\n500,0,1,1\n", "sees no light from 380 to 780 nm"),
     ],
 )
