@@ -13,7 +13,7 @@ from pcii.base.progress import Stages
 from pcii.core.arrays import check_z_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import check_photons, limit_photons
+from pcii.core.photon_limit import Light, limit_photons
 from pcii.importing.camera_order import Optics
 from pcii.importing.import_advice import checked
 from pcii.importing.import_requests import Imported, Request, ViewOptions, WholePair, read
@@ -209,7 +209,7 @@ def import_dataset(source: Path, *, out: Out, options: ImportOptions = NOTHING_S
     if said.z_range_mm is not None:
         check_depth_range(said.z_range_mm)
     if photons is not None:
-        check_photons(photons)
+        Light.per_view(photons)
         if asked.views.counts:
             raise InputError("--photons: is for pictures; these are photon counts already")
     held_dataset(out, None, content=False)

@@ -42,7 +42,7 @@ class FocalPlanes(ShortForm):
     """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
         object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
         across, down = np.abs(disparity_px(self.grid, self.z_mm))
         with np.errstate(over="ignore"):
@@ -75,7 +75,7 @@ class FocalPlanes(ShortForm):
         [500.0, 1000.0]
         """
         total = np.atleast_1d(np.asarray(total_disparity_px, dtype=np.float64))
-        return cls(grid, depth_of_total_disparity_mm(grid, total), total)
+        return cls(grid, check_z_mm(depth_of_total_disparity_mm(grid, total)), total)
 
     @classmethod
     def between(cls, grid: CameraGrid, z_near_mm: float, z_far_mm: float, step_px: float) -> "FocalPlanes":

@@ -7,14 +7,11 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.core.array_labels import VIEWS_LABELS, labelled_dataset
 from pcii.core.arrays import check_unmasked, read_only
-from pcii.core.bayer import check_cfa
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.view_figures import chosen_camera, draw_view, light_picture, middle_camera, view_thumbnail
+from pcii.core.bayer import check_cfa, colours_and_samples
+from pcii.core.camera_grid import CameraGrid, check_camera, middle_camera
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 
@@ -69,23 +66,10 @@ class Views(ShortForm):
     def _facts(self) -> dict[str, object]:
         return {"shape": times(self.radiance.shape), "cfa": self.cfa}
 
-    def _thumbnails(self) -> dict[str, str]:
-        k, l = middle_camera(self.grid)
-        try:
-            picture = light_picture(self.view(k, l), self.cfa)
-            return {f"view ({k}, {l})": view_thumbnail(picture, self.grid)}
-        except (InputError, OSError):  # no number, or no file: the rest can still be shown
-            return {}
-
     @property
     def channel_count(self) -> int:
         """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """`radiance` over cameras, pixels and channels; views on disk are all read."""
-        arrays = {"radiance": np.asarray(self.radiance)}
-        return labelled_dataset(arrays, VIEWS_LABELS, grid=self.grid, cfa=self.cfa)
 
     def plot(
         self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
@@ -96,14 +80,16 @@ class Views(ShortForm):
         is lit is white. A mosaic's pixels take the colours that they lack from those around. `axes` are by
         default those of a new figure. Raises `InputError` for a camera outside the grid, or NaN or infinity.
         """
-        camera = chosen_camera(self.grid, view)
-        if camera is not None:
-            light, title = self.view(*camera), f"view {camera}"
-        else:
+        from pcii.figures.plots import plot_view
+
+        if view == "mean":
             light, title = np.zeros(self.radiance.shape[2:]), "mean of all views"
             for k, l in np.ndindex(*self.radiance.shape[:2]):
                 light += self.view(k, l) / self.grid.view_count
-        return draw_view(axes, light_picture(light, self.cfa), self.grid, title)
+        else:
+            k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
+            light, title = self.view(k, l), f"view ({k}, {l})"
+        return plot_view(axes, colours_and_samples(light, self.cfa), title)
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm
-from pcii.core.arrays import read_only, whole_counts
+from pcii.core.arrays import is_whole, read_only, whole_counts
 from pcii.core.camera_grid import CameraGrid
 
 MOST_FRAMES = 1 << 24
@@ -55,13 +55,6 @@ class FrameEvents(ShortForm):
         return {"counts": self.frame.size}
 
 
-def _number(name: str, value: int, most: int) -> int:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not (whole and 1 <= value <= most):
-        raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
-    return int(value)
-
-
 @dataclass(frozen=True)
 class Readout:
     """An exposure of equal `frames`, in each of which a pixel stops at 2^`bits` - 1 counts.
@@ -73,9 +66,12 @@ class Readout:
     bits: int | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", _number("frames", self.frames, MOST_FRAMES))
-        if self.bits is not None:
-            object.__setattr__(self, "bits", _number("bits", self.bits, MOST_BITS))
+        for name, value, most in (("frames", self.frames, MOST_FRAMES), ("bits", self.bits, MOST_BITS)):
+            if name == "bits" and value is None:
+                continue
+            if not is_whole(value) or not 1 <= value <= most:
+                raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
+            object.__setattr__(self, name, int(value))
 
     @property
     def is_plain(self) -> bool:

@@ -1,18 +1,16 @@
 """Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
@@ -100,33 +98,9 @@ class Truth(ShortForm):
         The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
         two, by default of a new figure. Raises `InputError` for another number.
         """
-        from pcii.figures.maps import draw_depth
-        from pcii.figures.object_maps import draw_objects, named_width
-        from pcii.figures.panels import several_axes
+        from pcii.figures.plots import plot_truth
 
-        height, width = self.z_mm.shape
-        panels = several_axes(axes, 2, self.z_mm.shape, widths=(1.0, named_width(width / height)))
-        title = "true depth of the objects" if self.has_objects else "true depth"
-        draw_depth(panels[0], self.object_z_mm, None, z_range_mm, title)
-        draw_objects(panels[1], self.object_id, self.names)
-        return panels
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """The maps that are known, over pixels, and `photon_...` (photon,) for each photon.
-
-        Attributes of `object_id` name the objects, by the CF conventions for flags: `flag_values`, and
-        `flag_meanings` with underscores for spaces.
-        """
-        maps = {name: getattr(self, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
-        arrays = {name: values for name, values in maps.items() if values is not None}
-        if self.photons is not None:
-            columns = {column.name: getattr(self.photons, column.name) for column in fields(self.photons)}
-            arrays |= {f"photon_{name}": values for name, values in columns.items()}
-        dataset = labelled_dataset(arrays, TRUTH_LABELS | PHOTON_ORIGIN_LABELS)
-        names = {0: "none"} | dict(self.names)
-        meanings = " ".join(name.replace(" ", "_") for name in names.values())
-        dataset["object_id"].attrs |= {"flag_values": list(names), "flag_meanings": meanings}
-        return dataset
+        return plot_truth(axes, self.object_z_mm, self.object_id, self.names, z_range_mm)
 
     def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
         """Check an optional map and make it read-only; values may exceed the range by rounding, 1e-6."""

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pcii.core.bayer import colours_and_samples
 from pcii.core.photon_counts import PhotonCounts
 from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure, write_in_middle
@@ -19,7 +20,6 @@ from collections.abc import Iterator, Sequence
 
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.images import Views
-from pcii.core.view_figures import colours_and_samples
 from pcii.figures.exposure import block_px, exposed
 from pcii.imaging.blocks import evenly_chosen
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcii.core.bayer import colour_index
-from pcii.core.photon_limit import photon_rates, scope_energies, sense
+from pcii.core.photon_limit import Light, photon_rates, scope_energies, sense
 from simgen.base import random_streams as seeds
 from simgen.sensor.mosaic import draw_counts, fixed_totals
 from simgen.spec.recipe import Photons
@@ -16,13 +16,13 @@ def ramp(height: int = 12, width: int = 10) -> np.ndarray:
 
 def test_view_scope_shares_the_budget_in_proportion() -> None:
     raw = ramp()
-    rates = photon_rates(raw, "GRBG", 500, "view", scope_energies(raw, "GRBG", "view"))
+    rates = photon_rates(raw, "GRBG", Light(500), scope_energies(raw, "GRBG", "view"))
     np.testing.assert_allclose(rates, 500 * raw / raw.sum(), rtol=1e-12)
 
 
 def test_channel_scope_gives_every_colour_the_budget() -> None:
     raw = ramp()
-    rates = photon_rates(raw, "RGGB", 500, "channel", scope_energies(raw, "RGGB", "channel"))
+    rates = photon_rates(raw, "RGGB", Light(500, "channel"), scope_energies(raw, "RGGB", "channel"))
     colours = colour_index(12, 10, "RGGB")
     for colour in range(3):
         assert rates[colours == colour].sum() == pytest.approx(500, rel=1e-12)
@@ -32,7 +32,7 @@ def test_darkness_gets_no_photons_and_no_warning() -> None:
     raw = np.zeros((8, 8))
     for scope in ("view", "channel", "scene"):
         energies = scope_energies(raw, "GRBG", scope)
-        assert (photon_rates(raw, "GRBG", 500, scope, energies) == 0).all()
+        assert (photon_rates(raw, "GRBG", Light(500, scope), energies) == 0).all()
 
 
 def test_a_monochrome_sensor_sees_luminance() -> None:
@@ -61,7 +61,7 @@ def test_multinomial_totals_are_exact(scope: str) -> None:
     assert totals is not None
     rng = np.random.default_rng(2)
     drawn = [
-        draw_counts(photon_rates(raw, "GRBG", 700, scope, e), "GRBG", rng, t)
+        draw_counts(photon_rates(raw, "GRBG", Light(700, scope), e), "GRBG", rng, t)
         for raw, e, t in zip(raws, energies, totals, strict=True)
     ]
     if scope == "scene":
