@@ -49,12 +49,12 @@ def demosaic(
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
-    from pcii.sections import demosaic_kernels
+    from pcii.sections import dense_kernels
 
     cells = colour_cells(cfa).astype(np.int64)
     green, image = np.empty(raw.shape), np.empty((*raw.shape, 3))
-    demosaic_kernels.interpolate_green(green, raw, cells)
-    demosaic_kernels.interpolate_chroma(image, green, raw, cells)
+    dense_kernels.interpolate_green(green, raw, cells)
+    dense_kernels.interpolate_chroma(image, green, raw, cells)
     return image
 
 

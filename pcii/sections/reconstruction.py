@@ -20,15 +20,15 @@ from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.photon_events import PLAIN
 from pcii.core.section_stack import Sections, Shifts
-from pcii.sections.dense_sections import colours_apart, sum_counts, sum_fine, sum_views
-from pcii.sections.image_moves import step_px
-from pcii.sections.recycled_memory import empty
+from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
 
 DENSE_SHARE = 1 / 16
 """If a larger share of the pixels has photons, adding whole images takes less time than adding each photon.
 
-Measured on 100 views of 1024 x 1024: 24 ms for the images, 26 ms for the photons of 5.8 % of their pixels.
+Measured on 100 views of 1024 x 1024, where both take as long if 6 to 8 % of the pixels have photons.
 """
+PROBE_STEPS_PX = (-28.0, -14.0, 14.0, 28.0)
+"""Distance of the probes from their plane, in px of total disparity; half of it is blur."""
 
 
 def reconstruct(
@@ -109,6 +109,25 @@ def reconstruct_each(data: PhotonCounts | Views, z_mm: object, **options: Any) -
         yield reconstruct(data, planes.take([plane]), **options)
 
 
+def with_probes(planes: FocalPlanes, *, clear_px: float = 7.0) -> FocalPlanes:
+    """The requested planes (Z,), followed by their probe planes.
+
+    A probe less than `clear_px` of total disparity from a requested plane is left out, one less than half a
+    probe step from another probe, and one whose total disparity would not be above 0 (beyond infinity).
+    """
+    requested, probes = planes.total_disparity_px, []
+    if not requested.all():  # a single camera has no disparity at any depth
+        return planes
+    spacing = min(abs(step) for step in PROBE_STEPS_PX) / 2
+    for total in requested:
+        for step in PROBE_STEPS_PX:
+            probe = total + step
+            is_clear = np.all(np.abs(probe - requested) > clear_px - 1e-9)  # rounding of the sum
+            if probe > 0 and is_clear and all(abs(probe - added) > spacing for added in probes):
+                probes.append(probe)
+    return planes.followed_by(probes)
+
+
 def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sections:
     """Sections of the counts at `planes`, of which the first are those of `sections`, which are reused.
 
@@ -162,7 +181,7 @@ def _scatter(
 
     events = data.events
     # 32 bits hold the sum of any voxel if they hold the total; half the bytes take half the time.
-    counts = empty(shape, np.int32 if n is events.n and data.total < 2**31 else np.int64)
+    counts = np.empty(shape, np.int32 if n is events.n and data.total < 2**31 else np.int64)
     colours = data.event_colours if shape[3] == data.channel_count else np.zeros_like(data.event_colours)
     place = data.view_starts, events.i, events.j, colours
     kernels.scatter(counts, rows, cols, *place, n, kernels.bands_of(counts[0]))
@@ -208,10 +227,8 @@ def _coverage(
     The number of samples of Bayer phase (a, b) at voxel (r, c) is a product: of the number of camera rows
     with a pixel of row parity a at r, and of camera columns with a pixel of column parity b at c.
     """
-    from pcii.sections import event_kernels as kernels
-
     _, H, W, C = shape
-    coverage = empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
+    coverage = np.empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
     for plane in range(len(planes)):
         by_row, by_col = (
             np.array([_samples_at(targets[plane, :, parity::2], size) for parity in (0, 1)])
@@ -221,7 +238,7 @@ def _coverage(
         _, first, kinds = np.unique(by_row[0] << 32 | by_row[1], return_index=True, return_inverse=True)
         distinct = np.zeros((first.size, W, C), dtype=coverage.dtype)
         _add_product(distinct, by_row[:, first], by_col, cfa)
-        kernels.copy_rows(coverage[plane].reshape(H, W * C), kinds, distinct.reshape(-1, W * C))
+        np.take(distinct, kinds, axis=0, out=coverage[plane], mode="clip")
     return coverage
 
 

@@ -15,7 +15,7 @@ from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic
-from pcii.sections.film_parts import views_around
+from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
