@@ -101,7 +101,7 @@ class Shown:
         dataset = self.outcome.dataset
         if dataset.truth is None:
             return None
-        return TrueFocus(dataset.grid, dataset.truth, self.outcome.sections.z_mm)
+        return TrueFocus(self.outcome.sections.planes, dataset.truth)
 
     @cached_property
     def sections(self) -> list[np.ndarray]:

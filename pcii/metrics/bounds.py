@@ -38,8 +38,7 @@ def oracle(sections: Sections, truth: Truth, *, kind: Kind = "pixel") -> Segment
         raise InputError(f"kind: use 'object' or 'pixel', not {kind!r}")
     if sections.counts.shape[1:3] != truth.z_mm.shape:
         raise InputError(f"truth: its maps are {truth.z_mm.shape}, the sections {sections.counts.shape[1:3]}")
-    true = TrueFocus(sections.grid, truth, sections.z_mm)
-    return Segmented(true.oracle(kind), "oracle", sections)
+    return Segmented(TrueFocus(sections.planes, truth).oracle(kind), "oracle", sections)
 
 
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
@@ -117,8 +116,7 @@ def object_bounds(
     """
     rows: list[dict[str, Any]] = []
     planes, lit_planes = (
-        {} if each is None else TrueFocus(each.grid, truth, each.z_mm).plane_of
-        for each in (sections, full_light)
+        {} if each is None else TrueFocus(each.planes, truth).plane_of for each in (sections, full_light)
     )
     for number, name in sorted(truth.names.items()):
         photons = _photons(number, truth, sections, planes.get(number))

@@ -22,8 +22,8 @@ from pcii.core.photon_limit import Light, photon_rates, scope_energies
 from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.mask_outlines import boundary_f, object_share
-from pcii.metrics.agreement import mask_agreement
 from pcii.metrics.depth_accuracy import depth_errors
+from pcii.metrics.true_masks import mask_agreement
 from pcii.sections.photon_statistics import view_samples
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))

@@ -6,6 +6,7 @@ from twins import unit_grid
 
 from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -51,7 +52,7 @@ def test_by_object_the_oracle_claims_every_pixel_of_an_object_at_its_nearest_pla
 def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
     z = np.array([[4 / 40, 4 / 39, 4 / 38, 4 / 31, np.inf, np.inf, np.inf, np.inf]])
     true = Truth(z, np.array([[1, 1, 1, 1, 0, 0, 0, 0]]), {1: "long"})
-    iou = plane_bounds(TrueFocus(GRID, true, Z))
+    iou = plane_bounds(TrueFocus(FocalPlanes.at_depths(GRID, Z), true))
     # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
     assert iou == {(0, "object"): 3 / 4, (0, "pixel"): 1.0, (1, "object"): 0.0, (1, "pixel"): 1.0}
 
