@@ -2,7 +2,6 @@
 
 import base64
 import io
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,12 +15,12 @@ MAX_LISTED = 4
 PICTURE_DOTS_PER_INCH = 60
 
 
-class ShortForm(ABC):
-    """Gives a class that states its `_facts` a short `repr`, and a table and its `plot` to notebooks."""
+class ShortForm:
+    """Gives a dataclass a short `repr`, and a table and its `plot` to notebooks."""
 
-    @abstractmethod
     def _facts(self) -> Mapping[str, object]:
         """Names and values of what distinguishes this object, most important first; None is left out."""
+        return vars(self)
 
     def _known_facts(self) -> dict[str, object]:
         return {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}

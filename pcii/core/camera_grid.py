@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
+from pcii.base.short_form import ShortForm
 from pcii.core.arrays import is_whole
 
 if TYPE_CHECKING:
@@ -72,18 +72,6 @@ class CameraGrid(ShortForm):
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    def _facts(self) -> dict[str, object]:
-        across, down = self.baseline_mm
-        return {
-            "cameras": times((self.rows, self.cols)),
-            "pitch_mm (x, y)": "{:g}, {:g}".format(*self.pitch_mm),
-            "baseline_mm (x, y)": f"{across:g}, {down:g}",
-            "focal_mm": f"{self.focal_mm:g}",
-            "image": times((self.height, self.width)),
-            "pixel_mm": f"{self.pixel_mm:g}",
-            "shear_px (x, y)": "{:g}, {:g}".format(*self.shear_px) if any(self.shear_px) else None,
-        }
-
     @property
     def baseline_mm(self) -> tuple[float, float]:
         """Distance of the first and the last camera in mm, (x, y); 0 where there is one."""
@@ -105,20 +93,13 @@ class CameraGrid(ShortForm):
         return (self.height, self.width)
 
     def plot(self, axes: "Axes | None" = None) -> np.ndarray:
-        """Draw where the cameras stand, in mm, with both baselines and the virtual centre.
+        """Draw where the cameras stand, in mm, with both baselines; return the Matplotlib axes (1,).
 
-        Draws into `axes`, by default of a new figure, and returns them, (1,). Raises `InputError` if they are
-        no Matplotlib axes.
+        `axes` are by default those of a new figure. Raises `InputError` if they are no Matplotlib axes.
         """
         from pcii.figures.plots import plot_cameras
 
         return plot_cameras(axes, self.rows, self.cols, self.pitch_mm)
-
-
-def check_is_grid(value: object) -> None:
-    """Raise `InputError` for anything but a `CameraGrid`."""
-    if not isinstance(value, CameraGrid):
-        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
 
 
 def middle_camera(grid: CameraGrid) -> tuple[int, int]:

@@ -35,26 +35,20 @@ class Segmented(ShortForm):
     def __post_init__(self) -> None:
         if not isinstance(self.sections, Sections):
             raise InputError(f"sections: expected Sections, got {type(self.sections).__name__}")
-        expected = self.sections.counts.shape[:3]
-        if not _is_bool(self.in_focus) or self.in_focus.shape != expected:
-            raise InputError(f"in_focus: expected bool {expected}, got {_described(self.in_focus)}")
-        kept = self.photon_in_focus
-        if kept is not None:
-            if not _is_bool(kept) or kept.ndim != 2 or kept.shape[0] != expected[0]:
-                raise InputError(
-                    f"photon_in_focus: expected bool ({expected[0]}, events), got {_described(kept)}"
-                )
-            object.__setattr__(self, "photon_in_focus", read_only(kept))
+        shape, events = self.sections.counts.shape[:3], self.photon_in_focus
+        if not _is_bool(self.in_focus) or self.in_focus.shape != shape:
+            raise InputError(f"in_focus: expected bool {shape}, got {_described(self.in_focus)}")
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
+        if events is None:
+            return
+        if not _is_bool(events) or events.ndim != 2 or events.shape[0] != shape[0]:
+            raise InputError(f"photon_in_focus: expected bool ({shape[0]}, events), got {_described(events)}")
+        object.__setattr__(self, "photon_in_focus", read_only(events))
 
     def _facts(self) -> dict[str, object]:
-        shares = [f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))]
-        return {
-            "method": self.method,
-            "z_mm": listed(self.z_mm.tolist()),
-            "shape": times(self.in_focus.shape),
-            "in_focus": listed(shares),
-        }
+        shares = listed([f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))])
+        z_mm, shape = listed(self.z_mm.tolist()), times(self.in_focus.shape)
+        return {"method": self.method, "z_mm": z_mm, "shape": shape, "in_focus": shares}
 
     @property
     def z_mm(self) -> np.ndarray:
@@ -145,9 +139,9 @@ class DepthPosterior(ShortForm):
 
     def entropy_bits(self) -> np.ndarray:
         """Entropy (h, w) of the distribution in bits, float64: 0 is a depth for sure, or surely none."""
-        all_of_it = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
-        logarithm = np.log2(all_of_it, out=np.zeros(all_of_it.shape), where=all_of_it > 0)
-        return np.maximum(-(all_of_it * logarithm).sum(axis=0), 0)
+        outcomes = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
+        logarithm = np.log2(outcomes, out=np.zeros(outcomes.shape), where=outcomes > 0)
+        return np.maximum(-(outcomes * logarithm).sum(axis=0), 0)
 
     def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> np.ndarray:
         """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
@@ -208,12 +202,10 @@ class Score(ShortForm):
         }
 
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
-        """Draw what is scored, a panel each, and return the Matplotlib axes (N,).
+        """Draw the IoU of masks, the shares of errors of depth, and how often depths are right by confidence.
 
-        Masks: the IoU of the objects in each plane by method, beside the best that follows from true depth.
-        Depth: shares of errors and answers. Confidence: how often depths are right, of those that state as
-        much. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
-        number.
+        Returns the Matplotlib axes (N,), one for each of these that is known, by default of a new figure.
+        Raises `InputError` for another number of `axes`.
         """
         from pcii.figures.score_panels import draw_score
 
@@ -221,14 +213,9 @@ class Score(ShortForm):
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""
-        return {
-            "dataset": self.dataset,
-            "planes": [dict(row) for row in self.planes],
-            "objects": [dict(row) for row in self.objects],
-            "depth": dict(self.depth),
-            "bounds": dict(self.bounds),
-            "readout": self.readout,
-        }
+        rows = {name: [dict(row) for row in getattr(self, name)] for name in ("planes", "objects")}
+        others = {"depth": dict(self.depth), "bounds": dict(self.bounds), "readout": self.readout}
+        return {"dataset": self.dataset, **rows, **others}
 
 
 def _is_bool(values: object) -> bool:

@@ -14,7 +14,6 @@ from pcii.core.bayer import channel_count, check_cfa, colour_cells, colours_and_
 from pcii.core.camera_grid import (
     CameraGrid,
     check_camera,
-    check_is_grid,
     chosen_cameras,
     grid_of,
     middle_camera,
@@ -36,12 +35,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotonCounts(ShortForm):
-    """Photon counts of every elemental image, as sparse events or as a dense stack.
+    """Photon counts of every elemental image, as sparse events or as a dense stack, without ground truth.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the
     frames in which a single-photon camera counted, of whose counts these are the sums; `frame` (photons,), if
     it is known, is the frame of each single count, in the order of the events.
-    It holds what a camera would deliver, and no ground truth.
     """
 
     grid: CameraGrid
@@ -72,8 +70,7 @@ class PhotonCounts(ShortForm):
         >>> PhotonCounts.from_dense(np.ones((1, 2, 4, 6), dtype=np.uint16), grid, cfa="GRBG")
         PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, storage=dense)
         """
-        check_cfa(cfa)
-        check_is_grid(grid)
+        _check_sensor(grid, cfa)
         counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
@@ -112,8 +109,7 @@ class PhotonCounts(ShortForm):
         >>> counts.total, counts.view(0, 1)[3].tolist()
         (3, [0, 0, 0, 0, 2, 0])
         """
-        check_cfa(cfa)
-        check_is_grid(grid)
+        _check_sensor(grid, cfa)
         pixels = checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*pixels, photons)}) != 1:
@@ -280,3 +276,9 @@ class PhotonCounts(ShortForm):
         lit = n > 0
         events = events_of((events.k[lit], events.l[lit], events.i[lit], events.j[lit]), n[lit])
         return PhotonCounts(self.grid, self.cfa, _events=events, readout=self.readout, frame=frame)
+
+
+def _check_sensor(grid: object, cfa: str | None) -> None:
+    if not isinstance(grid, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
+    check_cfa(cfa)

@@ -42,7 +42,7 @@ class PhotonEvents(ShortForm):
 
 
 @dataclass(frozen=True, repr=False)
-class FrameEvents(ShortForm):
+class FrameEvents:
     """Single counts: camera (k, l), pixel (i, j) and `frame`, from 0; five arrays (N,) of integers."""
 
     k: np.ndarray
@@ -50,9 +50,6 @@ class FrameEvents(ShortForm):
     i: np.ndarray
     j: np.ndarray
     frame: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"counts": self.frame.size}
 
 
 @dataclass(frozen=True)
@@ -105,10 +102,10 @@ class Readout:
         most = self.most_per_frame
         if most is None:
             return mean
-        trials = samples.astype(np.float64) * self.frames
-        seen = (counts > 0) & (samples > 0)
-        number, of = counts[seen].astype(np.float64), trials[seen]
-        mean[seen] = self.frames * (_rate_of_bits(number, of) if most == 1 else _rate(number / of, most))
+        lit = (counts > 0) & (samples > 0)
+        number, trials = counts[lit].astype(np.float64), samples[lit].astype(np.float64) * self.frames
+        rate = _rate_of_bits(number, trials) if most == 1 else _rate(number / trials, most)
+        mean[lit] = self.frames * rate
         return mean
 
 

@@ -103,10 +103,9 @@ class Sections(ShortForm):
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
         """Draw the sections in their colours, a panel each, and return the Matplotlib axes (N,).
 
-        All have the same exposure, as in a report: the 98th percentile of what is lit is white, each mean
-        counting as often as it has samples. Of more than 12 sections 12 are drawn, from the first to the
-        last. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
-        number of them.
+        All have the same exposure: the 98th percentile of what is lit is white, each mean counting as often
+        as it has samples. Of more than 12 sections 12 are drawn. `axes` has those of each panel, by default
+        of a new figure. Raises `InputError` for another number of them.
         """
         from pcii.figures.plots import plot_sections
 

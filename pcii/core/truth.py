@@ -18,7 +18,7 @@ OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 
 
 @dataclass(frozen=True, repr=False)
-class PhotonTruth(ShortForm):
+class PhotonTruth:
     """Origin of each detected photon: six arrays (N,).
 
     Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of the first surface on its path.
@@ -30,9 +30,6 @@ class PhotonTruth(ShortForm):
     j: np.ndarray
     object_id: np.ndarray
     z_mm: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"photons": self.z_mm.size, "objects": np.unique(self.object_id).size}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,12 +61,13 @@ class Truth(ShortForm):
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
         if unknown:
             raise InputError(f"object_id: id {min(unknown)} has no name")
-        H, W = self.z_mm.shape
-        self._check_map("normal", (H, W, 3), np.float32, -1, 1)
-        self._check_map("coverage", (H, W), np.float32, 0, 1)
-        self._check_map("visible_views", (H, W), np.uint16, 0, np.inf)
-        object.__setattr__(self, "z_mm", read_only(self.z_mm))
-        object.__setattr__(self, "object_id", read_only(self.object_id))
+        shape = self.z_mm.shape
+        _check_map("normal", self.normal, (*shape, 3), np.float32, -1, 1)
+        _check_map("coverage", self.coverage, shape, np.float32, 0, 1)
+        _check_map("visible_views", self.visible_views, shape, np.uint16, 0, np.inf)
+        for name in ("z_mm", "object_id", *OPTIONAL_MAPS):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def _facts(self) -> dict[str, object]:
         hit = self.z_mm[np.isfinite(self.z_mm)]
@@ -102,13 +100,14 @@ class Truth(ShortForm):
 
         return plot_truth(axes, self.object_z_mm, self.object_id, self.names, z_range_mm)
 
-    def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
-        """Check an optional map and make it read-only; values may exceed the range by rounding, 1e-6."""
-        values = getattr(self, name)
-        if values is None:
-            return
-        if values.shape != shape or values.dtype != dtype:
-            raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
-        if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
-            raise InputError(f"{name}: expected values from {least} to {most}")
-        object.__setattr__(self, name, read_only(values))
+
+def _check_map(
+    name: str, values: np.ndarray | None, shape: tuple[int, ...], dtype: type, least: float, most: float
+) -> None:
+    """Check an optional map, whose values may exceed their range by rounding, 1e-6."""
+    if values is None:
+        return
+    if values.shape != shape or values.dtype != dtype:
+        raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
+    if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
+        raise InputError(f"{name}: expected values from {least} to {most}")

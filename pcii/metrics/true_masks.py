@@ -84,14 +84,20 @@ def mask_agreement(claimed: np.ndarray, true: np.ndarray | None, true_share: np.
     if true is None:
         return dict.fromkeys(("iou", "precision", "recall", "f1", "boundary_f"))
     both, positives, truths = (int(np.count_nonzero(mask)) for mask in (claimed & true, claimed, true))
-    either = positives + truths - both
+    any_of_them = positives + truths
     return {
-        "iou": both / either if either else 1.0,
+        "iou": intersection_over_union(claimed, true),
         "precision": both / positives if positives else None,
         "recall": both / truths if truths else None,
-        "f1": 2 * both / (positives + truths) if either else 1.0,
-        "boundary_f": boundary_f(claimed, true, true_share) if either else 1.0,
+        "f1": 2 * both / any_of_them if any_of_them else 1.0,
+        "boundary_f": boundary_f(claimed, true, true_share) if any_of_them else 1.0,
     }
+
+
+def intersection_over_union(one: np.ndarray, other: np.ndarray) -> float:
+    """IoU of two masks (H, W), 1 if both are empty."""
+    either = int(np.count_nonzero(one | other))
+    return int(np.count_nonzero(one & other)) / either if either else 1.0
 
 
 def photon_agreement(focus: Segmented, true: TrueFocus | None, plane: int) -> dict[Kind, Row]:

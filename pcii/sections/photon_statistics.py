@@ -151,11 +151,10 @@ def view_samples(
 ) -> ViewSamples:
     """Mean and variance of the non-zero samples of each pooled voxel of a plane (for Eq. 7).
 
-    With cells and windows of 1 these are the samples of single voxels, whatever their colour.
-
-    In focus all views see the same surface point, so their samples differ by Poisson noise only; out of focus
-    they see different points, and the variance is larger. A window of an even number of
-    pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
+    With cells and windows of 1 these are the samples of single voxels, whatever their colour. In focus all
+    views see the same surface point, so their samples differ by Poisson noise only; out of focus they see
+    different points, and the variance is larger. A window of an even number of pixels holds the same number
+    of sites of each Bayer colour, whatever the shift of the view.
 
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
@@ -230,9 +229,8 @@ def warn_of_saturation(data: PhotonCounts | Views) -> None:
     loss = 0.0 if isinstance(data, Views) else saturation_loss(data)
     if loss > NEGLIGIBLE_LOSS:
         warnings.warn(
-            f"saturation removed about {loss:.0%} of the photons, and depth and removal, which take counts "
-            f"for Poisson numbers, are meant for {NEGLIGIBLE_LOSS:.0%} at most; more frames or less light "
-            "would keep them",
+            f"saturation removed about {loss:.0%} of the photons; depth and removal take counts for Poisson "
+            f"numbers, which holds up to {NEGLIGIBLE_LOSS:.0%}: take more frames or less light",
             UserWarning,
             stacklevel=3,
         )

@@ -6,14 +6,14 @@ raw Bayer colours never mix. Photon counts stay integers until that last divisio
 interpolated.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.arrays import LARGEST_COUNT
+from pcii.core.arrays import LARGEST_COUNT, is_whole
 from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
 from pcii.core.images import Views
@@ -137,22 +137,18 @@ def extend(sections: Sections, counts: PhotonCounts, planes: FocalPlanes) -> Sec
     if len(planes) == known:
         return sections
     added = reconstruct(counts, planes.take(slice(known, None)))
-    return Sections(
-        planes,
-        np.concatenate([sections.counts, added.counts]),
-        partial(_joined_coverage, sections, added.samples),
-        readout=counts.readout,
-    )
+    counts_of_all, samples = np.concatenate([sections.counts, added.counts]), added.samples
 
+    def coverage() -> np.ndarray:
+        # Not from the sections of the added planes, which would stay in memory beside the joined ones.
+        return np.concatenate([sections.coverage, samples if isinstance(samples, np.ndarray) else samples()])
 
-def _joined_coverage(first: Sections, samples: np.ndarray | Callable[[], np.ndarray]) -> np.ndarray:
-    # Not from the sections of the added planes, which would be kept beside the joined ones.
-    return np.concatenate([first.coverage, samples if isinstance(samples, np.ndarray) else samples()])
+    return Sections(planes, counts_of_all, coverage, readout=counts.readout)
 
 
 def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts) -> None:
     check_data(data)
-    if isinstance(subpixel, bool) or not isinstance(subpixel, int | np.integer) or subpixel < 1:
+    if not is_whole(subpixel) or subpixel < 1:
         raise InputError(f"subpixel: expected a whole number of at least 1, got {subpixel!r}")
     if shifts not in ("nearest", "even"):
         raise InputError(f"shifts: use 'nearest' or 'even', not {shifts!r}")
@@ -164,9 +160,8 @@ def _check(data: PhotonCounts | Views, subpixel: int, shifts: Shifts) -> None:
 
 def _as_images(counts: PhotonCounts) -> bool:
     """Whether whole images are added: of dense counts with many photons, if float64 holds all sums."""
-    if counts.is_sparse or counts.occupied_share <= DENSE_SHARE:
-        return False
-    return counts.grid.view_count * LARGEST_COUNT <= 1 << 53 or counts.total <= 1 << 53
+    is_exact = counts.grid.view_count * LARGEST_COUNT <= 1 << 53 or counts.total <= 1 << 53
+    return not counts.is_sparse and counts.occupied_share > DENSE_SHARE and is_exact
 
 
 def _scatter(
@@ -210,15 +205,6 @@ def view_coverage(planes: FocalPlanes) -> np.ndarray:
     return _coverage(planes, None, shape, *planes.voxel_indices())[..., 0]
 
 
-def _add_product(coverage: np.ndarray, by_row: np.ndarray, by_col: np.ndarray, cfa: str | None) -> None:
-    """Add products of values by row (2, H) and column (2, W) of each parity to a plane (H, W, C)."""
-    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
-    for (a, b), colour in np.ndenumerate(cells):
-        coverage[..., colour] += (by_row[a][:, None] * by_col[b]).astype(coverage.dtype, copy=False)
-    if cfa is None:
-        coverage[..., 1:] = coverage[..., :1]  # every pixel has all colours
-
-
 def _coverage(
     planes: FocalPlanes, cfa: str | None, shape: tuple[int, ...], rows: np.ndarray, cols: np.ndarray
 ) -> np.ndarray:
@@ -228,6 +214,7 @@ def _coverage(
     with a pixel of row parity a at r, and of camera columns with a pixel of column parity b at c.
     """
     _, H, W, C = shape
+    cells = np.zeros((2, 2), np.int64) if cfa is None else colour_cells(cfa)
     coverage = np.empty(shape, np.uint16 if planes.grid.view_count < 1 << 16 else np.uint32)
     for plane in range(len(planes)):
         by_row, by_col = (
@@ -237,7 +224,10 @@ def _coverage(
         # Few rows are distinct: away from the borders the pattern repeats.
         _, first, kinds = np.unique(by_row[0] << 32 | by_row[1], return_index=True, return_inverse=True)
         distinct = np.zeros((first.size, W, C), dtype=coverage.dtype)
-        _add_product(distinct, by_row[:, first], by_col, cfa)
+        for (a, b), colour in np.ndenumerate(cells):
+            distinct[..., colour] += (by_row[a, first][:, None] * by_col[b]).astype(distinct.dtype)
+        if cfa is None:  # every pixel has all colours
+            distinct[..., 1:] = distinct[..., :1]
         np.take(distinct, kinds, axis=0, out=coverage[plane], mode="clip")
     return coverage
 

@@ -61,7 +61,7 @@ def test_depth_and_removal_warn_beyond_two_per_cent(recwarn: pytest.WarningsReco
     many, _ = read(0.3, 1, 1)
     with pytest.warns(UserWarning, match=r"saturation removed about 1\d% of the photons"):
         pcii.segment(many, z_mm=[1.0], method="brightness")
-    with pytest.warns(UserWarning, match="more frames or less light"):
+    with pytest.warns(UserWarning, match="take more frames or less light"):
         pcii.estimate_depth(many, (0.5, 2.0), method="variance-sweep")
 
 
