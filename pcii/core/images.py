@@ -1,7 +1,7 @@
 """Elemental images: the radiance of every view."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -53,14 +53,13 @@ class Views(ShortForm):
         if self.cfa is not None and shape[4] != 1:
             raise InputError("radiance: a Bayer mosaic has one channel per pixel, C = 1")
         if isinstance(self.radiance, np.ndarray):
-            if self.radiance.dtype.kind not in "fiu":
-                raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
+            dtype = self.radiance.dtype
+            if dtype.kind not in "fiu":
+                raise InputError(f"radiance: expected real numbers, got {dtype}")
             check_unmasked("radiance", self.radiance)
-            if self.radiance.dtype.newbyteorder("=") in (np.uint8, np.uint16):
-                raise InputError(
-                    f"radiance: {self.radiance.dtype} of pictures is sRGB, not light; decode it by "
-                    "pcii.srgb_to_linear, or give linear values as float32"
-                )
+            if dtype.newbyteorder("=") in (np.uint8, np.uint16):
+                remedy = "decode it by pcii.srgb_to_linear, or give linear values as float32"
+                raise InputError(f"radiance: {dtype} of pictures is sRGB, not light; {remedy}")
             object.__setattr__(self, "radiance", read_only(self.radiance))
 
     def _facts(self) -> dict[str, object]:
@@ -71,25 +70,17 @@ class Views(ShortForm):
         """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
 
-    def plot(
-        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
-    ) -> np.ndarray:
+    def plot(self, axes: "Axes | None" = None, *, view: tuple[int, int] | None = None) -> np.ndarray:
         """Draw the elemental image of the camera `view`, (k, l), in colours; return the Matplotlib axes (1,).
 
-        The default is the camera in the middle; "mean" is the mean of all views. The 98th percentile of what
-        is lit is white. A mosaic's pixels take the colours that they lack from those around. `axes` are by
-        default those of a new figure. Raises `InputError` for a camera outside the grid, or NaN or infinity.
+        The default is the camera in the middle. The 98th percentile of what is lit is white. A mosaic's
+        pixels take the colours that they lack from those around. `axes` are by default those of a new figure.
+        Raises `InputError` for a camera outside the grid, or NaN or infinity.
         """
         from pcii.figures.plots import plot_view
 
-        if view == "mean":
-            light, title = np.zeros(self.radiance.shape[2:]), "mean of all views"
-            for k, l in np.ndindex(*self.radiance.shape[:2]):
-                light += self.view(k, l) / self.grid.view_count
-        else:
-            k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
-            light, title = self.view(k, l), f"view ({k}, {l})"
-        return plot_view(axes, colours_and_samples(light, self.cfa), title)
+        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
+        return plot_view(axes, colours_and_samples(self.view(k, l), self.cfa), f"view ({k}, {l})")
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

@@ -11,13 +11,7 @@ from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
 from pcii.core.arrays import check_total, read_only, whole_counts
 from pcii.core.bayer import channel_count, check_cfa, colour_cells, colours_and_samples
-from pcii.core.camera_grid import (
-    CameraGrid,
-    check_camera,
-    chosen_cameras,
-    grid_of,
-    middle_camera,
-)
+from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of, middle_camera
 from pcii.core.photon_events import (
     PLAIN,
     FrameEvents,

@@ -99,10 +99,9 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
     light = Light.per_view(photons)
     if not is_whole(seed) or seed < 0:
         raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
-    if views.cfa is not None and cfa not in (None, views.cfa):
-        raise InputError(f"cfa: the views are mosaics of the pattern {views.cfa}, not {cfa}")
-    if views.radiance.shape[4] == 1 and views.cfa is None and cfa is not None:
-        raise InputError("cfa: the views have one channel and no pattern; give it to `Views`")
+    has_one_channel = views.radiance.shape[4] == 1
+    if has_one_channel and cfa not in (None, views.cfa):
+        raise InputError(f"cfa: views of one channel have the pattern {views.cfa}, not {cfa}")
     pattern, grid = views.cfa or cfa, views.grid
     columns: list[list[np.ndarray]] = []
     for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):

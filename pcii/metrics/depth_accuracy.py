@@ -169,12 +169,10 @@ def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, An
 def near_edges(disparity: np.ndarray) -> np.ndarray:
     """Pixels (H, W) bool within 5 px of a jump of the disparity by more than 0.15 px between neighbours."""
     jump = np.zeros(disparity.shape, dtype=bool)
-    down = np.abs(np.diff(disparity, axis=0)) > FINE_STEP_PX
-    across = np.abs(np.diff(disparity, axis=1)) > FINE_STEP_PX
-    jump[1:] |= down
-    jump[:-1] |= down
-    jump[:, 1:] |= across
-    jump[:, :-1] |= across
+    for lines, jumps in ((disparity, jump), (disparity.T, jump.T)):
+        differs = np.abs(np.diff(lines, axis=0)) > FINE_STEP_PX
+        jumps[1:] |= differs
+        jumps[:-1] |= differs
     return _near(jump)
 
 

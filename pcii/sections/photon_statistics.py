@@ -78,7 +78,7 @@ def pooled_estimate(sections: Sections, window_px: int, samples: np.ndarray | No
     """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
 
     Sums are divided, so all samples have the same weight; a window that no sample reaches is 0. `samples` are
-    the `pooled_samples` of other sections with this coverage, which then are not found again.
+    the `pooled_samples` of other sections with this coverage, which are then not computed again.
     """
     mean = np.empty(sections.counts.shape)
     for plane in range(len(mean)):
