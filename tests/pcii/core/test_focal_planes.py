@@ -80,11 +80,6 @@ def test_planes_run_from_far_to_near_in_equal_steps_of_total_disparity(near, ext
     assert steps.max() <= step + 1e-9
 
 
-def test_no_more_planes_than_the_step_asks_for():
-    planes = FocalPlanes.between(unit_grid(1, 5, 8, 8), 1.0, 4.0, 1.0)  # total disparity 4 / z
-    np.testing.assert_allclose(planes.z_mm, [4 / 1, 4 / 2, 4 / 3, 4 / 4], rtol=1e-15)
-
-
 @given(grid=grids, z=depths)
 @at_least(100)
 def test_planes_of_a_total_disparity_are_those_of_its_depth(grid, z):

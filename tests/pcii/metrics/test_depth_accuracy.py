@@ -59,15 +59,6 @@ def test_a_missing_answer_is_bad_and_left_out_of_means() -> None:
     assert far["badpix_001"] == far["badpix_003"] == far["badpix_007"] == 1.0
 
 
-def test_only_pixels_where_something_is_hit_are_judged() -> None:
-    true = np.full((40, 50), 2.0)
-    true[:, 30:] = 0.0
-    estimate = np.where(true > 0, true, 5.0)
-    assert errors(true, estimate)["badpix_001"] == 0.0
-    assert set(errors(np.zeros((40, 50)), estimate).values()) == {None}
-    assert set(errors(true[:30], estimate[:30], unit_grid(3, 3, 30, 50)).values()) == {None}  # all border
-
-
 def test_discontinuities_are_judged_within_five_pixels_of_an_edge() -> None:
     true = np.full((40, 50), 2.0)
     true[:, 25:] = 2.2

@@ -163,11 +163,6 @@ def test_colours_do_not_mix_at_the_border_by_any_method(method):
     np.testing.assert_allclose(image, np.broadcast_to([1.0, 0.2, 0.2], image.shape), atol=1e-12)
 
 
-def test_bilinear_is_the_mean_of_the_neighbours_by_hand():
-    raw = at((42, 4), (44, 8), (33, 100), (53, 200), (43, 10))
-    assert demosaic(raw, method="bilinear")[3, 2].tolist() == [0.0, (4 + 8 + 100 + 200) / 4, 10.0]
-
-
 @pytest.mark.parametrize("method", COMPARED)
 def test_no_method_changes_how_numbers_are_printed(method):
     before = np.get_printoptions()
