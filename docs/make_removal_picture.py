@@ -26,7 +26,7 @@ def main(dataset: Path) -> None:
         raise SystemExit(f"{dataset}: has no truth")
     z_mm = data.analysis["z_mm"]
     focus = pcii.segment(data.counts, z_mm, method="three-step")
-    truth = TrueFocus(data.grid, data.truth, focus.z_mm).by_object
+    truth = TrueFocus(focus.sections.planes, data.truth).by_object
     steps = focus.steps
     estimate = focus.sections.estimate
     white = white_level(estimate[0], (slice(None), slice(None)))

@@ -13,6 +13,7 @@ import numpy as np
 
 import pcii
 import simgen
+from pcii.core.focal_planes import FocalPlanes
 from pcii.metrics.true_masks import TrueFocus
 
 
@@ -26,7 +27,7 @@ def examples(
         assert truth is not None
         z_mm = float(rng.choice(planes))
         section = pcii.reconstruct(dataset.counts, z_mm=[z_mm])
-        in_focus = TrueFocus(dataset.grid, truth, np.array([z_mm])).by_pixel[0]
+        in_focus = TrueFocus(FocalPlanes.at_depths(dataset.grid, z_mm), truth).by_pixel[0]
         yield np.moveaxis(section.counts[0], -1, 0).astype(np.float32), in_focus
 
 

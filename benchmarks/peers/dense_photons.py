@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.core.photon_limit import photon_rates, scope_energies, sense
+from pcii.core.photon_limit import Light, photon_rates, scope_energies, sense
 from simgen.photons.candidates import Setup
 from simgen.renderer.radiance import render_view
 
@@ -16,5 +16,5 @@ def rendered_mosaic(setup: Setup, view: int, samples_per_pixel: int, seed: int) 
 
 def drawn_counts(mosaic: np.ndarray, cfa: str | None, budget: float, rng: np.random.Generator) -> np.ndarray:
     """Counts (H, W) of a view with so many photons on average."""
-    rates = photon_rates(mosaic, cfa, budget, "view", scope_energies(mosaic, cfa, "view"))
+    rates = photon_rates(mosaic, cfa, Light(budget), scope_energies(mosaic, cfa, "view"))
     return rng.poisson(rates)

@@ -13,14 +13,23 @@ from pcii.base.progress import Stages
 from pcii.core.arrays import check_z_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import check_photons, limit_photons
+from pcii.core.photon_limit import Light, limit_photons
 from pcii.exchange.camera_fit import CameraFit, check_grid
 from pcii.exchange.image_folders import ViewOrder
-from pcii.exchange.import_requests import Cameras, Lenses, Light, Pair, Source, WholePair, read, values_of
+from pcii.exchange.import_requests import (
+    Cameras,
+    Lenses,
+    Pair,
+    PictureLight,
+    Source,
+    WholePair,
+    read,
+    values_of,
+)
 from pcii.io.dataset_writer import check_depth_range, held_dataset, save_dataset
 
 FLAT = Parameter(name="*")
-CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), Light()
+CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +61,7 @@ def import_dataset(
     cameras: Annotated[Cameras, FLAT] = CAMERAS,
     order: Annotated[ViewOrder, FLAT] = ORDER,
     lenses: Annotated[Lenses, FLAT] = LENSES,
-    light: Annotated[Light, FLAT] = LIGHT,
+    light: Annotated[PictureLight, FLAT] = LIGHT,
     cfa: str | None = None,
     photons: float | None = None,
     seed: int = 1,
@@ -118,7 +127,7 @@ def import_dataset(
     if z_range_mm is not None:
         check_depth_range(z_range_mm)
     if photons is not None:
-        check_photons(photons)
+        Light.per_view(photons)
     options: dict[str, Any] = {
         "pattern": pattern,
         "grid": grid,

@@ -10,11 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.core.camera_grid import CameraGrid
+from pcii.core.camera_grid import CameraGrid, middle_camera
 from pcii.core.estimates import Segmented
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
-from pcii.core.view_figures import middle_camera
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import (
     encoded,
@@ -102,7 +101,7 @@ class Shown:
         dataset = self.outcome.dataset
         if dataset.truth is None:
             return None
-        return TrueFocus(dataset.grid, dataset.truth, self.outcome.sections.z_mm)
+        return TrueFocus(self.outcome.sections.planes, dataset.truth)
 
     @cached_property
     def sections(self) -> list[np.ndarray]:

@@ -22,7 +22,7 @@ from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import encoded
 from pcii.imaging.blocks import evenly_chosen
-from pcii.sections.film_parts import views_around
+from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
 
 MOST_PLANES = 20

@@ -10,7 +10,7 @@ from pcii.app.pipeline import Outcome
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.evaluation.summary import object_planes
 from pcii.evaluation.tables import METHOD, Column, Table, tabulated
-from pcii.sections.saturation import saturation_loss
+from pcii.sections.photon_statistics import saturation_loss
 
 Row = Mapping[str, Any]
 NUMBERS = (

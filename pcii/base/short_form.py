@@ -1,62 +1,57 @@
-"""Short representations of objects that hold large arrays: one line; in notebooks a table and pictures."""
+"""Short representations of objects that hold large arrays: one line; in notebooks a table and a picture."""
 
-from abc import ABC, abstractmethod
+import base64
+import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pcii.base.errors import InputError
 from pcii.base.plain_text import in_html, visible
 
-LONGEST = 119
-"""Most characters of the line."""
-MOST = 4
+MAX_LINE_LENGTH = 119
+MAX_LISTED = 4
 """Longer lists are abbreviated to their first and last value and their length."""
+PICTURE_DOTS_PER_INCH = 60
 
 
-class ShortForm(ABC):
-    """Gives a class that states its `_facts` a short `repr` and a table for notebooks."""
+class ShortForm:
+    """Gives a dataclass a short `repr`, and a table and its `plot` to notebooks."""
 
-    @abstractmethod
     def _facts(self) -> Mapping[str, object]:
         """Names and values of what distinguishes this object, most important first; None is left out."""
+        return vars(self)
 
-    def _known_facts(self) -> list[tuple[str, object]]:
-        return [(name, fact) for name, fact in self._facts().items() if fact is not None]
+    def _known_facts(self) -> dict[str, object]:
+        return {name: _figure(fact) for name, fact in self._facts().items() if fact is not None}
 
     def __repr__(self) -> str:
-        facts = ", ".join(f"{name}={visible(str(_figure(fact)))}" for name, fact in self._known_facts())
+        facts = ", ".join(f"{name}={visible(str(fact))}" for name, fact in self._known_facts().items())
         line = f"{type(self).__name__}({facts})"
-        return line if len(line) <= LONGEST else f"{line[: LONGEST - 2]}…)"
-
-    def _thumbnails(self) -> Mapping[str, str]:
-        """Small pictures for notebooks: data URIs by caption."""
-        return {}
+        return line if len(line) <= MAX_LINE_LENGTH else f"{line[: MAX_LINE_LENGTH - 2]}…)"
 
     def _repr_html_(self) -> str:
-        return table(type(self).__name__, self._known_facts()) + side_by_side(self._thumbnails())
+        facts = self._known_facts().items()
+        rows = "".join(f"<tr><td>{in_html(name)}</td><td>{in_html(fact)}</td></tr>" for name, fact in facts)
+        return f"<table><caption>{type(self).__name__}</caption>{rows}</table>{self._picture_html()}"
 
+    def _picture_html(self) -> str:
+        """What `plot` draws as an image in HTML; empty without `plot`, and for data that cannot be read."""
+        if not hasattr(self, "plot"):
+            return ""
+        from matplotlib import pyplot
 
-def table(caption: str, rows: Sequence[Sequence[object]], header: Sequence[str] = ()) -> str:
-    """A table in HTML with escaped cells; four significant digits of numbers, a dash for None."""
-    names = "".join(f"<th>{in_html(name)}</th>" for name in header)
-    body = "".join(
-        f"<tr>{''.join(f'<td>{in_html(_figure(cell))}</td>' for cell in row)}</tr>" for row in rows
-    )
-    return f"<table><caption>{in_html(caption)}</caption><tr>{names}</tr>{body}</table>"
-
-
-def side_by_side(uris: Mapping[str, str]) -> str:
-    """Pictures side by side in HTML, each with its caption; nothing if there are none."""
-    cells = "".join(
-        f'<td><img src="{in_html(uri)}" alt="{in_html(caption)}"><br>{in_html(caption)}</td>'
-        for caption, uri in uris.items()
-    )
-    return f"<table><tr>{cells}</tr></table>" if uris else ""
+        try:
+            figure = self.plot()[0].figure  # type: ignore[attr-defined]
+        except (InputError, OSError):
+            return ""
+        png = io.BytesIO()
+        figure.savefig(png, format="png", dpi=PICTURE_DOTS_PER_INCH)
+        pyplot.close(figure)
+        return f'<img src="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}">'
 
 
 def _figure(value: object) -> object:
-    if value is None:
-        return "–"
     return f"{value:.4g}" if isinstance(value, float) else value
 
 
@@ -85,6 +80,6 @@ def listed(values: Sequence[object]) -> str:
     ('[540, 620]', '[0 .. 29: 30 in all]')
     """
     texts = [f"{value:g}" if isinstance(value, float) else str(value) for value in values]
-    if len(texts) <= MOST:
+    if len(texts) <= MAX_LISTED:
         return f"[{', '.join(texts)}]"
     return f"[{texts[0]} .. {texts[-1]}: {len(texts)} in all]"

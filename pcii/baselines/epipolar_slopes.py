@@ -28,16 +28,15 @@ def structure_tensor(data: Views, z_range_mm: tuple[float, float]) -> DepthMap:
     grid = data.grid
     per_camera = max(grid.rows, grid.cols) - 1
     planes = FocalPlanes.between(grid, *z_range_mm, PLANE_STEP_PX * per_camera)
-    shape_HW = grid.shape_HW
-    found_px, coherence = np.full(shape_HW, np.nan), np.zeros(shape_HW)
+    best_px, best_coherence = np.full(grid.shape_HW, np.nan), np.zeros(grid.shape_HW)
     lines = _cross(data)
     for plane, total_px in enumerate(planes.total_disparity_px):
-        slope, clear = _slope(lines, planes.take([plane]))
-        clearer = (clear > coherence) & (np.abs(slope) <= LARGEST_SLOPE_PX)
-        found_px[clearer] = (total_px + slope * per_camera)[clearer]
-        coherence[clearer] = clear[clearer]
+        slope, coherence = _slope(lines, planes.take([plane]))
+        better = (coherence > best_coherence) & (np.abs(slope) <= LARGEST_SLOPE_PX)
+        best_px[better] = (total_px + slope * per_camera)[better]
+        best_coherence[better] = coherence[better]
     ends_px = planes.total_disparity_px.min(), planes.total_disparity_px.max()
-    return DepthMap(depth_of_total_disparity_mm(grid, np.clip(found_px, *ends_px)), coherence)
+    return DepthMap(depth_of_total_disparity_mm(grid, np.clip(best_px, *ends_px)), best_coherence)
 
 
 Line = list[tuple[int, int, np.ndarray]]
@@ -89,5 +88,5 @@ def _slope(lines: list[tuple[int, Line]], plane: FocalPlanes) -> tuple[np.ndarra
             total += gaussian_filter(product.sum(axis=0), OUTER_SIGMA_PX)
     # I(x, s) = f(x + slope s): the slope of least squares, and the share of the gradient that it explains.
     slope = np.divide(xs, xx, out=np.zeros_like(xs), where=xx > 0)
-    left = np.maximum(ss - slope * xs, 0)
-    return slope, np.divide(xx - left, xx + left, out=np.zeros_like(xx), where=xx + left > 0)
+    residual = np.maximum(ss - slope * xs, 0)
+    return slope, np.divide(xx - residual, xx + residual, out=np.zeros_like(xx), where=xx + residual > 0)

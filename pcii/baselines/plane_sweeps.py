@@ -72,10 +72,7 @@ def likelihood_sweep(data: PhotonCounts, z_range_mm: tuple[float, float]) -> Dep
     events = data.events
     most = int(events.n.max(initial=0))
     if most > MOST_PER_PIXEL:
-        raise InputError(
-            f"data: likelihood-sweep takes at most {MOST_PER_PIXEL} photons per pixel, and one has {most}; "
-            "use variance-sweep"
-        )
+        raise InputError(f"data: likelihood-sweep takes up to {MOST_PER_PIXEL} photons per pixel, got {most}")
     squared = None  # where no pixel has two photons they are their own squares
     if most > 1:
         squared = PhotonCounts.from_events(
@@ -125,20 +122,16 @@ def _swept(
     Sections, which have these `options`, are made of a few planes at a time.
     """
     planes = FocalPlanes.between(data.grid, *z_range_mm, STEP_PX)
-    shape_HW = data.grid.shape_HW
-    best = np.zeros(shape_HW, np.int64)
-    nearby, last, least = (
-        np.full((3, *shape_HW), -np.inf),
-        np.full(shape_HW, -np.inf),
-        np.full(shape_HW, np.inf),
-    )
+    nothing = np.full(data.grid.shape_HW, -np.inf)
+    best, nearby = np.zeros(nothing.shape, np.int64), np.stack([nothing] * 3)
+    last, least = nothing, -nothing
     for first in range(0, len(planes), BATCH):
         sections = reconstruct(data, planes.take(slice(first, first + BATCH)), **options)
         for within in range(len(sections.planes)):
             plane, current = first + within, measure(sections, within)
             nearby[2] = np.where(best == plane - 1, current, nearby[2])
             better = current > nearby[1]
-            nearby[:, better] = np.stack([last, current, np.full(shape_HW, -np.inf)])[:, better]
+            nearby[:, better] = np.stack([last, current, nothing])[:, better]
             best[better] = plane
             last, least = current, np.minimum(least, current)
     # Where all planes are alike there is nothing to choose from.

@@ -15,8 +15,7 @@ from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
 from pcii.imaging.bright_regions import brightness as root_photons
 from pcii.sections.photon_statistics import pooled_estimate, section_window_px, view_samples
-from pcii.sections.probe_planes import with_probes
-from pcii.sections.reconstruction import extend, view_coverage
+from pcii.sections.reconstruction import extend, view_coverage, with_probes
 
 NOISE = 0.5
 """Standard deviation of the square root of a Poisson count."""

@@ -34,7 +34,7 @@ def picture_of(result: Segmented | DepthMap, truth: Truth, grid: CameraGrid) -> 
         true, found, confidence = truth.z_mm, result.z_mm, result.confidence
         of_interest = truth.object_z_mm  # a backdrop far behind would leave the objects one colour
     else:
-        of_objects = TrueFocus(grid, truth, result.z_mm).by_object
+        of_objects = TrueFocus(result.sections.planes, truth).by_object
         true, found = (_plane_depth(masks, result.z_mm) for masks in (of_objects, result.in_focus))
         confidence, of_interest = None, true
     limits = depth_limits_mm(of_interest) or depth_limits_mm(found) or (0.0, 1.0)

@@ -1,7 +1,6 @@
 """Types of data, and what they rest on: Bayer patterns, camera geometry, focal planes.
 
-array_labels   What every array is: the names of its axes, its meaning and its unit, in files and in
-               xarray alike.
+array_labels   What every stored array is: the names of its axes, its meaning and its unit.
 arrays         Checks of arrays that all types share.
 bayer          Bayer colour filter arrays: which colour each pixel records.
 camera_grid    The grid of cameras: positions and intrinsic parameters.
@@ -15,5 +14,4 @@ photon_limit   Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
 section_stack  Sections: the scene reconstructed at several depths, with the number of samples of each
                voxel.
 truth          Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon.
-view_figures   Pictures of elemental images: which view, its colours, its exposure.
 """

@@ -4,6 +4,8 @@ Axes, always in this order: (K, L, H, W, C) for views, (Z, H, W, C) for sections
 Lengths are millimetres and carry `_mm`; `z` is planar depth from the camera plane, never ray length.
 """
 
+from typing import TypeGuard
+
 import numpy as np
 
 from pcii.base.errors import InputError
@@ -11,8 +13,14 @@ from pcii.base.errors import InputError
 LARGEST_COUNT = 1 << 40
 """Most photons of a pixel; the sum over millions of such pixels fits in 64 bits."""
 LARGEST_TOTAL = (1 << 63) - 1
+"""Most photons of all pixels, which 64 bits hold."""
 MOST_DEPTHS = 10_000
 """Longer lists, typed or stored, are rejected as errors: no stack has so many sections."""
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether a value is a whole number, of Python or of NumPy."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
@@ -62,18 +70,12 @@ def whole_counts(name: str, values: np.ndarray) -> np.ndarray:
     """Counts as integers: integers >= 0 as they are, floats if whole; else raises `InputError`."""
     check_unmasked(name, values)
     array = np.asarray(values)
-    if array.dtype.kind == "f":
-        is_whole = np.all(np.isfinite(array)) and np.all(array == np.floor(array))
-        if not is_whole or (array.size and float(np.abs(array).max()) > 2**53):
-            raise InputError(f"{name}: photon counts must be whole numbers")
-        array = array.astype(np.int64)
-    if array.dtype.kind not in "iub":
+    kind = array.dtype.kind
+    if kind not in "iubf" or (kind == "f" and not (np.isfinite(array) & (array == np.floor(array))).all()):
         raise InputError(f"{name}: photon counts must be whole numbers, got {array.dtype}")
-    if array.dtype.kind == "b":
-        array = array.astype(np.uint8)
-    array = array.astype(array.dtype.newbyteorder("="), copy=False)
     if array.size and array.min() < 0:
         raise InputError(f"{name}: photon counts must not be negative")
-    if array.size and array.max() > LARGEST_COUNT:
+    if array.size and float(array.max()) > LARGEST_COUNT:
         raise InputError(f"{name}: more than 2^40 photons in a pixel cannot be summed exactly")
-    return array
+    integers = {"f": np.dtype(np.int64), "b": np.dtype(np.uint8)}
+    return array.astype(integers.get(kind, array.dtype.newbyteorder("=")), copy=False)

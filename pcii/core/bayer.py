@@ -66,6 +66,14 @@ def by_colour(pixels: np.ndarray, cfa: str | None) -> np.ndarray:
     return pixels[..., None] * (colours == np.arange(channel_count(cfa)))
 
 
+def colours_and_samples(light: np.ndarray, cfa: str | None) -> tuple[np.ndarray, np.ndarray]:
+    """Light and number of samples, (H, W, C) each, of an image (H, W, C) that may be a mosaic."""
+    samples = np.ones(light.shape, dtype=np.int64)
+    if cfa is None:
+        return light, samples
+    return by_colour(light[..., 0], cfa), by_colour(samples[..., 0], cfa)
+
+
 def mosaic(rgb: np.ndarray, cfa: str) -> np.ndarray:
     """Bayer mosaic (..., H, W) of a colour image (..., H, W, 3), same dtype: one colour of each pixel.
 

@@ -7,25 +7,16 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, times
+from pcii.base.short_form import ShortForm
+from pcii.core.arrays import is_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def _check_size(name: str, value: object) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
-        raise InputError(f"{name}: expected a whole number of at least 1, got {value!r}")
-
-
 def _is_finite(value: object) -> TypeGuard[float]:
     number = isinstance(value, int | float | np.integer | np.floating)
     return number and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _check_length(name: str, value: object) -> None:
-    if not (_is_finite(value) and value > 0):
-        raise InputError(f"{name}: expected a finite length above 0 mm, got {value!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,36 +48,29 @@ class CameraGrid(ShortForm):
     shear_px: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        values: dict[str, object] = {}
         for name in ("rows", "cols", "height", "width"):
-            _check_size(name, getattr(self, name))
-            object.__setattr__(self, name, int(getattr(self, name)))
-        pitch = self.pitch_mm
-        if not isinstance(pitch, tuple | list) or len(pitch) != 2:
-            raise InputError(f"pitch_mm: expected two lengths (x, y) in mm, got {pitch!r}")
-        for name, value in (("pitch_mm", pitch[0]), ("pitch_mm", pitch[1])):
-            _check_length(name, value)
+            size = values[name] = getattr(self, name)
+            if not is_whole(size) or size < 1:
+                raise InputError(f"{name}: expected a whole number of at least 1, got {size!r}")
+            values[name] = int(size)
         for name in ("focal_mm", "pixel_mm"):
             length = getattr(self, name)
-            _check_length(name, length)
-            if isinstance(length, np.generic):  # small types of NumPy would overflow in products
-                object.__setattr__(self, name, float(length))
-        object.__setattr__(self, "pitch_mm", (float(pitch[0]), float(pitch[1])))
-        shear = self.shear_px
-        if not isinstance(shear, tuple | list) or len(shear) != 2 or not all(map(_is_finite, shear)):
-            raise InputError(f"shear_px: expected two finite numbers (x, y) of pixels, got {shear!r}")
-        object.__setattr__(self, "shear_px", (float(shear[0]), float(shear[1])))
-
-    def _facts(self) -> dict[str, object]:
-        across, down = self.baseline_mm
-        return {
-            "cameras": times((self.rows, self.cols)),
-            "pitch_mm (x, y)": "{:g}, {:g}".format(*self.pitch_mm),
-            "baseline_mm (x, y)": f"{across:g}, {down:g}",
-            "focal_mm": f"{self.focal_mm:g}",
-            "image": times((self.height, self.width)),
-            "pixel_mm": f"{self.pixel_mm:g}",
-            "shear_px (x, y)": "{:g}, {:g}".format(*self.shear_px) if any(self.shear_px) else None,
-        }
+            if not (_is_finite(length) and length > 0):
+                raise InputError(f"{name}: expected a finite length above 0 mm, got {length!r}")
+            # Small types of NumPy would overflow in products.
+            values[name] = float(length) if isinstance(length, np.generic) else length
+        for name, least, words in (
+            ("pitch_mm", 0.0, "lengths (x, y) above 0 mm"),
+            ("shear_px", -math.inf, "numbers (x, y) of pixels"),
+        ):
+            pair = getattr(self, name)
+            is_pair = isinstance(pair, tuple | list) and len(pair) == 2
+            if not is_pair or not all(_is_finite(value) and value > least for value in pair):
+                raise InputError(f"{name}: expected two finite {words}, got {pair!r}")
+            values[name] = (float(pair[0]), float(pair[1]))
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
 
     @property
     def baseline_mm(self) -> tuple[float, float]:
@@ -109,32 +93,28 @@ class CameraGrid(ShortForm):
         return (self.height, self.width)
 
     def plot(self, axes: "Axes | None" = None) -> np.ndarray:
-        """Draw where the cameras stand, in mm, with both baselines and the virtual centre.
+        """Draw where the cameras stand, in mm, with both baselines; return the Matplotlib axes (1,).
 
-        Draws into `axes`, by default of a new figure, and returns them, (1,). Raises `InputError` if they are
-        no Matplotlib axes.
+        `axes` are by default those of a new figure. Raises `InputError` if they are no Matplotlib axes.
         """
-        from pcii.figures.charts import draw_cameras
-        from pcii.figures.panels import several_axes
+        from pcii.figures.plots import plot_cameras
 
-        panels = several_axes(axes, 1, (4.0, 4.0))
-        (across, down), K, L = self.baseline_mm, self.rows, self.cols
-        x_mm, y_mm = np.linspace(-across / 2, across / 2, L), np.linspace(-down / 2, down / 2, K)
-        pitch = "{:g}, {:g}".format(*self.pitch_mm)
-        draw_cameras(panels[0], x_mm, y_mm, f"{K} x {L} cameras, pitch {pitch} mm (x, y)")
-        return panels
+        return plot_cameras(axes, self.rows, self.cols, self.pitch_mm)
 
 
-def check_is_grid(value: object) -> None:
-    """Raise `InputError` for anything but a `CameraGrid`."""
-    if not isinstance(value, CameraGrid):
-        raise InputError(f"grid: expected a CameraGrid, got {type(value).__name__}")
+def middle_camera(grid: CameraGrid) -> tuple[int, int]:
+    """The camera (k, l) in the middle, of an even number the one after it."""
+    return grid.rows // 2, grid.cols // 2
 
 
-def check_camera(grid: CameraGrid, k: int, l: int) -> None:
-    """Raise `InputError` for a camera outside the grid."""
+def check_camera(grid: CameraGrid, view: object) -> tuple[int, int]:
+    """The camera (k, l) of `view`; raises `InputError` for anything but a camera of the grid."""
+    if not (isinstance(view, tuple | list) and len(view) == 2 and all(map(is_whole, view))):
+        raise InputError(f"view: expected a camera (k, l), got {view!r}")
+    k, l = map(int, view)
     if not (0 <= k < grid.rows and 0 <= l < grid.cols):
         raise InputError(f"view: there is no camera ({k}, {l}) in a grid of {grid.rows} x {grid.cols}")
+    return k, l
 
 
 def chosen_cameras(grid: CameraGrid, cameras: object) -> tuple[range, range]:
@@ -144,25 +124,18 @@ def chosen_cameras(grid: CameraGrid, cameras: object) -> tuple[range, range]:
     """
     if not (isinstance(cameras, tuple) and len(cameras) == 2):
         raise InputError(f"cameras: expected two numbers or slices [k, l], got {cameras!r}")
-    rows, cols = (
-        _chosen(name, chosen, count)
-        for name, chosen, count in zip(("k", "l"), cameras, (grid.rows, grid.cols), strict=True)
-    )
-    return rows, cols
+    return _range_of("k", cameras[0], grid.rows), _range_of("l", cameras[1], grid.cols)
 
 
-def _chosen(name: str, chosen: object, count: int) -> range:
-    if isinstance(chosen, slice):
-        cameras = range(count)[chosen]
+def _range_of(name: str, index: object, count: int) -> range:
+    if isinstance(index, slice):
+        cameras = range(count)[index]
         if cameras.step < 1 or not cameras:
             raise InputError(f"{name}: a slice must choose cameras of 0 .. {count - 1} in their order")
         return cameras
-    if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer):
-        raise InputError(f"{name}: expected a number or a slice of cameras, got {chosen!r}")
-    if not -count <= chosen < count:
-        raise InputError(f"{name}: there is no camera {chosen} of 0 .. {count - 1}")
-    number = int(chosen) % count
-    return range(number, number + 1)
+    if not is_whole(index) or not -count <= index < count:
+        raise InputError(f"{name}: expected a camera of 0 .. {count - 1}, or a slice, got {index!r}")
+    return range(count)[index : index + 1 or None]
 
 
 def grid_of(grid: CameraGrid, rows: range, cols: range) -> CameraGrid:

@@ -7,18 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.base.short_form import ShortForm, listed, span, table, times
-from pcii.core.array_labels import DEPTH_LABELS, labelled_dataset
-from pcii.core.arrays import read_only
+from pcii.base.short_form import ShortForm, listed, span, times
+from pcii.core.arrays import is_whole, read_only
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.section_stack import Sections
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
-
-DEPTH_SHOWN = ("median_mm", "mae_mm", "median_px", "bias_mm", "bad_1px", "bad_3px", "coverage", "ece")
-"""Scores of depth that a notebook shows."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,29 +35,20 @@ class Segmented(ShortForm):
     def __post_init__(self) -> None:
         if not isinstance(self.sections, Sections):
             raise InputError(f"sections: expected Sections, got {type(self.sections).__name__}")
-        expected = self.sections.counts.shape[:3]
-        if not _is_bool(self.in_focus) or self.in_focus.shape != expected:
-            raise InputError(f"in_focus: expected bool {expected}, got {_described(self.in_focus)}")
-        kept = self.photon_in_focus
-        if kept is not None:
-            if not _is_bool(kept) or kept.ndim != 2 or kept.shape[0] != expected[0]:
-                raise InputError(
-                    f"photon_in_focus: expected bool ({expected[0]}, events), got {_described(kept)}"
-                )
-            object.__setattr__(self, "photon_in_focus", read_only(kept))
+        shape, events = self.sections.counts.shape[:3], self.photon_in_focus
+        if not _is_bool(self.in_focus) or self.in_focus.shape != shape:
+            raise InputError(f"in_focus: expected bool {shape}, got {_described(self.in_focus)}")
         object.__setattr__(self, "in_focus", read_only(self.in_focus))
+        if events is None:
+            return
+        if not _is_bool(events) or events.ndim != 2 or events.shape[0] != shape[0]:
+            raise InputError(f"photon_in_focus: expected bool ({shape[0]}, events), got {_described(events)}")
+        object.__setattr__(self, "photon_in_focus", read_only(events))
 
     def _facts(self) -> dict[str, object]:
-        shares = [f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))]
-        return {
-            "method": self.method,
-            "z_mm": listed(self.z_mm.tolist()),
-            "shape": times(self.in_focus.shape),
-            "in_focus": listed(shares),
-        }
-
-    def _thumbnails(self) -> dict[str, str]:
-        return self.sections._thumbnails_of(self.in_focus)
+        shares = listed([f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))])
+        z_mm, shape = listed(self.z_mm.tolist()), times(self.in_focus.shape)
+        return {"method": self.method, "z_mm": z_mm, "shape": shape, "in_focus": shares}
 
     @property
     def z_mm(self) -> np.ndarray:
@@ -79,16 +65,10 @@ class Segmented(ShortForm):
 
         Panels, exposure and `axes` are those of `Sections.plot`.
         """
-        from pcii.figures.palette import COLOURS, plot_label
-        from pcii.figures.panels import draw_outline
+        from pcii.figures.plots import plot_sections
 
-        panels, planes = self.sections._draw(axes, self.in_focus)
-        shape_HW = self.sections.grid.shape_HW
-        for panel, plane in zip(panels, planes, strict=True):
-            draw_outline(panel, self.in_focus[plane], shape_HW, COLOURS[4])
-            share = self.in_focus[plane].mean()
-            panel.set_title(f"{self.z_mm[plane]:.5g} mm: {share:.1%} in focus\n{plot_label(self.method)}")
-        return panels
+        own = self.sections
+        return plot_sections(axes, self.z_mm, own.in_colours, own.grid.shape_HW, self.in_focus, self.method)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,15 +97,6 @@ class DepthMap(ShortForm):
         share = f"{answered.size / max(1, self.z_mm.size):.2%}"
         return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
 
-    def _thumbnails(self) -> dict[str, str]:
-        from pcii.figures.maps import depth_limits_mm, depth_thumbnail
-
-        limits = depth_limits_mm(self.z_mm)
-        if limits is None:
-            return {}
-        caption = f"{limits[0]:.4g} mm (yellow) to {limits[1]:.4g} mm (violet)"
-        return {caption: depth_thumbnail(self.z_mm, self.confidence, limits)}
-
     def plot(
         self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None
     ) -> np.ndarray:
@@ -134,16 +105,9 @@ class DepthMap(ShortForm):
         The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
         those of a new figure. Raises `InputError` if they are no Matplotlib axes.
         """
-        from pcii.figures.maps import draw_depth
-        from pcii.figures.panels import several_axes
+        from pcii.figures.plots import plot_depth
 
-        panels = several_axes(axes, 1, self.z_mm.shape)
-        draw_depth(panels[0], self.z_mm, self.confidence, z_range_mm, "depth, greyer where less sure")
-        return panels
-
-    def to_xarray(self) -> "xarray.Dataset":
-        """`z_mm` and `confidence` over pixels."""
-        return labelled_dataset({"z_mm": self.z_mm, "confidence": self.confidence}, DEPTH_LABELS)
+        return plot_depth(axes, self.z_mm, self.confidence, z_range_mm)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -173,22 +137,11 @@ class DepthPosterior(ShortForm):
     def _facts(self) -> dict[str, object]:
         return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
 
-    def _thumbnails(self) -> dict[str, str]:
-        from pcii.figures.maps import entropy_thumbnail
-
-        most = self._most_bits()
-        return {
-            f"entropy, 0 (blue) to {most:.3g} bits (yellow)": entropy_thumbnail(self.entropy_bits(), most)
-        }
-
-    def _most_bits(self) -> float:
-        return float(np.log2(len(self.planes) + 1))
-
     def entropy_bits(self) -> np.ndarray:
         """Entropy (h, w) of the distribution in bits, float64: 0 is a depth for sure, or surely none."""
-        all_of_it = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
-        logarithm = np.log2(all_of_it, out=np.zeros(all_of_it.shape), where=all_of_it > 0)
-        return np.maximum(-(all_of_it * logarithm).sum(axis=0), 0)
+        outcomes = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
+        logarithm = np.log2(outcomes, out=np.zeros(outcomes.shape), where=outcomes > 0)
+        return np.maximum(-(outcomes * logarithm).sum(axis=0), 0)
 
     def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> np.ndarray:
         """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
@@ -196,21 +149,18 @@ class DepthPosterior(ShortForm):
         The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
         Matplotlib axes (1,), by default of a new figure. Raises `InputError` for a pixel outside the view.
         """
-        from pcii.figures.charts import draw_depth_probability
-        from pcii.figures.maps import draw_entropy
-        from pcii.figures.panels import several_axes
+        from pcii.figures.plots import plot_entropy, plot_probability
 
         shape_HW = self.planes.grid.shape_HW
         if pixel is None:
-            panels = several_axes(axes, 1, shape_HW)
-            draw_entropy(panels[0], self.entropy_bits(), self._most_bits(), shape_HW, self.block_px)
-            return panels
-        i, j = _checked_pixel(pixel, shape_HW)
-        panels = several_axes(axes, 1)
+            return plot_entropy(axes, self.entropy_bits(), len(self.planes), shape_HW, self.block_px)
+        is_inside = isinstance(pixel, tuple | list) and len(pixel) == 2 and all(map(is_whole, pixel))
+        if not is_inside or not all(0 <= n < size for n, size in zip(pixel, shape_HW, strict=True)):
+            raise InputError(f"pixel: expected (row, column) in a view of {times(shape_HW)}, got {pixel!r}")
+        i, j = pixel
         a, b = i // self.block_px, j // self.block_px
-        title = f"pixel ({i}, {j}), no surface: {self.no_surface[a, b]:.1%}"
-        draw_depth_probability(panels[0], self.planes.z_mm, self.probability[:, a, b], title)
-        return panels
+        probability, no_surface = self.probability[:, a, b], self.no_surface[a, b]
+        return plot_probability(axes, self.planes.z_mm, probability, no_surface, (i, j))
 
     def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.
@@ -251,19 +201,11 @@ class Score(ShortForm):
             "depth median_mm": self.depth.get("median_mm"),
         }
 
-    def _repr_html_(self) -> str:
-        names = ("z_mm", "method", "truth", "object", "iou", "precision", "recall", "boundary_f")
-        rows = [[row.get(name) for name in names] for row in self.planes]
-        errors = [(name, self.depth[name]) for name in DEPTH_SHOWN if self.depth.get(name) is not None]
-        return table(repr(self), rows, names) + table("depth", errors) * bool(errors)
-
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
-        """Draw what is scored, a panel each, and return the Matplotlib axes (N,).
+        """Draw the IoU of masks, the shares of errors of depth, and how often depths are right by confidence.
 
-        Masks: the IoU of the objects in each plane by method, beside the best that follows from true depth.
-        Depth: shares of errors and answers. Confidence: how often depths are right, of those that state as
-        much. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
-        number.
+        Returns the Matplotlib axes (N,), one for each of these that is known, by default of a new figure.
+        Raises `InputError` for another number of `axes`.
         """
         from pcii.figures.score_panels import draw_score
 
@@ -271,14 +213,9 @@ class Score(ShortForm):
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""
-        return {
-            "dataset": self.dataset,
-            "planes": [dict(row) for row in self.planes],
-            "objects": [dict(row) for row in self.objects],
-            "depth": dict(self.depth),
-            "bounds": dict(self.bounds),
-            "readout": self.readout,
-        }
+        rows = {name: [dict(row) for row in getattr(self, name)] for name in ("planes", "objects")}
+        others = {"depth": dict(self.depth), "bounds": dict(self.bounds), "readout": self.readout}
+        return {"dataset": self.dataset, **rows, **others}
 
 
 def _is_bool(values: object) -> bool:
@@ -288,13 +225,3 @@ def _is_bool(values: object) -> bool:
 def _described(values: object) -> str:
     """What was given instead of an array that was expected."""
     return f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__
-
-
-def _checked_pixel(pixel: tuple[int, int], shape_HW: tuple[int, int]) -> tuple[int, int]:
-    is_pair = isinstance(pixel, tuple | list) and len(pixel) == 2
-    if not is_pair or not all(isinstance(n, int | np.integer) for n in pixel):
-        raise InputError(f"pixel: expected (row, column), got {pixel!r}")
-    (i, j), (height, width) = map(int, pixel), shape_HW
-    if not (0 <= i < height and 0 <= j < width):
-        raise InputError(f"pixel: there is no pixel ({i}, {j}) in a view of {height} x {width}")
-    return i, j

@@ -42,7 +42,7 @@ class FocalPlanes(ShortForm):
     """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "z_mm", read_only(check_z_mm(self.z_mm)))
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
         object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
         across, down = np.abs(disparity_px(self.grid, self.z_mm))
         with np.errstate(over="ignore"):
@@ -66,16 +66,9 @@ class FocalPlanes(ShortForm):
 
     @classmethod
     def at_total_disparity(cls, grid: CameraGrid, total_disparity_px: object) -> "FocalPlanes":
-        """Planes of these total disparities in px, (Z,) or one number, each above 0.
-
-        >>> grid = CameraGrid(
-        ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
-        ... )
-        >>> FocalPlanes.at_total_disparity(grid, [20, 10]).z_mm.tolist()
-        [500.0, 1000.0]
-        """
+        """Planes of these total disparities in px, (Z,) or one number, each above 0."""
         total = np.atleast_1d(np.asarray(total_disparity_px, dtype=np.float64))
-        return cls(grid, depth_of_total_disparity_mm(grid, total), total)
+        return cls(grid, check_z_mm(depth_of_total_disparity_mm(grid, total)), total)
 
     @classmethod
     def between(cls, grid: CameraGrid, z_near_mm: float, z_far_mm: float, step_px: float) -> "FocalPlanes":
@@ -140,21 +133,15 @@ class FocalPlanes(ShortForm):
         fall outside the section have an index below 0, or not below its size.
         """
         height, width = self.grid.height, self.grid.width
-        if subpixel == 1:
-            rows, cols = self.nearest_shifts_px(step_px)
-            indices = np.arange(height) + rows[..., None], np.arange(width) + cols[..., None]
-        else:
-            rows, cols = self.exact_shifts_px
-            indices = (
-                np.floor((np.arange(size) + self.rounding + shifts[..., None]) * subpixel)
-                for size, shifts in ((height, rows), (width, cols))
-            )
-        # Far outside the section indices may exceed 32 bits.
-        row, col = (
-            np.clip(index, -1, size * subpixel).astype(np.int32)
-            for index, size in zip(indices, (height, width), strict=True)
-        )
-        return row, col
+        axes = zip(self.nearest_shifts_px(step_px), self.exact_shifts_px, (height, width), strict=True)
+        indices: list[np.ndarray] = []
+        for whole, exact, size in axes:
+            index = np.arange(size) + whole[..., None]
+            if subpixel > 1:
+                index = np.floor((np.arange(size) + self.rounding + exact[..., None]) * subpixel)
+            # Far outside the section indices may exceed 32 bits.
+            indices.append(np.clip(index, -1, size * subpixel).astype(np.int32))
+        return indices[0], indices[1]
 
     def project(
         self, photons: PhotonEvents | PhotonTruth, plane: int, subpixel: int = 1
@@ -181,22 +168,17 @@ def planes_at(grid: CameraGrid, z_mm: object) -> FocalPlanes:
 def check_data(data: object) -> None:
     """Raise `InputError` unless sections can be made of `data`: `PhotonCounts` or `Views`."""
     if not isinstance(data, PhotonCounts | Views):
-        raise InputError(
-            "data: expected PhotonCounts or Views (of a dataset its .counts or .views), "
-            f"got {type(data).__name__}"
-        )
+        expected = "PhotonCounts or Views (of a dataset its .counts or .views)"
+        raise InputError(f"data: expected {expected}, got {type(data).__name__}")
 
 
 def check_depth_counts(counts: object) -> None:
     """Raise `InputError` unless `counts` are `PhotonCounts` of at least two views, which depth needs."""
     if isinstance(counts, Views):
-        raise InputError(
-            "counts: needs photon counts, and these are images; draw them with pcii.limit_photons, or import "
-            "with --photons N"
-        )
+        remedy = "draw them with pcii.limit_photons, or import with --photons N"
+        raise InputError(f"counts: needs photon counts, and these are images; {remedy}")
     if not isinstance(counts, PhotonCounts):
-        raise InputError(
-            f"counts: expected PhotonCounts (of a dataset its .counts), got {type(counts).__name__}"
-        )
+        expected = "PhotonCounts (of a dataset its .counts)"
+        raise InputError(f"counts: expected {expected}, got {type(counts).__name__}")
     if counts.grid.view_count < 2:
         raise InputError("counts: one view has no depth; at least 2 cameras are needed")

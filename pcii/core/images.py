@@ -1,20 +1,17 @@
 """Elemental images: the radiance of every view."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.core.array_labels import VIEWS_LABELS, labelled_dataset
 from pcii.core.arrays import check_unmasked, read_only
-from pcii.core.bayer import check_cfa
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.view_figures import chosen_camera, draw_view, light_picture, middle_camera, view_thumbnail
+from pcii.core.bayer import check_cfa, colours_and_samples
+from pcii.core.camera_grid import CameraGrid, check_camera, middle_camera
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 
@@ -56,54 +53,34 @@ class Views(ShortForm):
         if self.cfa is not None and shape[4] != 1:
             raise InputError("radiance: a Bayer mosaic has one channel per pixel, C = 1")
         if isinstance(self.radiance, np.ndarray):
-            if self.radiance.dtype.kind not in "fiu":
-                raise InputError(f"radiance: expected real numbers, got {self.radiance.dtype}")
+            dtype = self.radiance.dtype
+            if dtype.kind not in "fiu":
+                raise InputError(f"radiance: expected real numbers, got {dtype}")
             check_unmasked("radiance", self.radiance)
-            if self.radiance.dtype.newbyteorder("=") in (np.uint8, np.uint16):
-                raise InputError(
-                    f"radiance: {self.radiance.dtype} of pictures is sRGB, not light; decode it by "
-                    "pcii.srgb_to_linear, or give linear values as float32"
-                )
+            if dtype.newbyteorder("=") in (np.uint8, np.uint16):
+                remedy = "decode it by pcii.srgb_to_linear, or give linear values as float32"
+                raise InputError(f"radiance: {dtype} of pictures is sRGB, not light; {remedy}")
             object.__setattr__(self, "radiance", read_only(self.radiance))
 
     def _facts(self) -> dict[str, object]:
         return {"shape": times(self.radiance.shape), "cfa": self.cfa}
-
-    def _thumbnails(self) -> dict[str, str]:
-        k, l = middle_camera(self.grid)
-        try:
-            picture = light_picture(self.view(k, l), self.cfa)
-            return {f"view ({k}, {l})": view_thumbnail(picture, self.grid)}
-        except (InputError, OSError):  # no number, or no file: the rest can still be shown
-            return {}
 
     @property
     def channel_count(self) -> int:
         """Number of colours of sections of these views."""
         return 3 if self.cfa is not None else self.radiance.shape[4]
 
-    def to_xarray(self) -> "xarray.Dataset":
-        """`radiance` over cameras, pixels and channels; views on disk are all read."""
-        arrays = {"radiance": np.asarray(self.radiance)}
-        return labelled_dataset(arrays, VIEWS_LABELS, grid=self.grid, cfa=self.cfa)
-
-    def plot(
-        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
-    ) -> np.ndarray:
+    def plot(self, axes: "Axes | None" = None, *, view: tuple[int, int] | None = None) -> np.ndarray:
         """Draw the elemental image of the camera `view`, (k, l), in colours; return the Matplotlib axes (1,).
 
-        The default is the camera in the middle; "mean" is the mean of all views. The 98th percentile of what
-        is lit is white. A mosaic's pixels take the colours that they lack from those around. `axes` are by
-        default those of a new figure. Raises `InputError` for a camera outside the grid, or NaN or infinity.
+        The default is the camera in the middle. The 98th percentile of what is lit is white. A mosaic's
+        pixels take the colours that they lack from those around. `axes` are by default those of a new figure.
+        Raises `InputError` for a camera outside the grid, or NaN or infinity.
         """
-        camera = chosen_camera(self.grid, view)
-        if camera is not None:
-            light, title = self.view(*camera), f"view {camera}"
-        else:
-            light, title = np.zeros(self.radiance.shape[2:]), "mean of all views"
-            for k, l in np.ndindex(*self.radiance.shape[:2]):
-                light += self.view(k, l) / self.grid.view_count
-        return draw_view(axes, light_picture(light, self.cfa), self.grid, title)
+        from pcii.figures.plots import plot_view
+
+        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
+        return plot_view(axes, colours_and_samples(self.view(k, l), self.cfa), f"view ({k}, {l})")
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Image (H, W, C) of camera (k, l); raises `InputError` if it contains NaN or infinity."""

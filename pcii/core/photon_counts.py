@@ -9,10 +9,9 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, times
-from pcii.core.array_labels import COUNTS_LABELS, labelled_dataset
 from pcii.core.arrays import check_total, read_only, whole_counts
-from pcii.core.bayer import channel_count, check_cfa, colour_cells
-from pcii.core.camera_grid import CameraGrid, check_camera, check_is_grid, chosen_cameras, grid_of
+from pcii.core.bayer import channel_count, check_cfa, colour_cells, colours_and_samples
+from pcii.core.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of, middle_camera
 from pcii.core.photon_events import (
     PLAIN,
     FrameEvents,
@@ -23,28 +22,18 @@ from pcii.core.photon_events import (
     sorted_events,
     sorted_frames,
 )
-from pcii.core.view_figures import (
-    chosen_camera,
-    draw_view,
-    light_picture,
-    middle_camera,
-    photon_picture,
-    view_thumbnail,
-)
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhotonCounts(ShortForm):
-    """Photon counts of every elemental image, as sparse events or as a dense stack.
+    """Photon counts of every elemental image, as sparse events or as a dense stack, without ground truth.
 
     Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the
     frames in which a single-photon camera counted, of whose counts these are the sums; `frame` (photons,), if
     it is known, is the frame of each single count, in the order of the events.
-    It holds what a camera would deliver, and no ground truth.
     """
 
     grid: CameraGrid
@@ -73,19 +62,17 @@ class PhotonCounts(ShortForm):
         ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
         ... )
         >>> PhotonCounts.from_dense(np.ones((1, 2, 4, 6), dtype=np.uint16), grid, cfa="GRBG")
-        PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, kept=dense)
+        PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, storage=dense)
         """
-        check_cfa(cfa)
-        check_is_grid(grid)
+        _check_sensor(grid, cfa)
         counts = whole_counts("counts", counts_KLHW)
         if counts.shape != grid.shape_KLHW:
             raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
         check_total("counts", counts)
         readout = Readout(frames, bits)
         readout.check(counts)
-        # Who gave the array may write to it later.
-        kept = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
-        return cls(grid, cfa, _dense=read_only(kept), readout=readout)
+        own = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
+        return cls(grid, cfa, _dense=read_only(own), readout=readout)
 
     @classmethod
     def from_events(
@@ -116,8 +103,7 @@ class PhotonCounts(ShortForm):
         >>> counts.total, counts.view(0, 1)[3].tolist()
         (3, [0, 0, 0, 0, 2, 0])
         """
-        check_cfa(cfa)
-        check_is_grid(grid)
+        _check_sensor(grid, cfa)
         pixels = checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
         photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
         if len({column.shape for column in (*pixels, photons)}) != 1:
@@ -138,14 +124,8 @@ class PhotonCounts(ShortForm):
             "photons": self.total,
             "frames": None if self.readout.is_plain else self.readout.frames,
             "bits": self.readout.bits,
-            "kept": "events" if self.is_sparse else "dense",
+            "storage": "events" if self.is_sparse else "dense",
         }
-
-    def _thumbnails(self) -> dict[str, str]:
-        k, l = middle_camera(self.grid)
-        counts = self.view(k, l)
-        picture = photon_picture(counts)
-        return {f"view ({k}, {l}), photons: {counts.sum()}": view_thumbnail(picture, self.grid)}
 
     @property
     def is_sparse(self) -> bool:
@@ -162,10 +142,6 @@ class PhotonCounts(ShortForm):
         dense = np.zeros(self.grid.shape_KLHW, dtype)
         dense[events.k, events.l, events.i, events.j] = events.n
         return dense
-
-    def to_numpy(self) -> np.ndarray:
-        """The dense stack of counts (K, L, H, W), integers: `dense`, by the name that data frames use."""
-        return self.dense
 
     @cached_property
     def occupied_share(self) -> float:
@@ -205,7 +181,7 @@ class PhotonCounts(ShortForm):
 
     def view(self, k: int, l: int) -> np.ndarray:
         """Dense counts (H, W) of camera (k, l); raises `InputError` for a camera outside the grid."""
-        check_camera(self.grid, k, l)
+        check_camera(self.grid, (k, l))
         if self._dense is not None:
             return self._dense[k, l]
         events = self.events
@@ -228,17 +204,17 @@ class PhotonCounts(ShortForm):
         in a sheared grid for cameras that do not lie symmetrically.
         """
         rows, cols = chosen_cameras(self.grid, cameras)
-        if not any(isinstance(chosen, slice) for chosen in cameras):
+        if not any(isinstance(index, slice) for index in cameras):
             return self.view(rows[0], cols[0])
         grid = grid_of(self.grid, rows, cols)
         if self._dense is not None:
             dense = self._dense[rows.start : rows.stop : rows.step, cols.start : cols.stop : cols.step]
             return PhotonCounts(grid, self.cfa, _dense=dense, readout=self.readout)
         e = self.events
-        kept = np.isin(e.k, rows) & np.isin(e.l, cols)
-        k, l = (e.k[kept] - rows.start) // rows.step, (e.l[kept] - cols.start) // cols.step
-        events = events_of((k, l, e.i[kept], e.j[kept]), e.n[kept])
-        frame = None if self.frame is None else read_only(self.frame[kept.repeat(e.n)])
+        inside = np.isin(e.k, rows) & np.isin(e.l, cols)
+        k, l = (e.k[inside] - rows.start) // rows.step, (e.l[inside] - cols.start) // cols.step
+        events = events_of((k, l, e.i[inside], e.j[inside]), e.n[inside])
+        frame = None if self.frame is None else read_only(self.frame[inside.repeat(e.n)])
         return PhotonCounts(grid, self.cfa, _events=events, readout=self.readout, frame=frame)
 
     @cached_property
@@ -261,20 +237,16 @@ class PhotonCounts(ShortForm):
         The default is the camera in the middle. "mean" is the mean of all views, in colours. `axes` are by
         default those of a new figure. Raises `InputError` for a camera outside the grid.
         """
-        camera = chosen_camera(self.grid, view)
-        if camera is not None:
-            counts = self.view(*camera)
-            title = f"view {camera}, photons: {counts.sum()}"
-            return draw_view(axes, photon_picture(counts), self.grid, title)
-        # The sum is a whole number, and at its exposure the picture of the mean.
-        views = np.ndindex(self.grid.rows, self.grid.cols)
-        light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
-        title = f"mean of all views, photons: {self.total}"
-        return draw_view(axes, light_picture(light[..., None], self.cfa), self.grid, title)
+        from pcii.figures.plots import plot_view
 
-    def to_xarray(self) -> "xarray.Dataset":
-        """`dense` over cameras and pixels."""
-        return labelled_dataset({"dense": self.dense}, COUNTS_LABELS, grid=self.grid, cfa=self.cfa)
+        if view == "mean":  # at its own exposure the sum looks like the mean
+            views = np.ndindex(self.grid.rows, self.grid.cols)
+            light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
+            title = f"mean of all views, photons: {self.total}"
+            return plot_view(axes, colours_and_samples(light[..., None], self.cfa), title)
+        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
+        counts = self.view(k, l)
+        return plot_view(axes, counts, f"view ({k}, {l}), photons: {counts.sum()}")
 
     def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
         """Counts of about `most` photons, each photon kept with the same probability.
@@ -291,10 +263,16 @@ class PhotonCounts(ShortForm):
         if self.frame is None:
             n = rng.binomial(events.n, most / self.total)
         else:
-            chosen = rng.random(self.total) < most / self.total
-            n = np.bincount(np.arange(events.n.size).repeat(events.n)[chosen], minlength=events.n.size)
-            frame = read_only(self.frame[chosen])
-        kept = n > 0
-        pixels = tuple(index[kept] for index in (events.k, events.l, events.i, events.j))
-        events = events_of(pixels, n[kept])
+            is_sampled = rng.random(self.total) < most / self.total
+            event = np.arange(events.n.size).repeat(events.n)
+            n = np.bincount(event[is_sampled], minlength=events.n.size)
+            frame = read_only(self.frame[is_sampled])
+        lit = n > 0
+        events = events_of((events.k[lit], events.l[lit], events.i[lit], events.j[lit]), n[lit])
         return PhotonCounts(self.grid, self.cfa, _events=events, readout=self.readout, frame=frame)
+
+
+def _check_sensor(grid: object, cfa: str | None) -> None:
+    if not isinstance(grid, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
+    check_cfa(cfa)

@@ -14,7 +14,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm
-from pcii.core.arrays import read_only, whole_counts
+from pcii.core.arrays import is_whole, read_only, whole_counts
 from pcii.core.camera_grid import CameraGrid
 
 MOST_FRAMES = 1 << 24
@@ -42,7 +42,7 @@ class PhotonEvents(ShortForm):
 
 
 @dataclass(frozen=True, repr=False)
-class FrameEvents(ShortForm):
+class FrameEvents:
     """Single counts: camera (k, l), pixel (i, j) and `frame`, from 0; five arrays (N,) of integers."""
 
     k: np.ndarray
@@ -50,16 +50,6 @@ class FrameEvents(ShortForm):
     i: np.ndarray
     j: np.ndarray
     frame: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"counts": self.frame.size}
-
-
-def _number(name: str, value: int, most: int) -> int:
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not (whole and 1 <= value <= most):
-        raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
-    return int(value)
 
 
 @dataclass(frozen=True)
@@ -73,9 +63,12 @@ class Readout:
     bits: int | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", _number("frames", self.frames, MOST_FRAMES))
-        if self.bits is not None:
-            object.__setattr__(self, "bits", _number("bits", self.bits, MOST_BITS))
+        for name, value, most in (("frames", self.frames, MOST_FRAMES), ("bits", self.bits, MOST_BITS)):
+            if name == "bits" and value is None:
+                continue
+            if not is_whole(value) or not 1 <= value <= most:
+                raise InputError(f"{name}: expected a whole number from 1 to {most}, got {value!r}")
+            object.__setattr__(self, name, int(value))
 
     @property
     def is_plain(self) -> bool:
@@ -109,10 +102,10 @@ class Readout:
         most = self.most_per_frame
         if most is None:
             return mean
-        trials = samples.astype(np.float64) * self.frames
-        seen = (counts > 0) & (samples > 0)
-        number, of = counts[seen].astype(np.float64), trials[seen]
-        mean[seen] = self.frames * (_rate_of_bits(number, of) if most == 1 else _rate(number / of, most))
+        lit = (counts > 0) & (samples > 0)
+        number, trials = counts[lit].astype(np.float64), samples[lit].astype(np.float64) * self.frames
+        rate = _rate_of_bits(number, trials) if most == 1 else _rate(number / trials, most)
+        mean[lit] = self.frames * rate
         return mean
 
 

@@ -4,18 +4,37 @@ The light of a scope is normalised to 1 and multiplied by a budget of photons: t
 pixel. A scope is a view, each colour of a view, or all views.
 """
 
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import LUMINANCE
+from pcii.core.arrays import is_whole
 from pcii.core.bayer import channel_count, colour_index, mosaic
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 
 MOST_PHOTONS = 1e12
 """Largest budget of a view; sums stay exact."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """`photons` expected in each `scope`: a "view", a colour of a view ("channel") or all views ("scene")."""
+
+    photons: float
+    scope: str = "view"
+
+    @classmethod
+    def per_view(cls, photons: object) -> "Light":
+        """Light of so many photons in each view; `InputError` unless they are above 0 and at most 10^12."""
+        is_number = isinstance(photons, int | float | np.integer | np.floating)
+        if isinstance(photons, bool) or not is_number or not 0 < float(photons) <= MOST_PHOTONS:
+            raise InputError(
+                f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {photons!r}"
+            )
+        return cls(float(photons))
 
 
 def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
@@ -45,31 +64,22 @@ def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
     return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
 
 
-def photon_rates(
-    raw: np.ndarray, cfa: str | None, budget: float, scope: str, energies: np.ndarray
-) -> np.ndarray:
-    """Expected photons per pixel, (H, W) float64: the budget shared out in proportion to `raw`.
+def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.ndarray) -> np.ndarray:
+    """Expected photons per pixel, (H, W) float64: the light shared out in proportion to `raw`.
 
     `energies` are those of `scope_energies`, for scope "scene" summed over all views. A scope with
     no light at all gets no photons. Raises `InputError` if radiance or its sum is not finite.
     """
     if not np.all(np.isfinite(energies)):
         raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
+    # The energy of the scope of each pixel, or of all.
+    own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
     with np.errstate(over="ignore"):
-        share = np.divide(budget, energies, out=np.zeros_like(energies), where=energies > 0)
-    if not np.isfinite(share).all():  # of very faint light the pixel's part is taken first
-        own = energies[colour_index(raw.shape[0], raw.shape[1], cfa) if scope == "channel" else 0]
-        return budget * np.divide(raw, own, out=np.zeros(raw.shape), where=own > 0)
-    if scope != "channel":
-        return raw * share[0]
-    return raw * share[colour_index(raw.shape[0], raw.shape[1], cfa)]
-
-
-def check_photons(photons: Any) -> None:
-    """Raise `InputError` for a photon budget that is not above 0, or too large."""
-    number = isinstance(photons, int | float | np.integer | np.floating) and not isinstance(photons, bool)
-    if not (number and 0 < float(photons) <= MOST_PHOTONS):
-        raise InputError(f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {photons!r}")
+        share = np.divide(light.photons, own, out=np.zeros_like(own), where=own > 0)
+    if np.isfinite(share).all():
+        return raw * share
+    # Of very faint light the pixel's part is taken first.
+    return light.photons * np.divide(raw, own, out=np.zeros(raw.shape), where=own > 0)
 
 
 def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = None) -> PhotonCounts:
@@ -84,22 +94,21 @@ def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = 
     >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=40, width=60)
     >>> views = Views(np.ones((1, 2, 40, 60, 3)), grid)
     >>> limit_photons(views, 1000, seed=1, cfa="GRBG")
-    PhotonCounts(shape=1 x 2 x 40 x 60, cfa=GRBG, photons=2056, kept=events)
+    PhotonCounts(shape=1 x 2 x 40 x 60, cfa=GRBG, photons=2056, storage=events)
     """
-    check_photons(photons)
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    light = Light.per_view(photons)
+    if not is_whole(seed) or seed < 0:
         raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
-    if views.cfa is not None and cfa not in (None, views.cfa):
-        raise InputError(f"cfa: the views are mosaics of the pattern {views.cfa}, not {cfa}")
-    if views.radiance.shape[4] == 1 and views.cfa is None and cfa is not None:
-        raise InputError("cfa: the views have one channel and no pattern; give it to `Views`")
+    has_one_channel = views.radiance.shape[4] == 1
+    if has_one_channel and cfa not in (None, views.cfa):
+        raise InputError(f"cfa: views of one channel have the pattern {views.cfa}, not {cfa}")
     pattern, grid = views.cfa or cfa, views.grid
     columns: list[list[np.ndarray]] = []
     for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
         raw = sense(views.view(k, l), pattern)
         if raw.min() < 0:
             raise InputError(f"radiance: view ({k}, {l}) holds light below 0")
-        rates = photon_rates(raw, pattern, photons, "view", scope_energies(raw, pattern, "view"))
+        rates = photon_rates(raw, pattern, light, scope_energies(raw, pattern, light.scope))
         rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
         counts = rng.poisson(rates)
         i, j = np.nonzero(counts)

@@ -1,7 +1,7 @@
 """Sections: the scene reconstructed at several depths, with the number of samples of each voxel."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -9,16 +9,13 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, times
-from pcii.core.array_labels import SECTIONS_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
 from pcii.core.bayer import by_colour, check_cfa
 from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_events import PLAIN, Readout
-from pcii.imaging.blocks import evenly_chosen
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 Shifts = Literal["nearest", "even"]
@@ -58,17 +55,16 @@ class Sections(ShortForm):
             object.__setattr__(self, "variance", read_only(self.variance))
 
     def _facts(self) -> dict[str, object]:
-        counted = self.counts.dtype.kind in "iu"
+        photons = None
+        if self.counts.dtype.kind in "iu":  # every plane is made of the same photons
+            photons = listed([int(plane.sum(dtype=np.int64)) for plane in self.counts])
         return {
             "z_mm": listed(self.z_mm.tolist()),
             "shape": times(self.counts.shape),
-            "photons": int(self.counts.sum(dtype=np.int64)) if counted else None,
+            "photons": photons,
             "subpixel": self.subpixel,
             "cfa": self.cfa,
         }
-
-    def _thumbnails(self) -> dict[str, str]:
-        return self._thumbnails_of(None)
 
     @property
     def grid(self) -> CameraGrid:
@@ -104,63 +100,20 @@ class Sections(ShortForm):
         """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
         return np.isinf(self.estimate)
 
-    def to_xarray(self) -> "xarray.Dataset":
-        """`counts`, `coverage`, `estimate` and, if known, `variance` over planes, voxels and channels."""
-        arrays = {"counts": self.counts, "coverage": self.coverage, "estimate": self.estimate}
-        if self.variance is not None:
-            arrays["variance"] = self.variance
-        labels = SECTIONS_LABELS
-        if self.counts.dtype.kind not in "iu":  # of radiance, whose unit is not known here
-            labels = {name: replace(label, unit="1") for name, label in labels.items()}
-        return labelled_dataset(
-            arrays, labels, grid=self.grid, cfa=self.cfa, planes_mm=self.z_mm, subpixel=self.subpixel
-        )
-
     def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
         """Draw the sections in their colours, a panel each, and return the Matplotlib axes (N,).
 
-        All have the same exposure, as in a report: the 98th percentile of what is lit is white, each mean
-        counting as often as it has samples. Of more than 12 sections 12 are drawn, from the first to the
-        last. `axes` has those of each panel, by default of a new figure. Raises `InputError` for another
-        number of them.
+        All have the same exposure: the 98th percentile of what is lit is white, each mean counting as often
+        as it has samples. Of more than 12 sections 12 are drawn. `axes` has those of each panel, by default
+        of a new figure. Raises `InputError` for another number of them.
         """
-        return self._draw(axes, None)[0]
+        from pcii.figures.plots import plot_sections
 
-    def _draw(
-        self, axes: "Axes | Sequence[Axes] | np.ndarray | None", kept: np.ndarray | None
-    ) -> tuple[np.ndarray, list[int]]:
-        """Draw as `plot` does, only points that are `kept`, bool (Z, H, W); the axes and the planes shown."""
-        from pcii.figures.exposure import PANEL_PX, block_px
-        from pcii.figures.panels import MOST_PANELS, several_axes, show_picture
+        return plot_sections(axes, self.z_mm, self.in_colours, self.grid.shape_HW)
 
-        shape_HW, planes = self.grid.shape_HW, evenly_chosen(len(self.planes), MOST_PANELS)
-        panels = several_axes(axes, len(planes), shape_HW)
-        step_px = block_px(self.counts.shape[1:3], PANEL_PX)
-        for panel, plane, image in zip(panels, planes, self._pictures(planes, step_px, kept), strict=True):
-            show_picture(
-                panel, image, shape_HW, f"section at {self.z_mm[plane]:.5g} mm", step_px / self.subpixel
-            )
-        return panels, planes
-
-    def _thumbnails_of(self, kept: np.ndarray | None) -> dict[str, str]:
-        """Small pictures for notebooks by caption, only of points that are `kept`, bool (Z, H, W)."""
-        from pcii.figures.exposure import MOST_THUMBNAILS, THUMBNAIL_PX, block_px
-        from pcii.figures.pictures import data_uri
-
-        planes = evenly_chosen(len(self.planes), MOST_THUMBNAILS)
-        images = self._pictures(planes, block_px(self.counts.shape[1:3], THUMBNAIL_PX), kept)
-        return {f"{z:.5g} mm": data_uri(image) for z, image in zip(self.z_mm[planes], images, strict=True)}
-
-    def _pictures(self, planes: Sequence[int], step_px: int, kept: np.ndarray | None) -> list[np.ndarray]:
-        """8-bit pictures of sections in blocks of `step_px` x `step_px` voxels, at a common exposure."""
-        from pcii.figures.exposure import exposed
-
-        def light(plane: int) -> tuple[np.ndarray, np.ndarray]:
-            sums, samples = self.counts[plane], self.coverage[plane]
-            if kept is not None:
-                sums = sums * kept[plane][..., None]
-            if self.cfa is None:
-                return sums, samples
-            return by_colour(sums[..., 0], self.cfa), by_colour(samples[..., 0], self.cfa)
-
-        return exposed(map(light, planes), step_px)
+    def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
+        """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""
+        sums, samples = self.counts[plane], self.coverage[plane]
+        if self.cfa is None:
+            return sums, samples
+        return by_colour(sums[..., 0], self.cfa), by_colour(samples[..., 0], self.cfa)

@@ -1,18 +1,16 @@
 """Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.short_form import ShortForm, listed, span, times
-from pcii.core.array_labels import PHOTON_ORIGIN_LABELS, TRUTH_LABELS, labelled_dataset
 from pcii.core.arrays import read_only
 
 if TYPE_CHECKING:
-    import xarray
     from matplotlib.axes import Axes
 
 OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
@@ -20,7 +18,7 @@ OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
 
 
 @dataclass(frozen=True, repr=False)
-class PhotonTruth(ShortForm):
+class PhotonTruth:
     """Origin of each detected photon: six arrays (N,).
 
     Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of the first surface on its path.
@@ -32,9 +30,6 @@ class PhotonTruth(ShortForm):
     j: np.ndarray
     object_id: np.ndarray
     z_mm: np.ndarray
-
-    def _facts(self) -> dict[str, object]:
-        return {"photons": self.z_mm.size, "objects": np.unique(self.object_id).size}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -66,12 +61,13 @@ class Truth(ShortForm):
         unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
         if unknown:
             raise InputError(f"object_id: id {min(unknown)} has no name")
-        H, W = self.z_mm.shape
-        self._check_map("normal", (H, W, 3), np.float32, -1, 1)
-        self._check_map("coverage", (H, W), np.float32, 0, 1)
-        self._check_map("visible_views", (H, W), np.uint16, 0, np.inf)
-        object.__setattr__(self, "z_mm", read_only(self.z_mm))
-        object.__setattr__(self, "object_id", read_only(self.object_id))
+        shape = self.z_mm.shape
+        _check_map("normal", self.normal, (*shape, 3), np.float32, -1, 1)
+        _check_map("coverage", self.coverage, shape, np.float32, 0, 1)
+        _check_map("visible_views", self.visible_views, shape, np.uint16, 0, np.inf)
+        for name in ("z_mm", "object_id", *OPTIONAL_MAPS):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, read_only(getattr(self, name)))
 
     def _facts(self) -> dict[str, object]:
         hit = self.z_mm[np.isfinite(self.z_mm)]
@@ -100,41 +96,18 @@ class Truth(ShortForm):
         The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
         two, by default of a new figure. Raises `InputError` for another number.
         """
-        from pcii.figures.maps import draw_depth
-        from pcii.figures.object_maps import draw_objects, named_width
-        from pcii.figures.panels import several_axes
+        from pcii.figures.plots import plot_truth
 
-        height, width = self.z_mm.shape
-        panels = several_axes(axes, 2, self.z_mm.shape, widths=(1.0, named_width(width / height)))
-        title = "true depth of the objects" if self.has_objects else "true depth"
-        draw_depth(panels[0], self.object_z_mm, None, z_range_mm, title)
-        draw_objects(panels[1], self.object_id, self.names)
-        return panels
+        return plot_truth(axes, self.object_z_mm, self.object_id, self.names, z_range_mm)
 
-    def to_xarray(self) -> "xarray.Dataset":
-        """The maps that are known, over pixels, and `photon_...` (photon,) for each photon.
 
-        Attributes of `object_id` name the objects, by the CF conventions for flags: `flag_values`, and
-        `flag_meanings` with underscores for spaces.
-        """
-        maps = {name: getattr(self, name) for name in ("z_mm", "object_id", *OPTIONAL_MAPS)}
-        arrays = {name: values for name, values in maps.items() if values is not None}
-        if self.photons is not None:
-            columns = {column.name: getattr(self.photons, column.name) for column in fields(self.photons)}
-            arrays |= {f"photon_{name}": values for name, values in columns.items()}
-        dataset = labelled_dataset(arrays, TRUTH_LABELS | PHOTON_ORIGIN_LABELS)
-        names = {0: "none"} | dict(self.names)
-        meanings = " ".join(name.replace(" ", "_") for name in names.values())
-        dataset["object_id"].attrs |= {"flag_values": list(names), "flag_meanings": meanings}
-        return dataset
-
-    def _check_map(self, name: str, shape: tuple[int, ...], dtype: type, least: float, most: float) -> None:
-        """Check an optional map and make it read-only; values may exceed the range by rounding, 1e-6."""
-        values = getattr(self, name)
-        if values is None:
-            return
-        if values.shape != shape or values.dtype != dtype:
-            raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
-        if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
-            raise InputError(f"{name}: expected values from {least} to {most}")
-        object.__setattr__(self, name, read_only(values))
+def _check_map(
+    name: str, values: np.ndarray | None, shape: tuple[int, ...], dtype: type, least: float, most: float
+) -> None:
+    """Check an optional map, whose values may exceed their range by rounding, 1e-6."""
+    if values is None:
+        return
+    if values.shape != shape or values.dtype != dtype:
+        raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
+    if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
+        raise InputError(f"{name}: expected values from {least} to {most}")

@@ -22,7 +22,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
 from pcii.depth.focus_labels import focus_depth
 from pcii.depth.posterior_depth import PosteriorDepth
-from pcii.sections.saturation import warn_of_saturation
+from pcii.sections.photon_statistics import warn_of_saturation
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]

@@ -83,7 +83,7 @@ class Lenses:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Light:
+class PictureLight:
     """How numbers stand for light."""
 
     srgb: bool = False
@@ -114,7 +114,7 @@ class CountOptions(Cameras, ViewOrder):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LightOptions(Cameras, ViewOrder, Light):
+class LightOptions(Cameras, ViewOrder, PictureLight):
     """What goes with all radiance whose cameras the source does not state."""
 
     cfa: str | None = None
@@ -169,7 +169,9 @@ class Imported:
     """Whether views are counted one by one, not stored by row and column."""
 
 
-def read_pictures(source: Source, *, pattern: str | None, grid: WholePair, light: LightOptions) -> Imported:
+def read_pictures(
+    source: Source, *, pattern: str | None, grid: WholePair, light: PictureLightOptions
+) -> Imported:
     """Pictures of a folder by --pattern, or pages of a TIFF file."""
     views = import_images(source.path, pattern, grid=grid, **light.keywords(), **source.listeners)
     what = "pages" if pattern is None else "pictures"
@@ -177,7 +179,7 @@ def read_pictures(source: Source, *, pattern: str | None, grid: WholePair, light
     return Imported(views, origin, counted=_is_counted(pattern, True))
 
 
-def read_lens_array(source: Source, *, lenses: Lenses, light: LightOptions) -> Imported:
+def read_lens_array(source: Source, *, lenses: Lenses, light: PictureLightOptions) -> Imported:
     """One picture of a lens array."""
     if lenses.lens_array is None or lenses.lens_pitch_px is None:
         raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
@@ -190,7 +192,7 @@ def read_lens_array(source: Source, *, lenses: Lenses, light: LightOptions) -> I
     return Imported(views, f"{source.name}, a picture of {rows} x {cols} lenses{_curve(light)}")
 
 
-def read_array(source: Source, *, array: str | None, grid: WholePair, light: LightOptions) -> Imported:
+def read_array(source: Source, *, array: str | None, grid: WholePair, light: PictureLightOptions) -> Imported:
     """An array of light in a .npy or .npz file."""
     views = import_arrays(source.path, array=array, grid=grid, **light.keywords())
     return Imported(views, f"array of {source.name}{_curve(light)}", counted=grid is not None)
@@ -231,14 +233,14 @@ def read_packed_frames(
     return Imported(counts, f"photon counts of {source.name}", counted=is_counted)
 
 
-def read_hci(source: Source, *, light: Light, cfa: str | None) -> Imported:
+def read_hci(source: Source, *, light: PictureLight, cfa: str | None) -> Imported:
     """A folder of the HCI 4D light field benchmark, which states its cameras."""
     scene = import_hci(source.path, encoding=light.encoding(), cfa=cfa, **source.listeners)
     origin = f"{source.name}, in the format of the HCI 4D light field benchmark"
     return Imported(scene.views, origin, scene.truth, z_range_mm=scene.z_range_mm, states_cameras=True)
 
 
-def read_posed_pictures(source: Source, *, film: Film, light: Light, cfa: str | None) -> Imported:
+def read_posed_pictures(source: Source, *, film: Film, light: PictureLight, cfa: str | None) -> Imported:
     """Pictures that a transforms.json places."""
     file = read_transforms(transforms_in(source.path) or source.path, tell=source.tell)
     options: dict[str, Any] = {**values_of(film), "encoding": light.encoding(), "cfa": cfa}
@@ -262,7 +264,7 @@ def _is_counted(pattern: str | None, otherwise: bool) -> bool:
     return otherwise if pattern is None else "{index" in pattern
 
 
-def _curve(light: Light) -> str:
+def _curve(light: PictureLight) -> str:
     """How numbers were decoded, for the origin of a dataset."""
     encoding = light.encoding()
     return f", decoded by {encoding}" if encoding is not None else ""

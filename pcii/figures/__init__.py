@@ -14,6 +14,7 @@ exposure      What of an image is shown, and how bright: blocks, smoothed photon
 maps          Maps over pixels with a scale: depth, entropy.
 object_maps   Objects in colours, with their names beside the picture.
 palette       Colours and markers that the colour-blind can distinguish, and names as Matplotlib shows them.
+plots         What `.plot()` of each type draws, of plain arrays.
 panels        Axes to draw in, given or new, and pictures over the pixels of a view.
 pictures      Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.
 score_panels  Panels of a score: IoU of masks by plane and method, shares of depths, reliability of

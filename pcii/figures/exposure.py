@@ -10,10 +10,6 @@ from pcii.imaging.blocks import block_sums
 PANEL_PX = 320
 """Pictures with longer sides are drawn in blocks of 2 x 2 pixels or more: a panel has about as many dots on a
 screen, so single photons are still seen."""
-THUMBNAIL_PX = 256
-"""The longer side of a small picture in a notebook."""
-MOST_THUMBNAILS = 4
-"""Small pictures of one value."""
 SHOWN_PHOTONS = 80
 """Photons under the Gaussian with which few photons are smoothed: their noise is then 11 %. Far more would
 blur what is small, far fewer leave colours that are noise."""

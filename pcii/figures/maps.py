@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pcii.figures.exposure import THUMBNAIL_PX, block_px
 from pcii.figures.panels import figure_of, show_picture, write_in_middle
-from pcii.figures.pictures import data_uri, depth_image
+from pcii.figures.pictures import depth_image
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,24 +53,12 @@ def draw_depth(
         bar.ax.invert_yaxis()
 
 
-def depth_thumbnail(z_mm: np.ndarray, confidence: np.ndarray, limits_mm: tuple[float, float]) -> str:
-    """A small picture of depth (H, W) as a data URI: single pixels, since depths have no mean."""
-    few = np.s_[:: block_px(z_mm.shape, THUMBNAIL_PX), :: block_px(z_mm.shape, THUMBNAIL_PX)]
-    return data_uri(depth_image(z_mm[few], *limits_mm, confidence[few]))
-
-
 def entropy_image(bits: np.ndarray, most_bits: float) -> np.ndarray:
     """Entropy (h, w) in cividis, 8-bit RGB (h, w, 3): blue for 0, yellow for `most_bits`."""
     from matplotlib import colormaps
 
     share = np.clip(np.nan_to_num(bits) / max(most_bits, 1e-30), 0, 1)
     return np.round(255 * colormaps["cividis"](share)[..., :3]).astype(np.uint8)
-
-
-def entropy_thumbnail(bits: np.ndarray, most_bits: float) -> str:
-    """A small picture of entropy (h, w) as a data URI."""
-    step = block_px(bits.shape, THUMBNAIL_PX)
-    return data_uri(entropy_image(bits[::step, ::step], most_bits))
 
 
 def draw_entropy(

@@ -15,7 +15,7 @@ from pcii.core.estimates import Segmented
 from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
-from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus
+from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus, intersection_over_union
 
 TEXTURE_SIGMA_PX = 0.5
 """Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels
@@ -38,8 +38,7 @@ def oracle(sections: Sections, truth: Truth, *, kind: Kind = "pixel") -> Segment
         raise InputError(f"kind: use 'object' or 'pixel', not {kind!r}")
     if sections.counts.shape[1:3] != truth.z_mm.shape:
         raise InputError(f"truth: its maps are {truth.z_mm.shape}, the sections {sections.counts.shape[1:3]}")
-    true = TrueFocus(sections.grid, truth, sections.z_mm)
-    return Segmented(true.oracle(kind), "oracle", sections)
+    return Segmented(TrueFocus(sections.planes, truth).oracle(kind), "oracle", sections)
 
 
 def camera_information(grid: CameraGrid) -> tuple[float, float]:
@@ -100,7 +99,7 @@ def log_gradient_squared(
 def plane_bounds(true: TrueFocus) -> dict[tuple[int, Kind], float]:
     """IoU of `oracle` at each plane, by the plane's number and kind of truth."""
     return {
-        (plane, kind): _iou(claimed, mask)
+        (plane, kind): intersection_over_union(claimed, mask)
         for kind in KINDS
         for plane, (claimed, mask) in enumerate(zip(true.oracle(kind), true.masks(kind), strict=True))
     }
@@ -117,8 +116,7 @@ def object_bounds(
     """
     rows: list[dict[str, Any]] = []
     planes, lit_planes = (
-        {} if each is None else TrueFocus(each.grid, truth, each.z_mm).plane_of
-        for each in (sections, full_light)
+        {} if each is None else TrueFocus(each.planes, truth).plane_of for each in (sections, full_light)
     )
     for number, name in sorted(truth.names.items()):
         photons = _photons(number, truth, sections, planes.get(number))
@@ -161,8 +159,3 @@ def _texture(
     if not inside.any():
         return None
     return log_gradient_squared(full_light.counts[plane][box], full_light.coverage[plane][box], inside)
-
-
-def _iou(claimed: np.ndarray, true: np.ndarray) -> float:
-    either = int(np.count_nonzero(claimed | true))
-    return int(np.count_nonzero(claimed & true)) / either if either else 1.0

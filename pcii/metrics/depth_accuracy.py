@@ -15,9 +15,29 @@ from pcii.core.estimates import DepthMap
 from pcii.core.geometry import parallax_px, total_disparity_px
 from pcii.core.truth import Truth
 
+MEASURES = (
+    "mae_mm",
+    "median_mm",
+    "bad_1px",
+    "bad_3px",
+    "coverage",
+    "median_px",
+    "mae_px",
+    "bias_mm",
+    "bias_px",
+)
 HCI_BORDER_PX = 15
 """Border that the benchmark ignores."""
 BADPIX = {"badpix_001": 0.01, "badpix_003": 0.03, "badpix_007": 0.07}
+HCI_MEASURES = (
+    *BADPIX,
+    "mse_x100",
+    "q25_x100",
+    "discontinuities",
+    "fine_fattening",
+    "fine_thinning",
+    "answered",
+)
 DISCONTINUITY_BADPIX = 0.07
 FINE_STEP_PX = 0.15
 """Disparity by which fine structures differ from their surroundings; a larger jump is an edge."""
@@ -27,8 +47,8 @@ NEAR_EDGE_PX = 5
 CORRECT_PX = 1.0
 """Error in px of total disparity up to which a depth is what its confidence is the probability of."""
 CONFIDENCE_BINS = 10
-ROUNDING = 1e-6
-"""By which a sum of probabilities may exceed 1."""
+PROBABILITY_TOLERANCE = 1e-6
+"""By which a sum of probabilities may exceed 1, by rounding."""
 
 
 def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
@@ -42,23 +62,16 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     above 0 where depths are too far; `bad_1px` and `bad_3px` the shares with larger errors; `coverage` that
     with an estimate. All are None without a depth map, and where no true depth is known.
     """
-    keys = (
-        "mae_mm",
-        "median_mm",
-        "bad_1px",
-        "bad_3px",
-        "coverage",
-        "median_px",
-        "mae_px",
-        "bias_mm",
-        "bias_px",
-    )
-    errors: dict[str, Any] = dict.fromkeys(keys)
-    errors["hci"] = hci_errors(grid, depth, truth, None if truth is None else np.isfinite(truth.z_mm))
-    on_object = None if truth is None else np.isfinite(truth.object_z_mm)
+    errors: dict[str, Any] = dict.fromkeys(MEASURES)
+    errors["hci"], errors["hci_objects"] = dict.fromkeys(HCI_MEASURES), dict.fromkeys(HCI_MEASURES)
+    errors["ece"] = errors["reliability"] = None
+    if grid is None or depth is None or truth is None:
+        return errors
+    on_object = np.isfinite(truth.object_z_mm)
+    errors["hci"] = hci_errors(grid, depth, truth, np.isfinite(truth.z_mm))
     errors["hci_objects"] = hci_errors(grid, depth, truth, on_object)
     errors |= calibration(grid, depth, truth)
-    if grid is None or depth is None or truth is None or on_object is None or not on_object.any():
+    if not on_object.any():
         return errors
     estimate, true = depth.z_mm[on_object], truth.z_mm[on_object]
     answered = _answered(estimate)
@@ -67,23 +80,17 @@ def depth_errors(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth |
     signed_px = true_px - estimated_px  # what is farther has less disparity
     error_px = np.full(estimate.shape, np.inf)
     error_px[answered] = np.abs(signed_px)
-    has_answers = answered.any()
-    return errors | {
-        "mae_mm": float(np.abs(signed_mm).mean()) if has_answers else None,
-        "median_mm": float(np.median(np.abs(signed_mm))) if has_answers else None,
-        "bad_1px": float((error_px > 1).mean()),
-        "bad_3px": float((error_px > 3).mean()),
-        "coverage": float(answered.mean()),
-        "median_px": float(np.median(error_px[answered])) if has_answers else None,
-        "mae_px": float(error_px[answered].mean()) if has_answers else None,
-        "bias_mm": float(np.median(signed_mm)) if has_answers else None,
-        "bias_px": float(np.median(signed_px)) if has_answers else None,
-    }
+    errors["bad_1px"], errors["bad_3px"] = (float((error_px > limit).mean()) for limit in (1, 3))
+    errors["coverage"] = float(answered.mean())
+    if answered.any():
+        for unit, signed in (("mm", signed_mm), ("px", signed_px)):
+            errors[f"mae_{unit}"] = float(np.abs(signed).mean())
+            errors[f"median_{unit}"] = float(np.median(np.abs(signed)))
+            errors[f"bias_{unit}"] = float(np.median(signed))
+    return errors
 
 
-def hci_errors(
-    grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None, where: np.ndarray | None
-) -> dict[str, float | None]:
+def hci_errors(grid: CameraGrid, depth: DepthMap, truth: Truth, where: np.ndarray) -> dict[str, float | None]:
     """Metrics of the HCI 4D light field benchmark over the pixels `where`, bool (H, W).
 
     Honauer et al. 2016, 2017. `badpix_*`: share with |e| > t; `mse_x100`: 100 mean e^2; `q25_x100`: 100
@@ -92,10 +99,7 @@ def hci_errors(
     e > 0.15; `answered`: share with an estimate. The benchmark's regions are drawn by hand; here they are
     `near_edges` and `fine_structures`. A border of 15 px is ignored. None where no pixel is left.
     """
-    keys = (*BADPIX, "mse_x100", "q25_x100", "discontinuities", "fine_fattening", "fine_thinning", "answered")
-    errors: dict[str, float | None] = dict.fromkeys(keys)
-    if grid is None or depth is None or truth is None or where is None:
-        return errors
+    errors: dict[str, float | None] = dict.fromkeys(HCI_MEASURES)
     judged = np.zeros(where.shape, dtype=bool)
     inner = np.s_[HCI_BORDER_PX:-HCI_BORDER_PX, HCI_BORDER_PX:-HCI_BORDER_PX]
     judged[inner] = where[inner]
@@ -119,7 +123,7 @@ def hci_errors(
     return errors
 
 
-def calibration(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | None) -> dict[str, Any]:
+def calibration(grid: CameraGrid, depth: DepthMap, truth: Truth) -> dict[str, Any]:
     """Whether the confidence of a depth map is the share of its depths that are right.
 
     Of all pixels of the film with an estimate; it is right if it is within 1 px of total disparity of the
@@ -127,7 +131,7 @@ def calibration(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | 
     "0.0-0.1" to "0.9-1.0" (an end between two belongs to the upper one): the `share` of the pixels, their
     mean `confidence` and the share that is `correct`, None in an empty bin. `ece`, the expected calibration
     error (Naeini, Cooper and Hauskrecht 2015), is the mean of |correct - confidence| over the bins, weighted
-    by their shares. Both are None without truth or without any estimate. Raises `InputError` for a confidence
+    by their shares. Both are None without any estimate. Raises `InputError` for a confidence
     that is no probability.
 
     >>> grid = CameraGrid(
@@ -138,14 +142,11 @@ def calibration(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | 
     >>> calibration(grid, depth, true)["ece"]
     0.0
     """
-    nothing = {"ece": None, "reliability": None}
-    if grid is None or depth is None or truth is None:
-        return nothing
     answered = _answered(depth.z_mm)
     if not answered.any():
-        return nothing
+        return {"ece": None, "reliability": None}
     stated = depth.confidence[answered]
-    if not ((stated >= 0) & (stated <= 1 + ROUNDING)).all():
+    if not ((stated >= 0) & (stated <= 1 + PROBABILITY_TOLERANCE)).all():
         raise InputError("confidence: expected probabilities from 0 to 1 where a depth is given")
     hit = np.isfinite(truth.z_mm[answered])
     error_px = total_disparity_px(grid, depth.z_mm[answered]) - total_disparity_px(grid, truth.z_mm[answered])
@@ -168,12 +169,10 @@ def calibration(grid: CameraGrid | None, depth: DepthMap | None, truth: Truth | 
 def near_edges(disparity: np.ndarray) -> np.ndarray:
     """Pixels (H, W) bool within 5 px of a jump of the disparity by more than 0.15 px between neighbours."""
     jump = np.zeros(disparity.shape, dtype=bool)
-    down = np.abs(np.diff(disparity, axis=0)) > FINE_STEP_PX
-    across = np.abs(np.diff(disparity, axis=1)) > FINE_STEP_PX
-    jump[1:] |= down
-    jump[:-1] |= down
-    jump[:, 1:] |= across
-    jump[:, :-1] |= across
+    for lines, jumps in ((disparity, jump), (disparity.T, jump.T)):
+        differs = np.abs(np.diff(lines, axis=0)) > FINE_STEP_PX
+        jumps[1:] |= differs
+        jumps[:-1] |= differs
     return _near(jump)
 
 

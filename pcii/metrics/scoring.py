@@ -1,8 +1,8 @@
 """Scores of masks, depth and entropies against the truth."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,9 @@ from pcii.core.geometry import blur_half_extent_px
 from pcii.core.section_stack import Sections
 from pcii.core.truth import Truth
 from pcii.imaging.mask_outlines import object_share
-from pcii.metrics.agreement import mask_agreement, photon_agreement
 from pcii.metrics.bounds import object_bounds, plane_bounds
 from pcii.metrics.depth_accuracy import depth_errors
-from pcii.metrics.true_masks import KINDS, Kind, TrueFocus
+from pcii.metrics.true_masks import KINDS, Kind, TrueFocus, mask_agreement, photon_agreement
 from pcii.sections.photon_statistics import (
     entropy_bits,
     pooled_estimate,
@@ -67,45 +66,46 @@ def score(
     if methods:
         grid = methods[0].sections.grid
     if truth is not None:
-        shapes = [each.in_focus.shape[1:] for each in methods]
-        shapes += [] if depth is None else [depth.z_mm.shape]
-        for shape in shapes:
-            if shape != truth.z_mm.shape:
-                raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {shape}")
+        maps = [*(each.in_focus[0] for each in methods), *([] if depth is None else [depth.z_mm])]
+        for estimate in maps:
+            if estimate.shape != truth.z_mm.shape:
+                raise InputError(f"truth: its maps are {truth.z_mm.shape}, the estimates {estimate.shape}")
         if depth is not None and grid is None:
             raise InputError("grid: a depth map without masks is scored with the CameraGrid of its dataset")
-    # Methods usually share their sections: what follows from these and the truth alone is made once.
-    seen = {id(each.sections): _Seen.of(each.sections, truth) for each in methods}
-    rows = [row for each in methods for row in _plane_rows(each, seen[id(each.sections)])]
+    # Methods usually share their sections: what follows from these and the truth alone is computed once.
+    compared = {id(each.sections): each.sections for each in methods}
+    references = {key: _reference(sections, truth) for key, sections in compared.items()}
+    pairs = [(each, references[id(each.sections)]) for each in methods]
     bounds: dict[str, Any] = {"planes": [], "objects": []}
     objects: list[dict[str, Any]] = []
     if truth is not None:
         if methods:
-            objects = _object_rows(methods[0], seen[id(methods[0].sections)].pooled, truth)
-        bounds["planes"] = [row for each in methods for row in _oracle_rows(each, seen[id(each.sections)])]
+            objects = _object_rows(methods[0], pairs[0][1].pooled, truth)
+        bounds["planes"] = [row for pair in pairs for row in _oracle_rows(*pair)]
         bounds["objects"] = object_bounds(truth, full_light, methods[0].sections if methods else None)
+    rows = tuple(row for pair in pairs for row in _plane_rows(*pair))
     readout = asdict(methods[0].sections.readout) if methods else None
-    return Score(tuple(rows), tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
+    return Score(rows, tuple(objects), depth_errors(grid, depth, truth), dataset, bounds, readout)
 
 
-@dataclass(frozen=True, eq=False)
-class _Seen:
-    """Pooled estimates (Z, H, W, C) of sections, what is truly in focus in them, and IoUs of the oracle."""
+class _Reference(NamedTuple):
+    """What masks of sections are compared with."""
 
     pooled: np.ndarray
+    """Pooled estimates (Z, H, W, C) of the sections."""
     true: TrueFocus | None
-    oracle: Mapping[tuple[int, Kind], float]
-
-    @classmethod
-    def of(cls, sections: Sections, truth: Truth | None) -> "_Seen":
-        true = None if truth is None else TrueFocus(sections.grid, truth, sections.z_mm)
-        pooled = pooled_estimate(sections, section_window_px(sections))
-        return cls(pooled, true, {} if true is None else plane_bounds(true))
+    oracle_iou: Mapping[tuple[int, Kind], float]
 
 
-def _plane_rows(focus: Segmented, seen: _Seen) -> list[dict[str, Any]]:
-    before, after = _section_entropies(focus, seen.pooled)
-    true = seen.true
+def _reference(sections: Sections, truth: Truth | None) -> _Reference:
+    true = None if truth is None else TrueFocus(sections.planes, truth)
+    pooled = pooled_estimate(sections, section_window_px(sections))
+    return _Reference(pooled, true, {} if true is None else plane_bounds(true))
+
+
+def _plane_rows(focus: Segmented, reference: _Reference) -> list[dict[str, Any]]:
+    before, after = _section_entropies(focus, reference.pooled)
+    true = reference.true
     names: dict[int, list[str]] = {}
     if true is not None:
         for number, plane in true.plane_of.items():
@@ -131,10 +131,11 @@ def _plane_rows(focus: Segmented, seen: _Seen) -> list[dict[str, Any]]:
     return rows
 
 
-def _oracle_rows(focus: Segmented, seen: _Seen) -> list[dict[str, Any]]:
+def _oracle_rows(focus: Segmented, reference: _Reference) -> list[dict[str, Any]]:
     """For each row of a method's planes the IoU of `bounds.oracle`."""
+    iou = reference.oracle_iou
     return [
-        {"z_mm": float(z), "method": focus.method, "truth": kind, "iou_oracle": seen.oracle[plane, kind]}
+        {"z_mm": float(z), "method": focus.method, "truth": kind, "iou_oracle": iou[plane, kind]}
         for plane, z in enumerate(focus.z_mm)
         for kind in KINDS
     ]

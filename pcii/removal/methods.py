@@ -8,8 +8,8 @@ from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import PosteriorMasks
 from pcii.removal.three_step.three_step_method import ThreeStep
+from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.sections.reconstruction import reconstruct
-from pcii.sections.saturation import warn_of_saturation
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:

@@ -7,6 +7,7 @@ interpolation, Malvar et al. 2004 and Menon et al. 2007 come from the package co
 """
 
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 
 import numpy as np
@@ -49,28 +50,13 @@ def demosaic(
 
 def laroche_prescott(raw: np.ndarray, cfa: str) -> np.ndarray:
     """Green along the smaller chroma gradient (Eqs. 4, 5), then red and blue differences (Eq. 6)."""
-    from pcii.sections import demosaic_kernels
+    from pcii.sections import dense_kernels
 
     cells = colour_cells(cfa).astype(np.int64)
     green, image = np.empty(raw.shape), np.empty((*raw.shape, 3))
-    demosaic_kernels.interpolate_green(green, raw, cells)
-    demosaic_kernels.interpolate_chroma(image, green, raw, cells)
+    dense_kernels.interpolate_green(green, raw, cells)
+    dense_kernels.interpolate_chroma(image, green, raw, cells)
     return image
-
-
-def bilinear(raw: np.ndarray, cfa: str) -> np.ndarray:
-    """The mean of the nearest sites of each colour."""
-    return _by_package("demosaicing_CFA_Bayer_bilinear", raw, cfa)
-
-
-def malvar(raw: np.ndarray, cfa: str) -> np.ndarray:
-    """Linear interpolation corrected by gradients: Malvar, He and Cutler 2004."""
-    return _by_package("demosaicing_CFA_Bayer_Malvar2004", raw, cfa)
-
-
-def menon(raw: np.ndarray, cfa: str) -> np.ndarray:
-    """Directional filtering with a decision afterwards: Menon, Andriani and Calvagno 2007."""
-    return _by_package("demosaicing_CFA_Bayer_Menon2007", raw, cfa)
 
 
 BORDER_PX = 8
@@ -78,7 +64,7 @@ BORDER_PX = 8
 
 
 def _by_package(name: str, raw: np.ndarray, cfa: str) -> np.ndarray:
-    """A method of colour-demosaicing, on the image continued by reflection: its borders mix colours."""
+    """A function of colour-demosaicing, on the image continued by reflection: its borders mix colours."""
     printing = np.get_printoptions()
     package = import_module("colour_demosaicing")
     np.set_printoptions(**printing)  # which importing the package changes
@@ -88,7 +74,7 @@ def _by_package(name: str, raw: np.ndarray, cfa: str) -> np.ndarray:
 
 METHODS: dict[str, Callable[[np.ndarray, str], np.ndarray]] = {
     "laroche-prescott": laroche_prescott,
-    "bilinear": bilinear,
-    "malvar": malvar,
-    "menon": menon,
+    "bilinear": partial(_by_package, "demosaicing_CFA_Bayer_bilinear"),
+    "malvar": partial(_by_package, "demosaicing_CFA_Bayer_Malvar2004"),
+    "menon": partial(_by_package, "demosaicing_CFA_Bayer_Menon2007"),
 }

@@ -1,53 +1,34 @@
-"""Compiled loops that add up whole images, with their variances."""
+"""Compiled loops over whole images: sums, squared deviations, and Laroche-Prescott demosaicing.
+
+Images (V, H, N), N columns times channels, are added to running sums of groups of images, (G, H, N)
+float64: `total`, `squares` and `first`. If variances are wanted, `total` has sums of differences from the
+`first` sample, which is NaN where there is none yet, and `squares` those of these differences squared; else
+`total` has sums of the samples and the other two are None: what is done with them is not compiled.
+
+`moves` are four arrays: the images (M,) in the order in which they are added, group after group; by how many
+rows (M,) and by how many columns times channels (M,) each is moved; and where each group ends (G,).
+"""
 
 import numpy as np
 
-from pcii.base.compiled_loops import shared
-from pcii.sections.image_moves import Groups, Moves
-from pcii.sections.row_kernels import add_rows, bad_rows, merge_line, not_finite
+from pcii.base.compiled_loops import helper, shared
 
 BAND = 16
-"""Rows of a section that are summed at a time when all views are in memory: their sums stay in the cache."""
+"""Rows of a section that are added to at a time: their sums stay in the cache."""
 
 
-def _bands(height: int) -> int:
-    return -(-height // BAND)
-
-
-@shared(lambda sums, variance, images, *_: _bands(images.shape[1]))
-def sum_views(
-    first_band: int,
-    last_band: int,
-    sums: np.ndarray,
-    variance: np.ndarray | None,
-    images: np.ndarray,
-    moves: Moves,
-    groups: Groups,
-) -> bool:
-    """A section of images (V, H, N) that are all in memory: `add_views` and `merge_groups` band by band.
-
-    `variance` is None if it is not wanted. Returns whether the results and all images are finite.
-    """
-    height, width = images.shape[1:]
-    bad = bad_rows(images, moves) if first_band == 0 else 0
-    for band in range(first_band, last_band):
-        top = band * BAND
-        bottom = min(top + BAND, height)
-        shape = (moves.ends.size, bottom - top, width)
-        total = np.zeros(shape)
-        squares = np.zeros(shape) if variance is not None else None
-        first = np.full(shape, np.nan) if variance is not None else None
-        band_variance = variance[top:bottom] if variance is not None else None
-        bad += add_rows(total, squares, first, images, moves, top, 0, bottom - top)
-        for line in range(bottom - top):
-            merge_line(sums[top:bottom], band_variance, total, squares, first, groups, top, line)
-            bad += not_finite(sums[top + line])
-            if variance is not None and squares is not None:
-                bad += not_finite(squares[:, line]) + not_finite(variance[top + line])
+@shared(lambda images: len(images))
+def are_finite(first: int, last: int, images: np.ndarray) -> bool:
+    """Whether no pixel of images (V, H, N) is NaN or infinite."""
+    bad = 0
+    for view in range(first, last):
+        for row in range(images.shape[1]):
+            for x in range(images.shape[2]):
+                bad += not np.isfinite(images[view, row, x])
     return bad == 0
 
 
-@shared(lambda total, squares, first, images, moves: _bands(images.shape[1]))
+@shared(lambda total, *_: -(-total.shape[1] // BAND))
 def add_views(
     first_band: int,
     last_band: int,
@@ -55,41 +36,34 @@ def add_views(
     squares: np.ndarray | None,
     first: np.ndarray | None,
     images: np.ndarray,
-    moves: Moves,
-) -> bool:
-    """Add shifted images (V, H, N) to running sums of their groups (see `row_kernels`).
+    moves: tuple[np.ndarray, ...],
+) -> None:
+    """Add shifted images (V, H, N) to the running sums of their groups.
 
-    Returns whether all pixels that fall outside the section are finite.
+    The rows of an image are read in the order in which they lie in memory.
     """
-    bad = bad_rows(images, moves) if first_band == 0 else 0
-    height = total.shape[1]
+    _, height, width = images.shape
+    source, row_shift, col_shift, ends = moves
     for band in range(first_band, last_band):
-        bad += add_rows(total, squares, first, images, moves, 0, band * BAND, min((band + 1) * BAND, height))
-    return bad == 0
-
-
-@shared(lambda sums, *_: len(sums))
-def merge_groups(
-    first_line: int,
-    last_line: int,
-    sums: np.ndarray,
-    variance: np.ndarray | None,
-    total: np.ndarray,
-    squares: np.ndarray | None,
-    first: np.ndarray | None,
-    groups: Groups,
-) -> bool:
-    """Sums and, if they are wanted, variances (H, W, C) from the running sums of the groups.
-
-    Returns whether the results are finite.
-    """
-    bad = 0
-    for line in range(first_line, last_line):
-        merge_line(sums, variance, total, squares, first, groups, 0, line)
-        bad += not_finite(sums[line])
-        if variance is not None and squares is not None:
-            bad += not_finite(squares[:, line]) + not_finite(variance[line])
-    return bad == 0
+        top, bottom = band * BAND, min((band + 1) * BAND, height)
+        begin = 0
+        for g in range(ends.size):
+            if first is not None:
+                for row in range(top, bottom):
+                    _find_first(first[g, row], images, row, moves, begin, ends[g])
+            for m in range(begin, ends[g], 4):
+                four = np.arange(m, min(m + 4, ends[g]))
+                for row in range(top, bottom):
+                    if squares is not None and first is not None:
+                        running_row = total[g, row], squares[g, row], first[g, row]
+                        _add_deviations_of_four(running_row, images, row, moves, four)
+                        continue
+                    for n in four:
+                        at, shift = row - row_shift[n], col_shift[n]
+                        low, high = max(0, shift), min(width, width + shift)
+                        if 0 <= at < height and low < high:
+                            _add(total[g, row, low:high], images[source[n], at, low - shift : high - shift])
+            begin = ends[g]
 
 
 @shared(lambda total, squares, first, image, *_: len(image))
@@ -107,7 +81,8 @@ def add_fine(
     """Add one image (H, W, N) to running sums (H M, W M, C) on finer voxels, as `add_views` does.
 
     Pixel (i, j) belongs to voxel (`rows[i]`, `cols[j]`): no two of an image to the same. `cells` (2, 2) are
-    the colours of a mosaic's Bayer cells, empty where every pixel holds all colours.
+    the colours of a mosaic's Bayer cells, empty where every pixel holds all colours; `squares` and `first`
+    are empty if no variance is wanted.
     """
     height, width, _ = total.shape
     for i in range(first_row, last_row):
@@ -127,3 +102,150 @@ def add_fine(
                     value -= first[row, col, colour]
                     squares[row, col, colour] += value * value
                 total[row, col, colour] += value
+
+
+@helper
+def _find_first(first, images, row, moves, from_move, to_move) -> None:
+    """Set `first` to the first sample of each voxel of a row that has none yet."""
+    _, height, width = images.shape
+    source, row_shift, col_shift, _ = moves
+    begin = end = 0  # the run of voxels that are known to have one
+    for m in range(from_move, to_move):
+        at, shift = row - row_shift[m], col_shift[m]
+        low, high = max(0, shift), min(width, width + shift)
+        if at < 0 or at >= height or low >= high:
+            continue
+        values = images[source[m], at]
+        if begin == end or low > end or high < begin:
+            _fill(first, values, shift, low, high)
+            if begin == end:
+                begin, end = low, high
+            continue
+        _fill(first, values, shift, low, begin)
+        _fill(first, values, shift, end, high)
+        begin, end = min(begin, low), max(end, high)
+
+
+@helper
+def _fill(first, values, shift, low, high) -> None:
+    for x in range(low, high):
+        first[x] = first[x] if first[x] == first[x] else values[x - shift]
+
+
+@helper
+def _add(total, values) -> None:
+    for x in range(total.size):
+        total[x] += values[x]
+
+
+@helper
+def _add_deviations(running_row, values, shift, start, stop) -> None:
+    """Add one image's row, moved by `shift`, to the running sums of the voxels `start` to `stop` of a row."""
+    total, squares, first = running_row
+    low, high = max(start, shift, 0), min(stop, values.size + shift, values.size)
+    for x in range(low, high):
+        difference = values[x - shift] - first[x]
+        total[x] += difference
+        squares[x] += difference * difference
+
+
+@helper
+def _add_deviations_of_four(running_row, images, row, moves, four) -> None:
+    """Add the rows of up to four images, in one pass where all have samples: sums are loaded less often."""
+    total, squares, first = running_row
+    source, row_shift, col_shift, _ = moves
+    _, height, width = images.shape
+    low, high, reaching = 0, width, 0
+    for m in four:
+        low, high = max(low, col_shift[m]), min(high, width + col_shift[m])
+        reaching += 0 <= row - row_shift[m] < height
+    if reaching < 4 or low >= high:
+        low = high = width
+    for m in four:
+        at = row - row_shift[m]
+        if 0 <= at < height:
+            values = images[source[m], at]
+            _add_deviations(running_row, values, col_shift[m], 0, low)
+            _add_deviations(running_row, values, col_shift[m], high, width)
+    if low >= high:
+        return
+    m, n, o, p = four[0], four[1], four[2], four[3]
+    a = images[source[m], row - row_shift[m], low - col_shift[m] : high - col_shift[m]]
+    b = images[source[n], row - row_shift[n], low - col_shift[n] : high - col_shift[n]]
+    c = images[source[o], row - row_shift[o], low - col_shift[o] : high - col_shift[o]]
+    d = images[source[p], row - row_shift[p], low - col_shift[p] : high - col_shift[p]]
+    total, squares, first = total[low:high], squares[low:high], first[low:high]
+    for x in range(high - low):
+        s, t, u, v = a[x] - first[x], b[x] - first[x], c[x] - first[x], d[x] - first[x]
+        total[x] += (s + t) + (u + v)
+        squares[x] += (s * s + t * t) + (u * u + v * v)
+
+
+@shared(lambda green, *_: len(green))
+def interpolate_green(first: int, last: int, green: np.ndarray, raw: np.ndarray, cells: np.ndarray) -> None:
+    """Green at every pixel of a mosaic (H, W): Eqs. 4 and 5 of Muniraj et al. 2017.
+
+    `cells` (2, 2) are the colours of the Bayer cells. The image is continued by reflection about its border
+    pixels.
+    """
+    height, width = raw.shape
+    for i in range(first, last):
+        row, above, below = raw[i], raw[_reflected(i - 1, height)], raw[_reflected(i + 1, height)]
+        far_above, far_below = raw[_reflected(i - 2, height)], raw[_reflected(i + 2, height)]
+        for parity in range(2):
+            if cells[i % 2, parity] == 1:
+                for j in range(parity, width, 2):
+                    green[i, j] = row[j]
+                continue
+            for j in range(parity, width, 2):
+                if 2 <= j < width - 2:
+                    left, right, far_left, far_right = row[j - 1], row[j + 1], row[j - 2], row[j + 2]
+                else:
+                    left, right = row[_reflected(j - 1, width)], row[_reflected(j + 1, width)]
+                    far_left, far_right = row[_reflected(j - 2, width)], row[_reflected(j + 2, width)]
+                alpha = abs((far_left + far_right) / 2 - row[j])
+                beta = abs((far_above[j] + far_below[j]) / 2 - row[j])
+                if alpha < beta:
+                    green[i, j] = (left + right) / 2
+                elif alpha > beta:
+                    green[i, j] = (above[j] + below[j]) / 2
+                else:  # rare in photographs, but usual for photon counts, most of which are 0
+                    green[i, j] = (above[j] + left + right + below[j]) / 4
+
+
+@shared(lambda image, *_: len(image))
+def interpolate_chroma(
+    first: int, last: int, image: np.ndarray, green: np.ndarray, raw: np.ndarray, cells: np.ndarray
+) -> None:
+    """Colours (H, W, 3) from a mosaic and its green: Eq. 6, differences from green at their own sites."""
+    height, width = raw.shape
+    for i in range(first, last):
+        up, down = _reflected(i - 1, height), _reflected(i + 1, height)
+        for parity in range(2):
+            colour, row_colour = cells[i % 2, parity], cells[i % 2, 1 - parity]
+            column_colour = cells[1 - i % 2, parity]
+            for j in range(parity, width, 2):
+                left, right = j - 1, j + 1
+                if j == 0 or j == width - 1:
+                    left, right = _reflected(left, width), _reflected(right, width)
+                green_here = green[i, j]
+                image[i, j, 1] = green_here
+                if colour == 1:
+                    horizontal = (raw[i, left] - green[i, left]) + (raw[i, right] - green[i, right])
+                    vertical = (raw[up, j] - green[up, j]) + (raw[down, j] - green[down, j])
+                    image[i, j, row_colour] = horizontal / 2 + green_here
+                    image[i, j, column_colour] = vertical / 2 + green_here
+                else:
+                    above = (raw[up, left] - green[up, left]) + (raw[up, right] - green[up, right])
+                    diagonal = above + (raw[down, left] - green[down, left])
+                    diagonal += raw[down, right] - green[down, right]
+                    image[i, j, colour] = raw[i, j]
+                    image[i, j, 2 - colour] = diagonal / 4 + green_here
+
+
+@helper
+def _reflected(index: int, size: int) -> int:
+    """The index inside 0 .. size-1 that stands for this one under reflection about the border pixels."""
+    while index < 0 or index >= size:
+        index = -index if index < 0 else 2 * (size - 1) - index
+    return index

@@ -9,6 +9,7 @@ deviations.
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +17,9 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.core.bayer import colour_cells
 from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
+from pcii.core.images import ArrayLike5D, Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Shifts
-from pcii.sections.image_moves import Moves, groups_of, moves_of, step_px
-from pcii.sections.recycled_memory import empty
 
 BATCH = 8
 """Views that are read from disk at a time; as many are added meanwhile."""
@@ -34,21 +33,23 @@ def sum_views(
     A view is read once, however many planes. A voxel below two samples has the variance 0.
     Raises `InputError` for radiance that is NaN or infinite, or whose sums or variances would be.
     """
-    kind = _dtype(data)
-    planes = [_Plane(data, focal_planes, p, shifts, kind, variance) for p in range(len(focal_planes))]
-    images = _in_memory(data)
-    if images is not None:
-        views = np.arange(data.grid.view_count)
-        finite = all(plane.sum(views, images) for plane in planes)
+    from pcii.sections import dense_kernels
+
+    kind, images = _dtype(data), _in_memory(data)
+    running = (_RunningSums(data, focal_planes.take([p]), shifts, variance) for p in range(len(focal_planes)))
+    if images is not None:  # plane by plane, so that the running sums of one are in memory
+        _check_finite(data, all(dense_kernels.are_finite(images)))
+        sections = [sums.add(np.arange(len(images)), images).merged(kind) for sums in running]
     else:
-        for plane in planes:
-            plane.start()
-        finite = all(plane.add(*batch) for batch in _batches(data) for plane in planes)
-        finite = finite and all(plane.finish() for plane in planes)
-    if not finite:
-        _raise_not_finite(data)
-    sums = _stacked([plane.sums for plane in planes])
-    variances = [plane.variance for plane in planes if plane.variance is not None]
+        planes = list(running)
+        for views, batch in _batches(data):
+            _check_finite(data, all(dense_kernels.are_finite(batch)))
+            for plane in planes:
+                plane.add(views, batch)
+        sections = [plane.merged(kind) for plane in planes]
+    sums = _stacked([sums for sums, _ in sections])
+    variances = [variance for _, variance in sections if variance is not None]
+    _check_finite(data, all(np.isfinite(part).all() for part in (sums, *variances)))
     return sums, _not_faint(data, _stacked(variances)) if variance else None
 
 
@@ -57,11 +58,12 @@ def sum_counts(data: PhotonCounts, focal_planes: FocalPlanes, shifts: Shifts) ->
 
     Sums run in double precision, which is exact if no voxel has more than 2^53 photons.
     """
-    images = _of_few_types(data.dense).reshape(data.grid.view_count, data.grid.height, -1)
-    planes = [_Plane(data, focal_planes, p, shifts, np.int64, False) for p in range(len(focal_planes))]
-    for plane in planes:
-        plane.sum(np.arange(data.grid.view_count), images)
-    return _stacked([plane.sums for plane in planes])
+    size = data.dense.dtype.itemsize
+    # Loops are compiled for four types. Counts are from 0 to 2^40, whose bits mean the same without a sign.
+    images = data.dense.view(np.int64 if size == 8 else f"u{size}")
+    images = images.reshape(data.grid.view_count, data.grid.height, -1)
+    running = (_RunningSums(data, focal_planes.take([p]), shifts, False) for p in range(len(focal_planes)))
+    return _stacked([sums.add(np.arange(len(images)), images).merged(np.int64)[0] for sums in running])
 
 
 def sum_fine(
@@ -89,8 +91,7 @@ def sum_fine(
             deviations = np.maximum(squares - total * (total / np.maximum(coverage, 1)), 0)
             sums = np.where(coverage > 0, total + first * coverage, 0)
         sample_variance = _not_faint(data, deviations / np.maximum(coverage.astype(np.int64) - 1, 1))
-    if not all(np.isfinite(part).all() for part in (sums, squares)):
-        _raise_not_finite(data)
+    _check_finite(data, all(np.isfinite(part).all() for part in (sums, squares)))
     return sums, sample_variance
 
 
@@ -99,58 +100,93 @@ def _stacked(planes: list[np.ndarray]) -> np.ndarray:
     return np.stack(planes) if len(planes) > 1 else planes[0][None]
 
 
-class _Plane:
-    """The section at one plane while it is summed: its result, and running sums if views come in batches."""
+class _RunningSums:
+    """The section at one plane while views are added: total, squares and first samples of `dense_kernels`."""
 
     def __init__(
-        self,
-        data: Views | PhotonCounts,
-        planes: FocalPlanes,
-        plane: int,
-        shifts: Shifts,
-        dtype: Any,
-        variance: bool,
+        self, data: Views | PhotonCounts, plane: FocalPlanes, shifts: Shifts, variance: bool
     ) -> None:
-        grid = data.grid
-        cfa, C = colours_apart(data, shifts)
-        self.row_px, self.col_px = (px[plane] for px in planes.nearest_shifts_px(step_px(shifts)))
-        self.is_mosaic = cfa is not None
-        self.channels, self.group_count = (1, 4) if self.is_mosaic else (C, 1)
-        self.groups = groups_of(self.row_px, self.col_px, grid, cfa)
-        self.sums = empty((*grid.shape_HW, C), dtype)
-        self.variance = empty(self.sums.shape, dtype) if variance else None
+        self.grid = data.grid
+        cfa, self.colours = colours_apart(data, shifts)
+        self.cells = None if cfa is None else colour_cells(cfa)
+        (self.row_px,), (self.col_px,) = plane.nearest_shifts_px(step_px(shifts))
+        H, W = self.grid.shape_HW
+        groups = (1, H, W * self.colours) if self.cells is None else (4, H, W)
+        self.sums = np.zeros((3 if variance else 1, *groups))
+        self.sums[2:] = np.nan
 
-    def sum(self, views: np.ndarray, images: np.ndarray) -> bool:
-        """Make the section of images (V, H, N) of all views; returns whether it and the images are finite."""
+    def add(self, views: np.ndarray, images: np.ndarray) -> "_RunningSums":
+        """Add images (V, H, N) of the views of these numbers (V,).
+
+        Group 2 p + q of mosaics has the views whose row and column shifts have the parities p and q.
+        """
         from pcii.sections import dense_kernels
 
-        moves = self._moves(views)
-        return all(dense_kernels.sum_views(self.sums, self.variance, images, moves, self.groups))
+        down, right = self.row_px[views // self.grid.cols], self.col_px[views % self.grid.cols]
+        group = np.zeros_like(down) if self.cells is None else 2 * (down % 2) + right % 2
+        # The images that move least cover most of a section, so they come first.
+        order = np.lexsort((np.abs(down) + np.abs(right), group))
+        ends = np.searchsorted(group[order], np.arange(self.sums.shape[1]), side="right")
+        channels = self.colours if self.cells is None else 1
+        moves = order, down[order], right[order] * channels, ends
+        total, squares, first = self.sums if len(self.sums) == 3 else (self.sums[0], None, None)
+        dense_kernels.add_views(total, squares, first, images, moves)
+        return self
 
-    def start(self) -> None:
-        """Begin a section of views that come in batches."""
-        H, W, _ = self.sums.shape
-        shape = (self.group_count, H, W * self.channels)
-        self.total = np.zeros(shape)
-        self.squares = np.zeros(shape) if self.variance is not None else None
-        self.first = np.full(shape, np.nan) if self.variance is not None else None
+    def merged(self, kind: Any) -> tuple[np.ndarray, np.ndarray | None]:
+        """Sums and, if it is wanted, variance (H, W, C) of all samples at each voxel, of type `kind`."""
+        H, W = self.grid.shape_HW
+        by_row, by_col = _cameras_by_parity(self.row_px, H), _cameras_by_parity(self.col_px, W)
+        sums = np.empty((H, W, self.colours), kind)
+        variance = np.empty_like(sums) if len(self.sums) == 3 else None
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self.cells is None:
+                number = (by_row.sum(axis=0)[:, None] * by_col.sum(axis=0))[..., None]
+                sums[...], squared = _of_one_group(number, self.sums.reshape(-1, *sums.shape))
+                if variance is not None:
+                    variance[...] = squared * (1 / np.maximum(number - 1, 1))
+                return sums, variance
+            for r, c, colour in np.ndindex(2, 2, self.colours):
+                groups: list[tuple[np.ndarray, np.ndarray]] = []
+                for i, j in np.argwhere(self.cells == colour):
+                    p, q = (r + i) % 2, (c + j) % 2
+                    number = by_row[p, r::2][:, None] * by_col[q, c::2]
+                    groups.append((number, self.sums[:, 2 * p + q, r::2, c::2]))
+                one, *others = groups
+                voxels = np.s_[r::2, c::2, colour]
+                sums[voxels], squared = _of_two_groups(one, others[0]) if others else _of_one_group(*one)
+                if variance is not None:
+                    variance[voxels] = squared / np.maximum(sum(number for number, _ in groups) - 1, 1)
+        return sums, variance
 
-    def add(self, views: np.ndarray, images: np.ndarray) -> bool:
-        """Add images (V, H, N) of these views; returns whether the pixels outside the section are finite."""
-        from pcii.sections import dense_kernels
 
-        running = self.total, self.squares, self.first
-        return all(dense_kernels.add_views(*running, images, self._moves(views)))
+def _of_one_group(number: np.ndarray, running: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
+    """Sum of `number` samples, and of their squared deviations from the mean, from their running sums."""
+    if len(running) == 1:
+        return running[0], 0.0
+    total, squares, first = running
+    deviations = _deviations(number, total, squares)
+    return total + np.where(number > 0, first, 0.0) * number, deviations
 
-    def finish(self) -> bool:
-        """Compute the result from the running sums; returns whether it is finite."""
-        from pcii.sections import dense_kernels
 
-        running = self.total, self.squares, self.first
-        return all(dense_kernels.merge_groups(self.sums, self.variance, *running, self.groups))
+def _of_two_groups(
+    one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """The same of the samples of two groups together: Chan, Golub and LeVeque 1983."""
+    (n, sums_n), (m, sums_m) = one, other
+    if len(sums_n) == 1:
+        return sums_n[0] + sums_m[0], 0.0
+    (a, squares_n, first_n), (b, squares_m, first_m) = sums_n, sums_m
+    squared = _deviations(n, a, squares_n) + _deviations(m, b, squares_m)
+    first_n, first_m = np.where(n > 0, first_n, 0.0), np.where(m > 0, first_m, 0.0)
+    difference = (first_m - first_n) + (b * (1 / np.maximum(m, 1)) - a * (1 / np.maximum(n, 1)))
+    squared += difference * difference * (n * m / np.maximum(n + m, 1))
+    return (a + b) + (first_n * n + first_m * m), squared
 
-    def _moves(self, views: np.ndarray) -> Moves:
-        return moves_of(self.row_px, self.col_px, views, self.channels, self.is_mosaic)
+
+def _deviations(number: np.ndarray, total: np.ndarray, squares: np.ndarray) -> np.ndarray:
+    """Sum of squared deviations from the mean; the square of the total alone could be infinite."""
+    return np.maximum(squares - total * (total * (1 / np.maximum(number, 1))), 0.0)
 
 
 def colours_apart(data: Views | PhotonCounts, shifts: Shifts) -> tuple[str | None, int]:
@@ -162,15 +198,6 @@ def _dtype(data: Views) -> np.dtype:
     """Type of the sums: float32 for float16 and float32 data, float64 for all others."""
     kind = getattr(data.radiance, "dtype", None)
     return np.dtype(np.float32) if kind in (np.float16, np.float32) else np.dtype(np.float64)
-
-
-def _of_few_types(counts: np.ndarray) -> np.ndarray:
-    """The same counts, not copied, as one of four types, for each of which loops are compiled.
-
-    None is negative, nor above 2^40, so that bits mean the same with a sign and without.
-    """
-    size = counts.dtype.itemsize
-    return counts.view(np.int64 if size == 8 else f"u{size}")
 
 
 def _in_memory(data: Views) -> np.ndarray | None:
@@ -217,7 +244,67 @@ def _not_faint(data: Views, variance: np.ndarray) -> np.ndarray:
     return variance
 
 
-def _raise_not_finite(data: Views) -> None:
+def _check_finite(data: Views, is_finite: bool) -> None:
+    """Raise `InputError` that names the view with NaN or infinity, if there is one, unless all is finite."""
+    if is_finite:
+        return
     for k, l in np.ndindex(data.grid.rows, data.grid.cols):
-        data.view(k, l)  # raises for a view with NaN or infinity
+        data.view(k, l)
     raise InputError("radiance: values are too large for their sum, or for their variance, to be a number")
+
+
+def step_px(shifts: Shifts) -> int:
+    """The number of pixels of which whole shifts are multiples."""
+    return 2 if shifts == "even" else 1
+
+
+def _cameras_by_parity(shift: np.ndarray, size: int) -> np.ndarray:
+    """How many cameras of even and of odd shift reach each voxel row (or column), (2, size)."""
+    pixel = np.arange(size) - shift[:, None]
+    inside = (pixel >= 0) & (pixel < size)
+    return np.array([inside[shift % 2 == parity].sum(axis=0) for parity in (0, 1)])
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Rows and columns of every view of some radiance, one view at a time."""
+
+    radiance: ArrayLike5D
+    rows: slice
+    cols: slice
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        K, L, *_, C = self.radiance.shape
+        return K, L, self.rows.stop - self.rows.start, self.cols.stop - self.cols.start, C
+
+    @property
+    def dtype(self) -> np.dtype | None:
+        return getattr(self.radiance, "dtype", None)
+
+    def __getitem__(self, index: Any, /) -> np.ndarray:
+        return np.asarray(self.radiance[index])[self.rows, self.cols]
+
+
+def views_around(
+    views: Views, planes: FocalPlanes, rows: slice, cols: slice
+) -> tuple[Views, FocalPlanes, tuple[slice, slice]]:
+    """Views of a smaller film, whose sections at these planes have the voxels `rows` and `cols` of all.
+
+    Also the planes for these views, and where the rows and columns are in their sections: all samples of
+    those voxels are there, and near the ends of the part some of the others are not.
+    """
+    reach_px = (int(np.abs(shifts_px).max()) for shifts_px in planes.whole_shifts_px)
+    part_rows, part_cols = map(_with_margin, (rows, cols), reach_px, views.grid.shape_HW)
+    radiance = _Part(views.radiance, part_rows, part_cols)
+    grid = replace(views.grid, height=radiance.shape[2], width=radiance.shape[3])
+    inside = (
+        slice(rows.start - part_rows.start, rows.stop - part_rows.start),
+        slice(cols.start - part_cols.start, cols.stop - part_cols.start),
+    )
+    return replace(views, radiance=radiance, grid=grid), replace(planes, grid=grid), inside
+
+
+def _with_margin(side: slice, reach_px: int, size: int) -> slice:
+    # From an even pixel on, so that a mosaic keeps its pattern.
+    return slice(max(side.start - reach_px, 0) // 2 * 2, min(side.stop + reach_px, size))

@@ -63,15 +63,6 @@ def scatter(
             begin[view] = e
 
 
-@shared(lambda target, *_: len(target))
-def copy_rows(first: int, last: int, target: np.ndarray, kinds: np.ndarray, rows: np.ndarray) -> None:
-    """Set each row n of `target` (N, M) to row `kinds[n]` of `rows` (P, M)."""
-    for row in range(first, last):
-        source, line = rows[kinds[row]], target[row]
-        for x in range(line.size):
-            line[x] = source[x]
-
-
 class Samples(NamedTuple):
     """Running statistics of samples that are not zero, (H, W) each, int64 and `squares` float64.
 

@@ -1,16 +1,26 @@
-"""Statistics of photon counts: pooled samples, entropy, and the variance of Poisson noise.
+"""Statistics of photon counts: pooled samples, entropy, the variance of Poisson noise, and saturation.
 
 At 1000 photons per view a voxel's own samples are degenerate: nine voxels of ten have no photon and
 hardly any has two different non-zero samples. So samples are pooled over small neighbourhoods, which
 is what the subscripts m, n of Muniraj et al. 2017, Eq. 7, can be read as.
+
+Photons that meet in a pixel and a frame are counted as 2^bits - 1 at most. How often they meet follows from
+how many there are in the same small part of a view. Of one bit, N of M pixels and frames that are set stand
+for M (H_M - H_(M-N)) photons, H being harmonic numbers. For N ~ Binomial(M, p) that is the sum over r of the
+unbiased estimates of p^r / r, the series of -ln(1 - p); a lone photon, which says nothing about saturation,
+stands for one.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
+from pcii.core.bayer import colour_index
 from pcii.core.focal_planes import FocalPlanes
+from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
+from pcii.core.photon_events import NEGLIGIBLE_LOSS, Readout
 from pcii.core.section_stack import Sections
 from pcii.imaging.blocks import sum_of
 
@@ -19,6 +29,9 @@ GREY_LEVELS = 256
 PHOTONS_PER_WINDOW = 64.0
 SMALLEST_WINDOW_PX = 3  # smaller windows may have no site of a Bayer colour
 LARGEST_WINDOW_PX = 15
+SATURATION_BLOCK_PX = 8
+"""Light is taken as even over blocks of so many pixels to a side, colour by colour: larger ones would average
+bright spots away, smaller ones hardly ever hold two photons (docs/single_photon.md has other sizes)."""
 
 
 def entropy_bits(values: np.ndarray, top: float) -> float:
@@ -65,7 +78,7 @@ def pooled_estimate(sections: Sections, window_px: int, samples: np.ndarray | No
     """Mean photons per sample over square windows, (Z, H, W, C) float64: counts over coverage.
 
     Sums are divided, so all samples have the same weight; a window that no sample reaches is 0. `samples` are
-    the `pooled_samples` of other sections with this coverage, which then are not found again.
+    the `pooled_samples` of other sections with this coverage, which are then not computed again.
     """
     mean = np.empty(sections.counts.shape)
     for plane in range(len(mean)):
@@ -138,11 +151,10 @@ def view_samples(
 ) -> ViewSamples:
     """Mean and variance of the non-zero samples of each pooled voxel of a plane (for Eq. 7).
 
-    With cells and windows of 1 these are the samples of single voxels, whatever their colour.
-
-    In focus all views see the same surface point, so their samples differ by Poisson noise only; out of focus
-    they see different points, and the variance is larger. A window of an even number of
-    pixels holds the same number of sites of each Bayer colour, whatever the shift of the view.
+    With cells and windows of 1 these are the samples of single voxels, whatever their colour. In focus all
+    views see the same surface point, so their samples differ by Poisson noise only; out of focus they see
+    different points, and the variance is larger. A window of an even number of pixels holds the same number
+    of sites of each Bayer colour, whatever the shift of the view.
 
     Variances are of the differences from each voxel's first sample, in double precision: exact where the sum
     of their squares times the number of views is below 2^53.
@@ -184,3 +196,53 @@ def truncated_poisson_variance(mean: np.ndarray) -> np.ndarray:
         slope = 1 - m * decay
         rate = np.maximum(rate - value / np.where(np.abs(slope) < 1e-12, 1e-12, slope), 1e-9)
     return np.where(m > 1 + 1e-9, m * np.maximum(1 + rate - m, 0.0), 0.0)
+
+
+def saturation_loss(counts: PhotonCounts) -> float:
+    """Share of the photons that the frames of these counts did not hold, from 0 to 1, estimated.
+
+    0 for counts without a limit, and without photons.
+    """
+    grid, most = counts.grid, counts.readout.most_per_frame
+    if most is None or not counts.total:
+        return 0.0
+    down, across = (-(-size // SATURATION_BLOCK_PX) for size in grid.shape_HW)
+    colours = counts.channel_count
+    rows, cols = np.indices(grid.shape_HW) // SATURATION_BLOCK_PX
+    block = ((rows * across + cols) * colours + colour_index(*grid.shape_HW, counts.cfa)).ravel()
+    trials = np.bincount(block, minlength=down * across * colours) * float(counts.readout.frames)
+    arrived = 0.0
+    for number in range(grid.view_count):
+        if counts.is_sparse:  # whole images of few photons would take ten times as long
+            events, own = counts.events, slice(*counts.view_starts[number : number + 2])
+            of, n = block[events.i[own].astype(np.int64) * grid.width + events.j[own]], events.n[own]
+        else:
+            of, n = block, counts.view(*divmod(number, grid.cols)).ravel()
+        counted = np.bincount(of, n, minlength=trials.size)
+        lit = counted > 0
+        arrived += float(_photons(counted[lit], trials[lit], counts.readout).sum())
+    return max(0.0, 1 - counts.total / arrived)
+
+
+def warn_of_saturation(data: PhotonCounts | Views) -> None:
+    """Warn where saturation removed more photons than a model of Poisson counts can do without."""
+    loss = 0.0 if isinstance(data, Views) else saturation_loss(data)
+    if loss > NEGLIGIBLE_LOSS:
+        warnings.warn(
+            f"saturation removed about {loss:.0%} of the photons; depth and removal take counts for Poisson "
+            f"numbers, which holds up to {NEGLIGIBLE_LOSS:.0%}: take more frames or less light",
+            UserWarning,
+            stacklevel=3,
+        )
+
+
+def _photons(counted: np.ndarray, trials: np.ndarray, readout: Readout) -> np.ndarray:
+    """Photons of blocks (N,) that have so many counts in so many pixels and frames."""
+    from scipy.special import digamma
+
+    if readout.bits == 1:
+        return trials * (digamma(trials + 1) - digamma(trials - counted + 1))
+    assert readout.most_per_frame is not None
+    # Three photons or more have to meet, and a few in a block say next to nothing about that.
+    below = np.minimum(counted, readout.most_per_frame * trials - 0.5)
+    return trials * Readout(1, readout.bits).photons(below, trials)

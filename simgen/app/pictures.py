@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.core.bayer import colours_and_samples
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.truth import Truth
-from pcii.core.view_figures import colours_and_samples
 from pcii.figures.exposure import block_px, exposed
 from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure

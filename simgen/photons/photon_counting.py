@@ -9,7 +9,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.photon_limit import photon_rates, scope_energies
+from pcii.core.photon_limit import Light, photon_rates, scope_energies
 from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
 from pcii.io.dataset_writer import write_counts as save_counts
 from pcii.io.dataset_writer import write_photon_truth
@@ -92,7 +92,8 @@ def draw_from_views(
                     f"exposure: more than {MOST_PHOTONS:g} photons in a pixel of view ({k}, {l})"
                 )
         else:
-            rates = photon_rates(raw, cfa, photons.budget, photons.scope, normalisers[number])
+            light = Light(photons.budget, photons.scope)
+            rates = photon_rates(raw, cfa, light, normalisers[number])
         rng = seeds.generator(capture.seed, view=number, stage="photons")
         counts = draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)

@@ -53,12 +53,12 @@ def voxel_of(pixel: int, camera: int, cameras: int, disparity: float, subpixel: 
 def samples_of(
     images: np.ndarray, grid: CameraGrid, z_mm: float, *, cfa: str | None = None, subpixel: int = 1
 ) -> dict[tuple[int, int, int], list[float]]:
-    """The samples that meet at each (row, column, colour) of views (K, L, H, W, C) of a `unit_grid`."""
+    """The samples that meet at each (row, column, colour) of views (K, L, H, W, C)."""
     K, L, H, W, C = images.shape
+    d_x, d_y = (grid.focal_mm * pitch / (z_mm * grid.pixel_mm) for pitch in grid.pitch_mm)
     meeting: dict[tuple[int, int, int], list[float]] = {}
     for k, l, i, j in np.ndindex(K, L, H, W):
-        row = voxel_of(i, k, K, grid.pitch_mm[1] / z_mm, subpixel)
-        col = voxel_of(j, l, L, grid.pitch_mm[0] / z_mm, subpixel)
+        row, col = voxel_of(i, k, K, d_y, subpixel), voxel_of(j, l, L, d_x, subpixel)
         if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
             for channel in range(C):
                 colour = channel if cfa is None else colour_of(i, j, cfa)
@@ -69,23 +69,13 @@ def samples_of(
 def section_twin(
     counts_KLHW: np.ndarray, grid: CameraGrid, cfa: str | None, z_mm: list[float], subpixel: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Eq. 3 as it reads, before its division: counts and coverage (Z, H M, W M, C) by five loops."""
-    channels = 1 if cfa is None else 3
-    shape = (len(z_mm), grid.height * subpixel, grid.width * subpixel, channels)
+    """Eq. 3 as it reads, before its division: counts and coverage (Z, H M, W M, C)."""
+    shape = (len(z_mm), grid.height * subpixel, grid.width * subpixel, 1 if cfa is None else 3)
     total, coverage = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint32)
-    K, L, H, W = grid.shape_KLHW
     for plane, z in enumerate(z_mm):
-        d_x = grid.focal_mm * grid.pitch_mm[0] / (z * grid.pixel_mm)
-        d_y = grid.focal_mm * grid.pitch_mm[1] / (z * grid.pixel_mm)
-        for k in range(K):
-            for l in range(L):
-                for i in range(H):
-                    for j in range(W):
-                        row, col = voxel_of(i, k, K, d_y, subpixel), voxel_of(j, l, L, d_x, subpixel)
-                        if 0 <= row < H * subpixel and 0 <= col < W * subpixel:
-                            colour = colour_of(i, j, cfa)
-                            total[plane, row, col, colour] += counts_KLHW[k, l, i, j]
-                            coverage[plane, row, col, colour] += 1
+        meeting = samples_of(counts_KLHW[..., None], grid, z, cfa=cfa, subpixel=subpixel)
+        for voxel, samples in meeting.items():
+            total[plane, *voxel], coverage[plane, *voxel] = sum(samples), len(samples)
     return total, coverage
 
 

@@ -10,6 +10,7 @@ from plain_scenes import built, card, grid, sphere
 
 import simgen
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import project_px
 from pcii.core.truth import Truth
 from pcii.metrics.true_masks import TrueFocus
@@ -155,7 +156,7 @@ def test_focus_is_what_the_score_takes_it_for() -> None:
         of = grid(rows, cols, 30, 40)
         truth = Truth(z, np.zeros(z.shape, np.int16), {})
         np.testing.assert_array_equal(
-            in_focus(of, z, planes), TrueFocus(of, truth, np.array(planes)).by_pixel
+            in_focus(of, z, planes), TrueFocus(FocalPlanes.at_depths(of, planes), truth).by_pixel
         )
     assert in_focus(of, z, ()).shape == (0, 30, 40)
 

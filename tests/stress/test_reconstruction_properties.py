@@ -18,12 +18,12 @@ from pcii.core.arrays import check_z_mm
 from pcii.core.bayer import PATTERNS
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import depth_of_total_disparity_mm, project_px, total_disparity_px
-from pcii.core.photon_limit import photon_rates, scope_energies
+from pcii.core.photon_limit import Light, photon_rates, scope_energies
 from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.mask_outlines import boundary_f, object_share
-from pcii.metrics.agreement import mask_agreement
 from pcii.metrics.depth_accuracy import depth_errors
+from pcii.metrics.true_masks import mask_agreement
 from pcii.sections.photon_statistics import view_samples
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
@@ -130,7 +130,7 @@ def test_a_subsample_has_no_photon_that_was_not_there(seed: int, most: float) ->
 def test_expected_photons_add_up_to_the_budget(seed: int, cfa: str | None, budget: float, power: int) -> None:
     raw = np.random.default_rng(seed).uniform(0, 1, (5, 6)) * 2.0**power
     for scope in ("view", "channel"):
-        rates = photon_rates(raw, cfa, budget, scope, scope_energies(raw, cfa, scope))
+        rates = photon_rates(raw, cfa, Light(budget, scope), scope_energies(raw, cfa, scope))
         parts = 1 if scope == "view" or cfa is None else 3
         assert (rates >= 0).all()
         np.testing.assert_allclose(rates.sum(), parts * budget, rtol=1e-12 if power > -900 else 1e-3)
@@ -249,7 +249,7 @@ def test_a_point_is_where_its_section_has_it(
 @given(st.booleans(), st.booleans(), st.booleans(), st.integers(1, 5), st.integers(1, 5))
 def test_stored_views_are_put_in_order_without_loss(swap, rows, cols, K: int, L: int) -> None:
     order = pcii.ViewOrder(swap_axes=swap, flip_rows=rows, flip_cols=cols)
-    numbers = order.numbers(K, L)
+    numbers = order.arrange(np.arange(K * L).reshape((L, K) if swap else (K, L)))
     assert numbers.shape == (K, L)
     assert sorted(numbers.ravel().tolist()) == list(range(K * L))
 

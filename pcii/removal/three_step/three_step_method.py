@@ -32,8 +32,7 @@ from pcii.sections.photon_statistics import (
     pooled_plane,
     section_window_px,
 )
-from pcii.sections.probe_planes import PROBE_STEPS_PX, with_probes
-from pcii.sections.reconstruction import extend, reconstruct
+from pcii.sections.reconstruction import PROBE_STEPS_PX, extend, reconstruct, with_probes
 
 PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
 LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2

@@ -47,14 +47,6 @@ def test_an_even_section_has_one_class_and_it_is_dark(method, cfa, count, size):
     assert not segment(counts, [0.5, 1.0], method=method).in_focus.any()
 
 
-def test_what_is_saturated_on_the_dark_is_bright():
-    grid = unit_grid(3, 3, 48, 48)
-    film = np.zeros(grid.shape_KLHW, dtype=int)
-    film[:, :, 12:36, 12:36] = 2**40
-    counts = PhotonCounts.from_dense(film, grid)
-    assert segment(counts, [1e6], method="brightness").in_focus[0, 14:34, 14:34].all()
-
-
 @pytest.mark.parametrize("method", ["variance", "shape-from-focus"])
 def test_one_cue_beside_brightness_is_better_than_brightness(two_squares, method):
     simple = segment(two_squares.counts, two_squares.z_mm, method="brightness").in_focus

@@ -1,5 +1,3 @@
-import math
-
 import numpy as np
 import pytest
 from camera_grids import grids
@@ -82,24 +80,6 @@ def test_planes_run_from_far_to_near_in_equal_steps_of_total_disparity(near, ext
     assert steps.max() <= step + 1e-9
 
 
-def test_no_more_planes_than_the_step_asks_for():
-    planes = FocalPlanes.between(unit_grid(1, 5, 8, 8), 1.0, 4.0, 1.0)  # total disparity 4 / z
-    np.testing.assert_allclose(planes.z_mm, [4 / 1, 4 / 2, 4 / 3, 4 / 4], rtol=1e-15)
-
-
-def test_there_are_two_planes_even_if_the_step_is_coarse():
-    planes = FocalPlanes.between(paper_grid(), 540.0, 541.0, 1000.0)
-    np.testing.assert_allclose(planes.z_mm, [541.0, 540.0], rtol=1e-13)  # two divisions
-
-
-def test_a_step_of_total_disparity_is_a_quadratic_step_of_depth():
-    z = FocalPlanes.between(paper_grid(), 300.0, 1200.0, 0.05).z_mm[::-1]
-    slope = np.diff(z) / z[:-1] ** 2
-    # dz = z^2 dd / (focal pitch (N-1) / pixel); second order is step / total disparity = 0.05 / 53.
-    np.testing.assert_allclose(slope, slope[0], rtol=2 * 0.05 / 53)
-    assert math.isclose(slope[0], 0.05 * 0.0352 / (50 * 5 * 9), rel_tol=1e-2)
-
-
 @given(grid=grids, z=depths)
 @at_least(100)
 def test_planes_of_a_total_disparity_are_those_of_its_depth(grid, z):
@@ -118,14 +98,6 @@ def test_planes_are_taken_and_followed_by_others_in_the_order_asked_for():
     np.testing.assert_array_equal(more.z_mm, [4.0, 1.0, 0.5])
     np.testing.assert_array_equal(more.total_disparity_px, [1.0, 4.0, 8.0])
     assert len(planes.followed_by([])) == 3
-
-
-def test_shifts_of_several_planes_are_those_of_each():
-    grid = paper_grid()
-    planes = FocalPlanes.at_depths(grid, [540.0, 620.0])
-    for plane, z in enumerate((540.0, 620.0)):
-        for shifts, alone in zip(planes.whole_shifts_px, whole_shifts(grid, z), strict=True):
-            np.testing.assert_array_equal(shifts[plane], alone)
 
 
 def test_a_plane_whose_shifts_no_integer_holds_is_refused():

@@ -17,26 +17,17 @@ from pcii.core.geometry import (
 depths = st.floats(200, 5000)
 
 
-def test_a_camera_further_right_sees_a_point_further_left():
-    grid = unit_grid(3, 3, 9, 9, pitch_mm=(2.0, 1.0))
-    columns = [project_px(grid, (0, 0, 1), 1, l)[1] for l in range(3)]
-    assert columns == [6.0, 4.0, 2.0]  # X_l = -2, 0, 2
-
-
-def test_a_camera_further_down_sees_a_point_further_up():
+def test_a_camera_further_right_or_down_sees_a_point_further_left_or_up():
     grid = unit_grid(3, 3, 9, 9, pitch_mm=(2.0, 1.0))
     rows = [project_px(grid, (0, 0, 1), k, 1)[0] for k in range(3)]
     assert rows == [5.0, 4.0, 3.0]  # Y_k = -1, 0, 1
+    columns = [project_px(grid, (0, 0, 1), 1, l)[1] for l in range(3)]
+    assert columns == [6.0, 4.0, 2.0]  # X_l = -2, 0, 2
 
 
 def test_right_and_down_in_the_world_are_right_and_down_in_the_image():
     grid = unit_grid(1, 1, 9, 11)
     assert project_px(grid, (1, 2, 2), 0, 0) == (4 + 1.0, 5 + 0.5)
-
-
-def test_the_row_of_a_camera_does_not_depend_on_its_column():
-    grid = unit_grid(3, 3, 9, 9, pitch_mm=(2.0, 1.0))
-    assert {project_px(grid, (3, 1, 2), 0, l)[0] for l in range(3)} == {4 + (1 + 1) / 2}
 
 
 @pytest.mark.parametrize(
@@ -45,10 +36,6 @@ def test_the_row_of_a_camera_does_not_depend_on_its_column():
 def test_the_optical_axis_meets_the_middle_of_even_and_odd_images(size, axis_px):
     grid = unit_grid(1, 1, *size)
     assert project_px(grid, (0, 0, 7), 0, 0) == axis_px
-
-
-def test_the_virtual_centre_of_an_odd_grid_is_its_middle_camera():
-    assert camera_position_mm(unit_grid(3, 5, 1, 1, pitch_mm=(2.0, 4.0)), 1, 2) == (0.0, 0.0)
 
 
 def test_the_virtual_centre_of_an_even_grid_is_between_cameras():
@@ -69,29 +56,15 @@ def test_disparity_is_the_step_between_neighbouring_cameras(grid, z):
     assert i0 - i1 == pytest.approx(float(d_y), abs=5e-12)
 
 
-def test_disparity_is_focal_times_pitch_over_depth_times_pixel():
-    d_x, d_y = disparity_px(unit_grid(2, 2, 1, 1, pitch_mm=(6.0, 3.0)), np.array([1.0, 2.0, 4.0]))
-    np.testing.assert_array_equal(d_x, [6.0, 3.0, 1.5])
-    np.testing.assert_array_equal(d_y, [3.0, 1.5, 0.75])
-
-
 def test_disparity_of_the_papers_objects():
     d_x, _ = disparity_px(paper_grid(), np.array([540.0, 620.0]))
     # 50 x 5 / (z x 0.0352) by hand, to the digits written.
     np.testing.assert_allclose(d_x, [13.1524, 11.4553], rtol=0, atol=5e-5)
 
 
-def test_there_is_no_disparity_at_infinity():
-    assert disparity_px(paper_grid(), np.inf) == (0.0, 0.0)
-
-
 def test_total_disparity_is_taken_over_the_longer_axis():
     assert total_disparity_px(unit_grid(3, 5, 1, 1, pitch_mm=(2.0, 3.0)), 1.0) == 8.0  # 4 x 2 > 2 x 3
     assert total_disparity_px(unit_grid(4, 5, 1, 1, pitch_mm=(2.0, 3.0)), 1.0) == 9.0  # 3 x 3 > 4 x 2
-
-
-def test_a_single_camera_has_no_total_disparity():
-    assert total_disparity_px(unit_grid(1, 1, 4, 4), 5.0) == 0.0
 
 
 @given(grid=grids, z=depths, z0=depths)
@@ -105,7 +78,3 @@ def test_blur_is_half_of_where_the_cameras_scatter_a_point(grid, z, z0):
         extents.append((max(placed) - min(placed)) / 2)
     # Positions up to 1e4 px, each rounded at 2^-53 relative: 1e-11 px with room to spare.
     assert float(blur_half_extent_px(grid, z, z0)) == pytest.approx(max(extents), abs=1e-10)
-
-
-def test_what_is_in_focus_has_no_blur():
-    assert blur_half_extent_px(paper_grid(), 540.0, 540.0) == 0.0

@@ -76,13 +76,11 @@ def test_means_of_a_mosaic_have_its_colours(j: int, channel: int) -> None:
     assert not np.delete(image[4, j], channel).any()
 
 
-def test_views_are_drawn_one_by_one_and_as_a_mean() -> None:
+def test_views_are_drawn_one_by_one() -> None:
     radiance = np.zeros((3, 3, 12, 16, 3))
     radiance[0, 1, 2, 3] = 1, 0, 0
-    radiance[2, 2, 7, 8] = 0, 0, 1
     views = pcii.Views(radiance, GRID)
     assert np.argwhere(picture(views.plot(view=(0, 1))[0])).tolist() == [[2, 3, 0]]
-    assert np.argwhere(picture(views.plot(view="mean")[0])).tolist() == [[2, 3, 0], [7, 8, 2]]
 
 
 def test_single_bright_voxels_do_not_darken_a_section() -> None:
@@ -287,7 +285,7 @@ def test_numbers_that_are_no_light_are_drawn_without_a_warning(value: float) -> 
     planes = FocalPlanes.at_depths(GRID, Z_MM)
     sections = pcii.Sections(planes, np.full((2, 12, 16, 3), value), np.ones((2, 12, 16, 3)))
     sections.plot()[0].figure.draw_without_rendering()
-    assert sections._repr_html_().count("<img") == 2
+    assert sections._repr_html_().count("<img") == 1
 
 
 def test_matplotlib_is_loaded_by_the_first_picture() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.base.errors import InputError
 from pcii.core.camera_grid import CameraGrid
+from pcii.core.focal_planes import FocalPlanes
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.core.section_stack import Sections
@@ -51,16 +51,9 @@ def test_by_object_the_oracle_claims_every_pixel_of_an_object_at_its_nearest_pla
 def test_an_object_across_two_planes_costs_even_the_oracle() -> None:
     z = np.array([[4 / 40, 4 / 39, 4 / 38, 4 / 31, np.inf, np.inf, np.inf, np.inf]])
     true = Truth(z, np.array([[1, 1, 1, 1, 0, 0, 0, 0]]), {1: "long"})
-    iou = plane_bounds(TrueFocus(GRID, true, Z))
+    iou = plane_bounds(TrueFocus(FocalPlanes.at_depths(GRID, Z), true))
     # It belongs to the plane of 40, where one pixel of four is nearer to that of 30.
     assert iou == {(0, "object"): 3 / 4, (0, "pixel"): 1.0, (1, "object"): 0.0, (1, "pixel"): 1.0}
-
-
-def test_oracle_refuses_what_it_cannot_compare() -> None:
-    with pytest.raises(InputError, match=r"^kind: use 'object' or 'pixel', not 'photon'"):
-        oracle(sections(), truth(), kind="photon")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match=r"^truth: its maps are \(1, 8\), the sections \(1, 9\)"):
-        oracle(sections(unit_grid(5, 5, 1, 9)), truth())
 
 
 def test_ten_cameras_inform_as_much_as_the_mean_square_of_their_places() -> None:
@@ -98,30 +91,6 @@ def test_the_bound_is_one_over_the_root_of_a_numerical_fisher_information(grid: 
     squares = float((weight * g_x**2).sum()), float((weight * g_y**2).sum())
     # Central differences of 1e-3 px are exact to their square.
     assert depth_bound_px(grid, photons, squares) == pytest.approx(information**-0.5, rel=1e-5)
-
-
-def test_the_best_estimate_from_poisson_counts_reaches_the_bound_and_no_more() -> None:
-    grid, side, trials = unit_grid(1, 10, 16, 16), 16, 4000
-    places = (np.arange(10) - 4.5) / 9
-    x = np.arange(side) * (2 * np.pi / side)
-
-    def rates(u: float) -> np.ndarray:  # (views x columns); all 16 rows are alike and added up
-        moved = x - u * places[:, None] * (2 * np.pi / side)
-        return 16 * np.exp(0.9 * np.sin(2 * moved)).ravel()
-
-    slope = 0.9 * 2 * np.cos(2 * x) * (2 * np.pi / side)
-    weight = np.exp(0.9 * np.sin(2 * x))
-    squared = float((weight * slope**2).sum() / weight.sum())
-    bound = depth_bound_px(grid, rates(0).sum(), (squared, 0.0))
-    assert bound is not None
-    u = np.linspace(-6 * bound, 6 * bound, 61)
-    counts = np.random.default_rng(11).poisson(rates(0), (trials, 10 * side))
-    likelihood = counts @ np.log([rates(one) for one in u]).T  # the sums of the rates do not depend on u
-    best = likelihood.argmax(axis=1).clip(1, u.size - 2)
-    before, at, after = (likelihood[np.arange(trials), best + step] for step in (-1, 0, 1))
-    estimate = u[best] + (before - after) / (2 * (before - 2 * at + after)) * (u[1] - u[0])
-    # A standard deviation from n trials is known to 1 / sqrt(2 n); four of these. 1/12 for c is 10 % off.
-    assert estimate.std() == pytest.approx(bound, rel=4 / np.sqrt(2 * trials))
 
 
 def test_without_information_on_depth_there_is_no_bound() -> None:
@@ -169,10 +138,3 @@ def test_objects_have_bounds_where_light_texture_and_photons_are_known() -> None
     assert rows[0]["depth_sigma_px"] == pytest.approx(1 / np.sqrt(c_x * 200 * 0.05**2), rel=1e-2)
     assert rows[1]["depth_sigma_px"] is rows[2]["depth_sigma_px"] is None
     assert {row["depth_sigma_px"] for row in object_bounds(true, None, None)} == {None}
-
-
-def test_without_provenance_photons_are_those_of_the_objects_pixels() -> None:
-    rows = object_bounds(truth(), None, sections())
-    # One photon a pixel. At disparity 10 and 7.5 the other views move out of a picture of 1 x 8, but for
-    # single columns at its ends, so the two and the four pixels of the objects get one photon each.
-    assert [row["photons"] for row in rows] == [2, 4]

@@ -12,7 +12,7 @@ from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks
 from pcii.io.sample_dataset import sample
 from pcii.removal.methods import segment
-from pcii.sections.probe_planes import with_probes
+from pcii.sections.reconstruction import with_probes
 
 ABLE = ["three-step", "likelihood", "posterior"]
 methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "variance", "shape-from-focus"])

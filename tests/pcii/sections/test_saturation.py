@@ -8,7 +8,7 @@ from twins import unit_grid
 import pcii
 from pcii.base.command_line import run
 from pcii.core.photon_counts import PhotonCounts
-from pcii.sections.saturation import saturation_loss
+from pcii.sections.photon_statistics import saturation_loss
 
 GRID = unit_grid(2, 2, 64, 50)
 
@@ -61,7 +61,7 @@ def test_depth_and_removal_warn_beyond_two_per_cent(recwarn: pytest.WarningsReco
     many, _ = read(0.3, 1, 1)
     with pytest.warns(UserWarning, match=r"saturation removed about 1\d% of the photons"):
         pcii.segment(many, z_mm=[1.0], method="brightness")
-    with pytest.warns(UserWarning, match="more frames or less light"):
+    with pytest.warns(UserWarning, match="take more frames or less light"):
         pcii.estimate_depth(many, (0.5, 2.0), method="variance-sweep")
 
 

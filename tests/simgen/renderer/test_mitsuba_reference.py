@@ -135,7 +135,7 @@ def test_views_truth_and_photons_are_those_of_mitsuba(
     luminance = theirs.mean(axis=0) @ [0.2126, 0.7152, 0.0722]
     expected = luminance / luminance.sum() * counts.total
     size = SIDE // TILES
-    drawn = counts.to_numpy().reshape(TILES, size, TILES, size).sum(axis=(1, 3))
+    drawn = counts.dense.reshape(TILES, size, TILES, size).sum(axis=(1, 3))
     assert ((drawn - expected) ** 2 / expected).sum() / (TILES**2 - 1) < 1.8
     ray, _ = file.sensors()[0].sample_ray(0.0, 0.0, mi.Point2f(0.27, 0.71), mi.Point2f(0.5))
     hit = file.ray_intersect(ray)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pcii.core.bayer import colour_index
-from pcii.core.photon_limit import photon_rates, scope_energies, sense
+from pcii.core.photon_limit import Light, photon_rates, scope_energies, sense
 from simgen.sensor.detector import draw_counts, fixed_totals
 from simgen.spec.recipe import Photons
 
@@ -34,7 +34,7 @@ def test_multinomial_totals_are_exact(scope: str) -> None:
     assert totals is not None
     rng = np.random.default_rng(2)
     drawn = [
-        draw_counts(photon_rates(raw, "GRBG", 700, scope, e), "GRBG", rng, t)
+        draw_counts(photon_rates(raw, "GRBG", Light(700, scope), e), "GRBG", rng, t)
         for raw, e, t in zip(raws, energies, totals, strict=True)
     ]
     if scope == "scene":
@@ -48,9 +48,9 @@ def test_multinomial_totals_are_exact(scope: str) -> None:
 
 def test_expected_photons_share_the_budget_in_proportion_to_the_light() -> None:
     raw = ramp()
-    rates = photon_rates(raw, "GRBG", 500, "view", scope_energies(raw, "GRBG", "view"))
+    rates = photon_rates(raw, "GRBG", Light(500), scope_energies(raw, "GRBG", "view"))
     np.testing.assert_allclose(rates, 500 * raw / raw.sum(), rtol=1e-12)
-    rates = photon_rates(raw, "RGGB", 500, "channel", scope_energies(raw, "RGGB", "channel"))
+    rates = photon_rates(raw, "RGGB", Light(500, "channel"), scope_energies(raw, "RGGB", "channel"))
     colours = colour_index(12, 10, "RGGB")
     for colour in range(3):
         assert rates[colours == colour].sum() == pytest.approx(500, rel=1e-12)

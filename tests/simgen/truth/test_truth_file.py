@@ -9,6 +9,7 @@ import zarr
 from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
+from pcii.core.focal_planes import FocalPlanes
 from pcii.io.dataset import open_dataset
 from pcii.io.dataset_layout import TRUTH
 from pcii.metrics.true_masks import TrueFocus
@@ -51,7 +52,7 @@ def test_every_pass_is_there_and_opens(whole: Path) -> None:
     assert (truth.coverage[truth.object_id > 0] < 1).any()
     group = zarr.open_group(whole / TRUTH, mode="r")
     assert group.attrs["in_focus_z_mm"] == [540.0, 620.0]
-    masks = TrueFocus(dataset.grid, truth, np.array([540.0, 620.0])).by_pixel
+    masks = TrueFocus(FocalPlanes.at_depths(dataset.grid, [540.0, 620.0]), truth).by_pixel
     np.testing.assert_array_equal(array(group, "in_focus"), masks)
     assert masks.any()
     work = {entry["what"]: entry["saved"] for entry in dataset.manifest["skipped"]}

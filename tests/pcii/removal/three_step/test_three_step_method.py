@@ -22,7 +22,7 @@ from pcii.imaging.watershed_pieces import cheapest_planes, pieces_along_ridges
 from pcii.removal.three_step.edge_entropy import edge_entropies, planes_of_least_entropy
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.removal.three_step.variance_threshold import adaptive_threshold
-from pcii.sections.probe_planes import with_probes
+from pcii.sections.reconstruction import with_probes
 
 NOTHING = ThreeStep(threshold=False, boundary=False, entropy=False)
 
