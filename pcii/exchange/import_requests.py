@@ -170,7 +170,7 @@ class Imported:
 
 
 def read_pictures(
-    source: Source, *, pattern: str | None, grid: WholePair, light: PictureLightOptions
+    source: Source, *, pattern: str | None, grid: WholePair, light: LightOptions
 ) -> Imported:
     """Pictures of a folder by --pattern, or pages of a TIFF file."""
     views = import_images(source.path, pattern, grid=grid, **light.keywords(), **source.listeners)
@@ -179,7 +179,7 @@ def read_pictures(
     return Imported(views, origin, counted=_is_counted(pattern, True))
 
 
-def read_lens_array(source: Source, *, lenses: Lenses, light: PictureLightOptions) -> Imported:
+def read_lens_array(source: Source, *, lenses: Lenses, light: LightOptions) -> Imported:
     """One picture of a lens array."""
     if lenses.lens_array is None or lenses.lens_pitch_px is None:
         raise InputError("--lens-pitch-px: missing; a lens array needs the distance from lens to lens")
@@ -192,7 +192,7 @@ def read_lens_array(source: Source, *, lenses: Lenses, light: PictureLightOption
     return Imported(views, f"{source.name}, a picture of {rows} x {cols} lenses{_curve(light)}")
 
 
-def read_array(source: Source, *, array: str | None, grid: WholePair, light: PictureLightOptions) -> Imported:
+def read_array(source: Source, *, array: str | None, grid: WholePair, light: LightOptions) -> Imported:
     """An array of light in a .npy or .npz file."""
     views = import_arrays(source.path, array=array, grid=grid, **light.keywords())
     return Imported(views, f"array of {source.name}{_curve(light)}", counted=grid is not None)

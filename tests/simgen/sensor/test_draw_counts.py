@@ -56,5 +56,5 @@ def test_expected_photons_share_the_budget_in_proportion_to_the_light() -> None:
         assert rates[colours == colour].sum() == pytest.approx(500, rel=1e-12)
     for scope in ("view", "channel", "scene"):  # darkness gets none, and no warning
         energies = scope_energies(0 * raw, "GRBG", scope)
-        assert (photon_rates(0 * raw, "GRBG", 500, scope, energies) == 0).all()
+        assert (photon_rates(0 * raw, "GRBG", Light(500, scope), energies) == 0).all()
     np.testing.assert_allclose(sense(np.full((2, 2, 3), 7.0), None), 7.0, rtol=1e-12)
