@@ -169,9 +169,7 @@ class Imported:
     """Whether views are counted one by one, not stored by row and column."""
 
 
-def read_pictures(
-    source: Source, *, pattern: str | None, grid: WholePair, light: LightOptions
-) -> Imported:
+def read_pictures(source: Source, *, pattern: str | None, grid: WholePair, light: LightOptions) -> Imported:
     """Pictures of a folder by --pattern, or pages of a TIFF file."""
     views = import_images(source.path, pattern, grid=grid, **light.keywords(), **source.listeners)
     what = "pages" if pattern is None else "pictures"

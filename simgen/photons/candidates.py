@@ -4,9 +4,11 @@ What all backends share: `wavefront_sampler` traces all candidates at once, `sca
 other.
 """
 
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,8 +47,7 @@ class Setup:
         return channel_count(self.cfa)
 
 
-@dataclass(frozen=True, eq=False)
-class Accepted:
+class Accepted(NamedTuple):
     """The `photons` that candidates gave, a row for each that was kept, and its first hit.
 
     `candidate` (rows,) is the number of each. `ratio` (F,) is radiance over limit of all paths that were
@@ -59,6 +60,12 @@ class Accepted:
     exceeding: Samples
 
 
+def nothing(channels: int) -> Accepted:
+    """No photons."""
+    whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
+    return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
+
+
 class FilmPoints(NamedTuple):
     """Points (N,) of films: view, and row and column from the film's corner in [0, H) and [0, W)."""
 
@@ -68,50 +75,13 @@ class FilmPoints(NamedTuple):
 
     def on_film(self, grid: CameraGrid) -> "FilmPoints":
         """Those that lie on the film; NaN lies nowhere."""
-        rows, cols = self.row, self.col
-        which = (rows >= 0) & (rows < grid.height) & (cols >= 0) & (cols < grid.width)
-        return FilmPoints(self.view[which], rows[which], cols[which])
+        which = is_on_film(grid, self.row, self.col)
+        return FilmPoints(self.view[which], self.row[which], self.col[which])
 
 
-class CandidateSampler(Protocol):
-    """A majorant as candidates are drawn from it.
-
-    They come of groups of Bayer cells, each candidate of one. `mass` (G,) is the sum of the bounds of the
-    pixels of each group in one view, border tiles counted whole. With an earlier majorant `below`, of the
-    same tiles and nowhere higher, what lies between the two is drawn: of the tiles that have been raised
-    alone, and of each path the part of its radiance above the earlier bound.
-    """
-
-    majorant: Majorant
-    below: Majorant | None
-    mass: np.ndarray
-
-    @property
-    def paths_each(self) -> int:
-        """Light paths of a candidate that is followed."""
-        ...
-
-    @property
-    def max_dark_candidates(self) -> int:
-        """Where so many candidates find no light there is none."""
-        ...
-
-    def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
-        """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
-
-        `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
-        A path that exceeds its bound is kept, and is among those that are `exceeding`. Raises `InputError`
-        for radiance that is not finite.
-        """
-        ...
-
-    def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
-        """A pilot through these points of films, of which the first `follow` are followed.
-
-        Of a ray that is not followed `light` is NaN (see `Samples`); backends may leave such out. Raises
-        `InputError` for radiance that is not finite.
-        """
-        ...
+def is_on_film(grid: CameraGrid, row: Any, col: Any) -> Any:
+    """Whether rows and columns lie on the film; arrays of NumPy or of the renderer."""
+    return (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width)
 
 
 def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) -> FilmPoints:
@@ -130,42 +100,82 @@ def even_film_points(grid: CameraGrid, number: int, rng: np.random.Generator) ->
     return FilmPoints(rng.permutation(cell.size) % grid.view_count, i, j)
 
 
-def paths_of(sampler: CandidateSampler, candidates: int, followed: int) -> int:
-    """Light paths of so many candidates, of which some are followed beyond their first hit."""
-    return candidates + (sampler.paths_each - 1) * followed
+class Candidates(NamedTuple):
+    """Candidates (N,), in arrays of NumPy or of the renderer.
 
-
-@dataclass(frozen=True)
-class Chances:
-    """Where the candidates of a group of Bayer cells fall: entry of the majorant and cell (2 a + b).
-
-    `running` (N,) are the sums of the bounds of all pixels up to and with these; the last is their mass.
+    Camera, pixel, place on the film, entry of the majorant, colour, whether the pixel is on the film, the
+    point (2, N) of the lens in mm, and numbers that decide on wavelengths in compiled backends. Dr.Jit looks
+    into tuples but not into named ones: hand it their elements.
     """
 
-    running: np.ndarray
-    entry: np.ndarray
-    cell: np.ndarray
+    k: Any
+    l: Any
+    row: Any
+    col: Any
+    row_px: Any
+    col_px: Any
+    entry: Any
+    colour: Any
+    inside: Any
+    lens_point: Any
+    wavelength_sample: Any = None
 
 
-def chances(setup: Setup, majorant: Majorant, below: Majorant | None, cells: np.ndarray) -> Chances:
-    """The chances of a group of cells under a majorant; 0 on tiles that are as they were in `below`."""
-    colours = colour_cells(setup.cfa).ravel()[cells]
-    mass = majorant.bound[:, colours] * (majorant.side_px**2 / 4)[:, None]
-    if below is not None:
-        mass *= majorant.is_above(below)[:, None]
-    entries = majorant.layer.size
-    return Chances(np.cumsum(mass.ravel()), np.arange(entries).repeat(cells.size), np.tile(cells, entries))
+class CandidateSampler(ABC):
+    """A majorant as candidates are drawn from it, in light that is guessed to be `ambient` (C,) all around.
 
+    They come of `groups` of Bayer cells (2 a + b), each candidate of one. `running` are for each group the
+    sums of the bounds of all pixels, in one view, up to and with those of an entry's cell; the last is their
+    `mass` (G,), border tiles counted whole. With an earlier majorant `below`, of the same tiles and nowhere
+    higher, what lies between the two is drawn: of the tiles that have been raised alone, and of each path the
+    part of its radiance above the earlier bound.
+    """
 
-def require_finite(setup: Setup, light: np.ndarray, object_id: np.ndarray) -> None:
-    """`InputError` for radiance (N, ...) that is no finite number, with the object (N,) that was seen."""
-    is_finite = np.isfinite(light).reshape(len(light), -1).all(axis=1)
-    if not is_finite.all():
-        number = int(object_id[np.flatnonzero(~is_finite)[0]])
-        raise InputError(not_finite(setup.render_scene, number))
+    paths_each: int
+    """Light paths of a candidate that is followed."""
+    max_dark_candidates: int
+    """Where so many candidates find no light there is none."""
 
+    def __init__(
+        self,
+        setup: Setup,
+        majorant: Majorant,
+        groups: Sequence[np.ndarray],
+        ambient: np.ndarray,
+        below: Majorant | None = None,
+    ) -> None:
+        self.setup, self.majorant, self.groups = setup, majorant, groups
+        self.ambient, self.below = ambient, below
+        bound = majorant.bound * (majorant.side_px**2 / 4)[:, None]
+        if below is not None:
+            bound *= majorant.is_above(below)[:, None]
+        self.colours = colour_cells(setup.cfa).ravel()
+        self.running = [np.cumsum(bound[:, self.colours[cells]]) for cells in groups]
+        self.mass = np.array([sums[-1] for sums in self.running])
 
-def nothing(channels: int) -> Accepted:
-    """No photons."""
-    whole, real, colours = np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((0, channels))
-    return Accepted(no_photons(), whole, real, Samples(whole, whole, whole, whole, real, colours, colours))
+    @abstractmethod
+    def try_candidates(self, group: np.ndarray, view: np.ndarray | None, seed: int) -> Accepted:
+        """Draw a candidate for each of `group` (N,), keep it with probability radiance / bound.
+
+        `group` says which cells each may fall on, `view` (N,) on which film; None draws the view too.
+        A path that exceeds its bound is kept, and is among those that are `exceeding`. Raises `InputError`
+        for radiance that is not finite.
+        """
+
+    @abstractmethod
+    def trace(self, points: FilmPoints, follow: int, seed: int) -> Samples:
+        """A pilot through these points of films, of which the first `follow` are followed.
+
+        Of a ray that is not followed `light` is NaN (see `Samples`); backends may leave such out. Raises
+        `InputError` for radiance that is not finite.
+        """
+
+    def count_paths(self, candidates: int, followed: int) -> int:
+        """Light paths of so many candidates, of which some are followed beyond their first hit."""
+        return candidates + (self.paths_each - 1) * followed
+
+    def require_finite(self, radiance: np.ndarray, object_id: np.ndarray) -> None:
+        """`InputError` for radiance (N,) that is no finite number, with the object (N,) that was seen."""
+        wrong = np.flatnonzero(~np.isfinite(radiance))
+        if wrong.size:
+            raise InputError(not_finite(self.setup.render_scene, int(object_id[wrong[0]])))

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -101,8 +102,7 @@ class Plan:
     """What is known of the light, if photons are thinned."""
 
 
-@dataclass(frozen=True)
-class Probe:
+class Probe(NamedTuple):
     """Of one pixel seen by the sensor: mean radiance, and variance of a single path, averaged over a view."""
 
     mean: float
@@ -110,9 +110,7 @@ class Probe:
 
     def photon_noise(self, photons_per_radiance: float, samples: int) -> float:
         """Variance that rendering adds to counts, as a share of their Poisson variance."""
-        if self.mean <= 0:
-            return 0.0
-        return photons_per_radiance * self.variance / (samples * self.mean)
+        return photons_per_radiance * self.variance / (samples * self.mean) if self.mean > 0 else 0.0
 
     def light_error(self, paths: int) -> float:
         """Standard error of the light that `paths` find, as a share of it."""
@@ -159,21 +157,14 @@ def plan(
 def probe(render_scene: RenderScene, grid: CameraGrid, cfa: str | None, seed: int) -> Probe:
     """A coarse look from the virtual centre; its pixels are larger, so it rather sees too much noise."""
     small = replace(_coarse(grid), rows=1, cols=1)
-    first, second = (
-        sense(
-            render_view(
-                render_scene,
-                small,
-                0,
-                0,
-                samples_per_pixel=PROBE_SAMPLES,
-                seed=seeds.integer(seed, stage="plan probe", part=part),
-                independent=True,
-            ),
-            cfa,
-        ).astype(np.float64)
-        for part in range(2)
-    )
+
+    def mosaic(part: int) -> np.ndarray:
+        view_seed = seeds.integer(seed, stage="plan probe", part=part)
+        samples = {"samples_per_pixel": PROBE_SAMPLES, "independent": True}
+        view = render_view(render_scene, small, 0, 0, seed=view_seed, **samples)
+        return sense(view, cfa).astype(np.float64)
+
+    first, second = mosaic(0), mosaic(1)
     # Half the squared difference of two means of n samples is 1 / n of one sample's variance.
     variance = PROBE_SAMPLES * ((first - second) ** 2).mean() / 2
     mean, extra_variance = _missed_light(render_scene, small, cfa, grid)
@@ -188,22 +179,22 @@ def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, w
     if kind == "scalar":
         photon_cost, sample_cost = SCALAR_PHOTON_COST, SCALAR_SAMPLE_COST
 
-    def is_cheaper(per_view: float, samples: int) -> bool:
-        return photon_cost * per_view <= (sample_cost * samples + PIXEL_COST) * pixels
+    def is_cheaper(photons: float, samples: int) -> bool:
+        return photon_cost * photons <= (sample_cost * samples + PIXEL_COST) * pixels
 
-    def are_few(per_view: float) -> bool:
-        return per_view * grid.view_count <= MAX_SINGLE_PHOTONS
+    def are_few(photons: float) -> bool:
+        return photons * grid.view_count <= MAX_SINGLE_PHOTONS
 
-    per_view, gain = scopes.photons_per_view, scopes.photons_per_radiance
-    if per_view is not None and not why_rendered and are_few(per_view) and is_cheaper(per_view, min_samples):
-        return Plan(True, min_samples, per_view, depths_mm=_first_hit_depths_mm(render_scene, grid))
+    budget, gain = scopes.photons_per_view, scopes.photons_per_radiance
+    if budget is not None and not why_rendered and are_few(budget) and is_cheaper(budget, min_samples):
+        return Plan(True, min_samples, budget, depths_mm=_first_hit_depths_mm(render_scene, grid))
     probed = probe(render_scene, grid, scopes.cfa, PROBE_SEED)
     # The virtual centre tells how many photons an exposure has, and what a unit of radiance has of a budget.
-    if per_view is None:
-        assert gain is not None
-        per_view = gain * probed.mean * pixels
+    if gain is None:
+        assert budget is not None
+        per_view, gain = budget, budget / (pixels * probed.mean) if probed.mean > 0 else 0.0
     else:
-        gain = per_view / (pixels * probed.mean) if probed.mean > 0 else 0.0
+        per_view = gain * probed.mean * pixels
     samples = max(probed.samples_for(gain, scopes.pixels), min_samples)
     if scopes.photons.nested and not are_few(per_view):
         raise InputError(
@@ -218,21 +209,15 @@ def _choose_cheaper(scopes: Scopes, setup: Setup, kind: str, min_samples: int, w
     thins = may_thin and per_view <= max_thinned and is_better
     if not thins and samples > max_samples:
         most = 0.95 * max(max_thinned, per_view * max_samples / samples)  # two digits are off by up to 5 %
-        name = "photons.budget" if scopes.photons_per_view is not None else "exposure"
+        name = "photons.budget" if budget is not None else "exposure"
         raise InputError(
             f"{name}: {per_view:.3g} photons per view are more than can be made without rendering noise; "
             f"at most {most:.2g} can be"
         )
-    return Plan(
-        thins=thins,
-        samples=samples,
-        photons_per_view=per_view,
-        keeps_origins=are_few(per_view),
-        why_rendered=why_rendered,
-        noise=probed.photon_noise(gain, samples),
-        normaliser_error=0.0 if scopes.pixels is None else probed.light_error(samples * scopes.pixels),
-        depths_mm=_first_hit_depths_mm(render_scene, grid) if thins else (),
-    )
+    noise = probed.photon_noise(gain, samples)
+    error = 0.0 if scopes.pixels is None else probed.light_error(samples * scopes.pixels)
+    depths_mm = _first_hit_depths_mm(render_scene, grid) if thins else ()
+    return Plan(thins, samples, per_view, are_few(per_view), why_rendered, noise, error, depths_mm)
 
 
 def _missed_light(

@@ -7,6 +7,7 @@ tiles are even, so that a tile holds whole Bayer cells.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +22,7 @@ LAYER_BLUR_TILES = 0.5
 MAX_LAYERS = 64
 
 
-@dataclass(frozen=True)
-class Samples:
+class Samples(NamedTuple):
     """Paths (N,): where they went through which film, and the radiance that they found.
 
     `guess` and `light` are (N, C); `light` is NaN for paths that were not followed beyond the first
@@ -44,13 +44,12 @@ class Samples:
 
     def take(self, which: np.ndarray) -> "Samples":
         """Some of them, by mask or index."""
-        return Samples(*(column[which] for column in vars(self).values()))
+        return Samples(*(column[which] for column in self))
 
     @staticmethod
     def joined(parts: "Sequence[Samples]") -> "Samples":
         """Those of all parts, one part after the other."""
-        columns = zip(*(vars(part).values() for part in parts), strict=True)
-        return Samples(*(np.concatenate(column) for column in columns))
+        return Samples(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -103,10 +102,7 @@ class DisparityLayers:
     def around(self, tiles: np.ndarray, reach: int = 1) -> np.ndarray:
         """Flat indices (N, (2 reach + 1)^2) of the tiles up to `reach` away; the border's own beyond it."""
         layer, row, col = self.layer_row_col(tiles)
-        offsets = np.argwhere(np.ones((2 * reach + 1, 2 * reach + 1))) - reach
-        near_row = np.clip(row[:, None] + offsets[:, 0], 0, self.rows - 1)
-        near_col = np.clip(col[:, None] + offsets[:, 1], 0, self.cols - 1)
-        return self.flat(layer[:, None], near_row, near_col)
+        return self.flat(layer[:, None], *squares_around(row, col, reach, self.rows, self.cols))
 
     def merged(self, side: int) -> "DisparityLayers":
         """The same layers with tiles of `side` x `side` of these."""
@@ -117,6 +113,14 @@ class DisparityLayers:
         """Flat indices, in `merged(side)`, of the tiles that these lie in."""
         layer, row, col = self.layer_row_col(tiles)
         return self.merged(side).flat(layer, row // side, col // side)
+
+
+def squares_around(
+    row: np.ndarray, col: np.ndarray, reach: int, rows: int, cols: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns (N, (2 reach + 1)^2) of places up to `reach` away; the border's own beyond it."""
+    down, right = np.indices((2 * reach + 1, 2 * reach + 1)).reshape(2, -1) - reach
+    return np.clip(row[:, None] + down, 0, rows - 1), np.clip(col[:, None] + right, 0, cols - 1)
 
 
 def layers_for(grid: CameraGrid, tile_px: int, z_mm: np.ndarray) -> DisparityLayers:

@@ -8,14 +8,18 @@ of a pixel gets its photons as a window of a million does. Paths through the fil
 (`path_tracing.radiance_along`).
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from pcii.base.srgb import LUMINANCE
 from pcii.core.bayer import colour_cells
-from simgen.photons.candidates import Accepted, Setup, nothing
-from simgen.photons.shining_pieces import look_of, pieces_in_view, points_on_ball
+from simgen.cameras.rig import Rig
+from simgen.photons.candidates import Accepted, Setup, is_on_film, nothing
+from simgen.photons.shining_pieces import pieces_in_view
+from simgen.renderer.emission import ShiningSurface
 from simgen.renderer.intersection import standing_before
 from simgen.sensor.photon_table import PhotonTable
 
@@ -24,8 +28,7 @@ SHADOW_EPSILON = 1e-5
 errs by a hundredth of it."""
 
 
-@dataclass(frozen=True, eq=False)
-class ShiningPoints:
+class ShiningPoints(NamedTuple):
     """Points (N,) that shine, the lens points that they are seen from, and where they fall on the film.
 
     `sent` times the radiance is what is sent per mm^2, in radiance px, and at most `bound`; 0 if the point
@@ -40,6 +43,10 @@ class ShiningPoints:
     col_px: np.ndarray
     sent: np.ndarray
     bound: np.ndarray
+
+    def take(self, which: np.ndarray) -> "ShiningPoints":
+        """Some of them, by mask or index."""
+        return ShiningPoints(*(column[which] for column in self))
 
 
 class Arriving(NamedTuple):
@@ -63,21 +70,18 @@ class Arriving(NamedTuple):
 class EmissionSampler:
     """What shines in view, as candidates are drawn from it.
 
-    `mass` is the sum of the bounds in one view, in radiance times px as of `CandidateSampler`; 0 if no camera
-    can see anything that shines.
+    `surfaces` are in the colours of the sensor. `mass` is the sum of the bounds in one view, in radiance
+    times px as of `CandidateSampler`; 0 if no camera can see anything that shines.
     """
 
     def __init__(self, setup: Setup) -> None:
-        self.setup, self.surfaces = setup, setup.render_scene.shining
-        self.mass = 0.0
+        self.setup, self.surfaces, self.mass = setup, list(_surfaces_as_sensed(setup)), 0.0
         self.numbers = np.array([one.number for one in self.surfaces], dtype=np.int16)
         self.is_ball = np.array([one.ball is not None for one in self.surfaces])
-        if not self.surfaces:
-            return
-        self.look = look_of(self.surfaces, setup.cfa, setup.render_scene.filters is not None)
-        self.pieces = pieces_in_view(self.surfaces, self.look, setup.rig)
-        self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
-        self.mass = float(self.running[-1]) if self.running.size else 0.0
+        if self.surfaces:
+            self.pieces = pieces_in_view(self.surfaces, setup.rig)
+            self.running = np.cumsum(self.pieces.bound * self.pieces.area_mm2)
+            self.mass = float(self.running[-1]) if self.running.size else 0.0
 
     def try_candidates(
         self, group: np.ndarray, view: np.ndarray, cells: list[np.ndarray], seed: int
@@ -87,84 +91,104 @@ class EmissionSampler:
         `cells` are the Bayer cells (2 a + b) of each group: what falls on others is rejected.
         """
         light = self.arriving(view, np.random.default_rng(seed))
-        is_of_group = np.zeros((len(cells), 4), dtype=bool)
-        for number, own in enumerate(cells):
-            is_of_group[number, own] = True
+        is_of_group = np.array([np.isin(np.arange(4), own) for own in cells])
         light = light.take(is_of_group[group[light.candidate], light.row % 2 * 2 + light.col % 2])
         k, l = np.divmod(view[light.candidate], self.setup.grid.cols)
         origin = {"object_id": self.numbers[light.surface], "z_mm": light.z_mm}
         photons = PhotonTable(k, l, light.row, light.col, np.ones_like(light.row), **origin)
-        return replace(nothing(self.setup.channels), photons=photons, candidate=light.candidate)
+        return nothing(self.setup.channels)._replace(photons=photons, candidate=light.candidate)
 
     def arriving(self, view: np.ndarray, rng: np.random.Generator) -> Arriving:
         """Those of candidates on the films of `view` (N,) that are kept and that nothing hides."""
-        points, chance, grid = self.film_points(view, rng), rng.random(view.size), self.setup.grid
+        points, chance = self.film_points(view, rng), rng.random(view.size)
         row, col = np.floor(points.row_px + 0.5), np.floor(points.col_px + 0.5)
-        inside = (row >= 0) & (row < grid.height) & (col >= 0) & (col < grid.width) & (points.sent > 0)
-        which = np.flatnonzero(inside)
-        row, col = row[which].astype(np.int64), col[which].astype(np.int64)
+        which = np.flatnonzero(is_on_film(self.setup.grid, row, col) & (points.sent > 0))
+        points, row, col = points.take(which), row[which].astype(np.int64), col[which].astype(np.int64)
         colour = colour_cells(self.setup.cfa).ravel()[row % 2 * 2 + col % 2]
-        radiance = self._radiance(points.surface[which], points.texcoord[which])
-        radiance = radiance[np.arange(which.size), colour]
-        is_kept = chance[which] * points.bound[which] < points.sent[which] * radiance
-        which, row, col, radiance = which[is_kept], row[is_kept], col[is_kept], radiance[is_kept]
-        surface, point_mm = points.surface[which], points.point_mm[which]
-        blocker = standing_before(self.setup.render_scene, points.camera_mm[which], point_mm, SHADOW_EPSILON)
+        radiance = self._radiance(points)[np.arange(which.size), colour]
+        is_kept = chance[which] * points.bound < points.sent * radiance
+        light = Arriving(which, row, col, points.surface, radiance, points.point_mm[:, 2]).take(is_kept)
+        points = points.take(is_kept)
+        blocker = standing_before(self.setup.render_scene, points.camera_mm, points.point_mm, SHADOW_EPSILON)
         # A ball hides no point of its own that faces the camera, whatever the rounding of where it is hit.
-        is_visible = (blocker < 0) | (self.is_ball[surface] & (blocker == self.numbers[surface]))
-        return Arriving(which, row, col, surface, radiance, point_mm[:, 2]).take(is_visible)
+        is_itself = self.is_ball[light.surface] & (blocker == self.numbers[light.surface])
+        return light.take((blocker < 0) | is_itself)
 
     def film_points(self, view: np.ndarray, rng: np.random.Generator) -> ShiningPoints:
         """A point that shines for each camera (N,), drawn with its piece's bound, and where it falls."""
-        rig, pieces = self.setup.rig, self.pieces
+        rig = self.setup.rig
         piece = np.searchsorted(self.running, rng.random(view.size) * self.mass, side="right")
         piece = np.minimum(piece, self.running.size - 1)
         across, along = np.sqrt(rng.random(view.size)), rng.random(view.size)
         shares = np.stack([1 - across, across * (1 - along), across * along], axis=1)
-        point_mm = np.einsum("nc,ncd->nd", shares, pieces.corners_mm[piece])
-        texcoord = np.einsum("nc,ncd->nd", shares, pieces.texcoords[piece])
-        normal, stretch, surface = pieces.normal[piece], np.ones(view.size), pieces.surface[piece]
+        point_mm = np.einsum("nc,ncd->nd", shares, self.pieces.corners_mm[piece])
+        texcoord = np.einsum("nc,ncd->nd", shares, self.pieces.texcoords[piece])
+        normal, surface = self.pieces.normal[piece], self.pieces.surface[piece]
+        stretch = np.ones(view.size)
         for number, one in enumerate(self.surfaces):
-            if one.ball is not None:
-                here = np.flatnonzero(surface == number)
-                centre_mm, radius_mm, axes = one.ball
-                point_mm[here], normal[here], stretch[here] = points_on_ball(
-                    point_mm[here], pieces.height_mm[piece[here]], centre_mm, np.full(here.size, radius_mm)
-                )
-                x, y, z = (normal[here] @ axes).T
-                east, north = np.arctan2(x, -z), np.arcsin(np.clip(-y, -1, 1))
-                texcoord[here] = np.stack([(east / np.pi + 1) / 2, north / np.pi + 0.5], axis=1)
+            if one.ball is None:
+                continue
+            here, (centre_mm, radius_mm, axes) = np.flatnonzero(surface == number), one.ball
+            # Points of inscribed triangles are moved outwards onto the ball, which has more area there.
+            outwards = point_mm[here] - centre_mm
+            length = np.linalg.norm(outwards, axis=1, keepdims=True)
+            normal[here] = outwards / length
+            point_mm[here] = centre_mm + radius_mm * normal[here]
+            stretch[here] = np.square(radius_mm) * self.pieces.height_mm[piece[here]] / length[:, 0] ** 3
+            x, y, z = (normal[here] @ axes).T
+            east, north = np.arctan2(x, -z), np.arcsin(np.clip(-y, -1, 1))
+            texcoord[here] = np.stack([(east / np.pi + 1) / 2, north / np.pi + 0.5], axis=1)
         k, l = np.divmod(view, self.setup.grid.cols)
-        camera_mm, rotation = rig.position_mm[k, l], rig.rotation[k, l]
-        lens_point = np.zeros((2, view.size))
+        camera_mm, lens_point = rig.position_mm[k, l], np.zeros((2, 1))
         if rig.lens is not None:
             lens_point = rig.lens_points(rng.random((2, view.size)))
-            camera_mm = camera_mm + np.einsum("nab,bn->na", rotation[..., :2], lens_point)
-        away = point_mm - camera_mm
-        x, y, z = np.einsum("nba,nb->an", rotation, away)
-        z = np.where(z > 0, z, np.nan)  # what is behind the camera falls nowhere
-        if rig.lens is not None:
-            x, y = (
-                part + shift * z / rig.lens.focus_mm for part, shift in zip((x, y), lens_point, strict=True)
-            )
+            camera_mm = camera_mm + np.einsum("nab,bn->na", rig.rotation[k, l][..., :2], lens_point)
+        away_mm = point_mm - camera_mm
+        row_px, col_px, z_mm = film_px(rig, view, away_mm, lens_point)
         scale_px = self.setup.grid.focal_mm / self.setup.grid.pixel_mm
-        axis_px = rig.axis_px[k, l]
-        sent = scale_px**2 * stretch * np.maximum(-(normal * away).sum(axis=1), 0) / z**3
-        row_px, col_px = y / z * scale_px + axis_px[:, 1], x / z * scale_px + axis_px[:, 0]
-        bound = pieces.bound[piece]
-        return ShiningPoints(
-            surface, point_mm, camera_mm, texcoord, row_px, col_px, np.nan_to_num(sent), bound
-        )
+        sent = scale_px**2 * stretch * np.maximum(-(normal * away_mm).sum(axis=1), 0) / z_mm**3
+        places = surface, point_mm, camera_mm, texcoord, row_px, col_px
+        return ShiningPoints(*places, np.nan_to_num(sent), self.pieces.bound[piece])
 
-    def _radiance(self, surface: np.ndarray, texcoord: np.ndarray) -> np.ndarray:
+    def _radiance(self, points: ShiningPoints) -> np.ndarray:
         """Radiance (N, C) of points of surfaces, in the sensor's colours."""
-        radiance = np.stack(self.look.radiance)[surface]
-        for number, picture in enumerate(self.look.pictures):
-            if picture is not None:
-                here = surface == number
-                closes = self.surfaces[number].ball is not None
-                radiance[here] *= _between_pixels(picture, texcoord[here], closes)
+        radiance = np.stack([one.radiance for one in self.surfaces])[points.surface]
+        for number, one in enumerate(self.surfaces):
+            if one.picture is not None:
+                here = points.surface == number
+                radiance[here] *= _between_pixels(one.picture, points.texcoord[here], one.ball is not None)
         return radiance
+
+
+def film_px(
+    rig: Rig, view: np.ndarray, away_mm: np.ndarray, lens_point: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Row and column on the films of `view` (N,), and planar depth in mm, of what a point of the lens sees.
+
+    `away_mm` (N, 3) is where that is from the point of the lens, (2, N) or (2, 1). NaN behind the camera.
+    """
+    k, l = np.divmod(view, rig.grid.cols)
+    x, y, z_mm = np.einsum("nba,nb->an", rig.rotation[k, l], away_mm)
+    z_mm = np.where(z_mm > 0, z_mm, np.nan)
+    if rig.lens is not None:
+        x, y = np.stack([x, y]) + lens_point * z_mm / rig.lens.focus_mm
+    scale_px, axis_px = rig.grid.focal_mm / rig.grid.pixel_mm, rig.axis_px[k, l]
+    return y / z_mm * scale_px + axis_px[:, 1], x / z_mm * scale_px + axis_px[:, 0], z_mm
+
+
+def _surfaces_as_sensed(setup: Setup) -> Iterator[ShiningSurface]:
+    """What shines in the colours of the sensor: luminance alone for a monochrome one."""
+
+    def sensed(values: np.ndarray) -> np.ndarray:
+        has_colours = setup.render_scene.filters is not None or setup.cfa is not None
+        return values if has_colours else (values @ LUMINANCE)[..., None]
+
+    for one in setup.render_scene.shining:
+        if one.picture is None:
+            yield replace(one, radiance=sensed(one.radiance))
+        else:
+            picture = sensed(one.picture.astype(np.float64))
+            yield replace(one, picture=picture, radiance=np.full(picture.shape[-1], one.radiance[0]))
 
 
 def _between_pixels(picture: np.ndarray, texcoord: np.ndarray, closes: bool) -> np.ndarray:
@@ -177,10 +201,9 @@ def _between_pixels(picture: np.ndarray, texcoord: np.ndarray, closes: bool) -> 
     first = np.floor(place_px)
     share = place_px - first
     total = np.zeros((len(texcoord), picture.shape[-1]))
-    for right in (0, 1):
-        for down in (0, 1):
-            at = first.astype(np.int64) + np.array([right, down])
-            col, row = (at % size if closes else np.clip(at, 0, size - 1)).T
-            weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - down - share[:, 1])
-            total += weight[:, None] * picture[row, col]
+    for right, down in np.ndindex(2, 2):
+        at = first.astype(np.int64) + np.array([right, down])
+        col, row = (at % size if closes else np.clip(at, 0, size - 1)).T
+        weight = np.abs(1 - right - share[:, 0]) * np.abs(1 - down - share[:, 1])
+        total += weight[:, None] * picture[row, col]
     return total

@@ -8,22 +8,14 @@ independence.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import (
-    Accepted,
-    CandidateSampler,
-    FilmPoints,
-    Setup,
-    even_film_points,
-    paths_of,
-)
+from simgen.photons.candidates import CandidateSampler, FilmPoints, Setup, even_film_points
 from simgen.photons.disparity_layers import RAYS_PER_TILE, TILES_ACROSS, Samples, layers_for, tile_px_for
-from simgen.photons.emission_sampler import EmissionSampler
+from simgen.photons.emission_sampler import EmissionSampler, film_px
 from simgen.photons.majorant import DIM_SHARE, Majorant, fit
 from simgen.photons.scalar_sampler import ScalarSampler
 from simgen.photons.scopes import Scopes
@@ -85,18 +77,16 @@ class Exploration:
 
     `majorant` is None if there is no light but what comes straight from something that shines; copy it before
     raising bounds. `is_bounded` is False if paths exceed every majorant too often: no thinning then.
+    `excess_share` is the share of the light that lay above the bounds in the last rehearsal.
     """
 
     majorant: Majorant | None
     emission: EmissionSampler
     ambient: np.ndarray
-    kept_share: float
     paths: int
-    max_dark_candidates: int
-    """Where so many candidates of a scope find no light it has none."""
+    kept_share: float = KEPT_SHARE_GUESS
     is_bounded: bool = True
     excess_share: float = 0.0
-    """Share of the light that lay above the bounds in the last rehearsal."""
 
 
 def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None = None) -> Exploration:
@@ -108,69 +98,37 @@ def explore(setup: Setup, photons: Photons, photons_per_radiance: float | None =
     """
     scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
     emission = EmissionSampler(setup)
-    kept_of_emission = _kept_share_of(emission, setup) if emission.mass else 0.0
-    pilot = _send_pilot(setup, emission, scopes)
-    found = Exploration(
-        pilot.majorant, emission, pilot.ambient, KEPT_SHARE_GUESS, pilot.paths, pilot.max_dark_candidates
-    )
-    film_mass = 0.0
-    if pilot.majorant is not None:
-        expected = scopes.expected_photons(pilot.mean)
-        warming = _Warming(setup, pilot.majorant, scopes.cell_groups, pilot.ambient, expected)
-        warming.warm_up()
-        is_bounded = warming.rehearse(direct=emission.mass * kept_of_emission)
-        film_mass = float(warming.sampler().mass.mean())
-        found = replace(
-            found,
-            kept_share=warming.kept_share,
-            paths=pilot.paths + warming.paths,
-            is_bounded=is_bounded,
-            excess_share=warming.excess_share,
-        )
+    kept_of_emission = 0.0
     if emission.mass:
-        kept = film_mass * found.kept_share + emission.mass * kept_of_emission
-        found = replace(found, kept_share=max(kept / (film_mass + emission.mass), MIN_KEPT_SHARE))
-    return found
+        view = np.arange(AIMED_RAYS) % setup.grid.view_count
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
+        accepted = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
+        kept_of_emission = accepted.photons.k.size / AIMED_RAYS
+    explored, mean = _send_pilot(setup, emission, scopes)
+    film_mass = 0.0
+    if explored.majorant is not None:
+        photons_wanted, direct = scopes.expected_photons(mean), emission.mass * kept_of_emission
+        explored, film_mass = _warm_up(setup, explored, explored.majorant, scopes, photons_wanted, direct)
+    if emission.mass:
+        kept = film_mass * explored.kept_share + emission.mass * kept_of_emission
+        explored = replace(explored, kept_share=max(kept / (film_mass + emission.mass), MIN_KEPT_SHARE))
+    return explored
 
 
-def sampler_for(
-    setup: Setup,
-    majorant: Majorant,
-    groups: Sequence[np.ndarray],
-    ambient: np.ndarray,
-    below: Majorant | None = None,
-) -> CandidateSampler:
-    """Candidates of groups of Bayer cells (2 a + b) by `majorant`, in light of `ambient` (C,) all around.
-
-    All at once where a compiled backend runs, else one by one. With `below` those of what lies between the
-    two majorants (see `CandidateSampler`).
-    """
-    if is_scalar(setup.render_scene.mi):
-        return ScalarSampler(setup, majorant, groups, below)
-    return WavefrontSampler(setup, majorant, groups, ambient, below)
+def sampler_class(setup: Setup) -> type[CandidateSampler]:
+    """How candidates are drawn: all at once where a compiled backend runs, else one by one."""
+    return ScalarSampler if is_scalar(setup.render_scene.mi) else WavefrontSampler
 
 
-@dataclass(frozen=True)
-class _Pilot:
-    """A first majorant (see `Exploration`), mean radiance (C,) of all views, ambient light, paths it took."""
-
-    majorant: Majorant | None
-    mean: np.ndarray
-    ambient: np.ndarray
-    paths: int
-    max_dark_candidates: int
-
-
-def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> _Pilot:
-    """Find where there is light, and how much at most, with the effort that the photons deserve."""
+def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> tuple[Exploration, np.ndarray]:
+    """Find where there is light, and how much at most; and the mean radiance (C,) of all views."""
     surroundings = np.zeros(setup.channels)
     if not is_scalar(setup.render_scene.mi):  # where candidates are guessed at
         surroundings = surrounding_radiance(setup.render_scene, light_of(setup.render_scene, setup.cfa))
     first, paths = _send_first_pilot(setup, surroundings)
     mean = first.light.mean(axis=0)
     if not mean.any():
-        max_dark_candidates = _sampler_of_films(setup, surroundings).max_dark_candidates
-        return _Pilot(None, mean, surroundings, paths, max_dark_candidates)
+        return Exploration(None, emission, surroundings, paths), mean
     ambient = surroundings + AMBIENT_SHARE * mean.mean()
     # A colour that the pilot did not find may be there nevertheless.
     dim = DIM_SHARE * np.maximum(mean, 0.01 * mean.max())
@@ -184,15 +142,15 @@ def _send_pilot(setup: Setup, emission: EmissionSampler, scopes: Scopes) -> _Pil
     if aimed.view.size:
         path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot")
         samples.append(sampler.trace(aimed, aimed.view.size, path_seed))
-        paths += paths_of(sampler, aimed.view.size, aimed.view.size)
     contrast = float(surroundings.max() / mean.max())
     if contrast >= MIN_CONTRAST:
-        openings, spent = _look_for_openings(setup, sampler, Samples.joined(samples).z_mm, contrast)
-        samples, paths = [*samples, openings], paths + spent
+        openings, traced = _look_for_openings(setup, sampler, Samples.joined(samples).z_mm, contrast)
+        samples.append(openings)
+        paths += traced
     known = Samples.joined(samples)
     layers = layers_for(setup.grid, tile_px_for(setup.grid, rays), known.z_mm)
-    paths += paths_of(sampler, rays, followed)
-    return _Pilot(fit(setup.grid, layers, known, dim), mean, ambient, paths, sampler.max_dark_candidates)
+    paths += sampler.count_paths(rays + aimed.view.size, followed + aimed.view.size)
+    return Exploration(fit(setup.grid, layers, known, dim), emission, ambient, paths), mean
 
 
 def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, int]:
@@ -203,7 +161,7 @@ def _send_first_pilot(setup: Setup, surroundings: np.ndarray) -> tuple[Samples, 
         path_seed = seeds.integer(EXPLORATION_SEED, stage="first pilot", round_number=round_number)
         samples = sampler.trace(_spread_evenly(setup, rays, path_seed), rays, path_seed)
         samples = samples.take(samples.followed)
-        paths += paths_of(sampler, rays, rays)
+        paths += sampler.count_paths(rays, rays)
         if samples.light.any() or rays >= sampler.max_dark_candidates:
             return samples, paths
         round_number, rays = round_number + 1, rays * 4
@@ -215,24 +173,17 @@ def _spread_evenly(setup: Setup, rays: int, seed: int) -> FilmPoints:
 
 def _aimed_points(setup: Setup, emission: EmissionSampler) -> FilmPoints:
     """Where what shines, and what is bright of the surroundings, would be seen if nothing stood before it."""
-    rng, rig, grid = seeds.generator(EXPLORATION_SEED, stage="aimed pilot"), setup.rig, setup.grid
-    view = np.arange(AIMED_RAYS) % grid.view_count
-    rows_px, columns_px = [np.zeros(0)], [np.zeros(0)]
+    rng, places_px = seeds.generator(EXPLORATION_SEED, stage="aimed pilot"), [np.zeros((2, 0))]
+    view = np.arange(AIMED_RAYS) % setup.grid.view_count
     if emission.mass:
         points = emission.film_points(view, rng)
-        rows_px.append(points.row_px)
-        columns_px.append(points.col_px)
+        places_px.append(np.stack([points.row_px, points.col_px]))
     path_seed = seeds.integer(EXPLORATION_SEED, stage="aimed pilot", part=1)
     direction = bright_directions(setup.render_scene, AIMED_RAYS, path_seed)
     if len(direction):
-        k, l = np.divmod(view, grid.cols)
-        x, y, z = np.einsum("nba,nb->an", rig.rotation[k, l], direction)
-        ahead = np.where(z > 0, z, np.nan)
-        scale_px, axis_px = grid.focal_mm / grid.pixel_mm, rig.axis_px[k, l]
-        rows_px.append(y / ahead * scale_px + axis_px[:, 1])
-        columns_px.append(x / ahead * scale_px + axis_px[:, 0])
-    row, col = np.concatenate(rows_px) + 0.5, np.concatenate(columns_px) + 0.5
-    return FilmPoints(np.resize(view, row.size), row, col).on_film(grid)
+        places_px.append(np.stack(film_px(setup.rig, view, direction, np.zeros((2, 1)))[:2]))
+    row, col = np.concatenate(places_px, axis=1) + 0.5
+    return FilmPoints(np.resize(view, row.size), row, col).on_film(setup.grid)
 
 
 def _look_for_openings(
@@ -269,81 +220,56 @@ def _trace_misses(sampler: CandidateSampler, points: FilmPoints, seed: int) -> S
     """Rays that hit nothing: what they see needs no light path, the guess is right."""
     samples = sampler.trace(points, 1, seed)
     samples = samples.take(np.isinf(samples.z_mm))
-    return replace(samples, light=samples.guess)
+    return samples._replace(light=samples.guess)
 
 
 def _sampler_of_films(setup: Setup, ambient: np.ndarray) -> CandidateSampler:
     """A sampler that knows of nothing but the films."""
     nowhere = layers_for(setup.grid, tile_px_for(setup.grid, MAX_RAYS), np.array([np.inf]))
     flat = Majorant(setup.grid, nowhere, np.ones(setup.channels))
-    return sampler_for(setup, flat, [np.arange(4)], ambient)
+    return sampler_class(setup)(setup, flat, [np.arange(4)], ambient)
 
 
-def _kept_share_of(emission: EmissionSampler, setup: Setup) -> float:
-    """The share of the candidates of what shines that are kept."""
-    view = np.arange(AIMED_RAYS) % setup.grid.view_count
-    path_seed = seeds.integer(EXPLORATION_SEED, stage="emission candidates")
-    accepted = emission.try_candidates(np.zeros_like(view), view, [np.arange(4)], path_seed)
-    return accepted.photons.k.size / AIMED_RAYS
+def _warm_up(
+    setup: Setup, explored: Exploration, majorant: Majorant, scopes: Scopes, photons: float, direct: float
+) -> tuple[Exploration, float]:
+    """Warm the majorant up, then rehearse and lift it until little enough light is above the bounds.
 
-
-@dataclass
-class _Warming:
-    """A majorant that is lifted where candidates exceed it, the share that it keeps, the paths it took."""
-
-    setup: Setup
-    majorant: Majorant
-    groups: Sequence[np.ndarray]
-    ambient: np.ndarray
-    photons: float
-    kept_share: float = KEPT_SHARE_GUESS
-    paths: int = 0
-    rounds: int = 0
-    excess_share: float = 0.0
-
-    def warm_up(self) -> None:
-        """Bring all bounds to about what the light needs."""
-        number = int(np.clip(WARM_UP_SHARE * self.photons / KEPT_SHARE_GUESS, *WARM_UP_CANDIDATES))
-        for _ in range(WARM_UP_ROUNDS):
-            accepted = self._try(self.sampler(), number)
+    `photons` are wanted; `direct` is light that comes straight from what shines, in the unit of
+    `CandidateSampler.mass`. What is known then, and the mass of the films.
+    """
+    paths, kept_share, excess_share, is_bounded = explored.paths, KEPT_SHARE_GUESS, 0.0, False
+    allowed, shares = MAX_MISSING_SD / math.sqrt(max(photons, 1.0)), list[float]()
+    groups, make_sampler = scopes.cell_groups, sampler_class(setup)
+    for turn in range(-WARM_UP_ROUNDS, MAX_REHEARSALS):
+        sampler = make_sampler(setup, majorant, groups, explored.ambient)
+        wanted, most = photons / kept_share, REHEARSAL_PATHS // sampler.paths_each
+        if turn < 0:
+            wanted, most = WARM_UP_SHARE * photons / KEPT_SHARE_GUESS, WARM_UP_CANDIDATES[1]
+        number = int(np.clip(wanted, WARM_UP_CANDIDATES[0], most))
+        path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=turn + WARM_UP_ROUNDS)
+        accepted = sampler.try_candidates(np.arange(number) % len(groups), None, path_seed)
+        paths += sampler.count_paths(number, accepted.ratio.size)
+        kept_share = max(accepted.photons.k.size / number, MIN_KEPT_SHARE)
+        if turn < 0:
             factor = _factor(accepted.ratio)
-            self.kept_share = max(self.kept_share / factor, MIN_KEPT_SHARE)
-            self.majorant.scale(factor)
-            self.majorant.lift(accepted.exceeding)
-
-    def rehearse(self, direct: float) -> bool:
-        """Rehearse and lift until little enough light is above the bounds; whether that is so in the end.
-
-        `direct` is light that comes straight from what shines, in the unit of `CandidateSampler.mass`.
-        """
-        allowed, shares = MAX_MISSING_SD / math.sqrt(max(self.photons, 1.0)), list[float]()
-        for turn in range(MAX_REHEARSALS):
-            sampler = self.sampler()
-            most = REHEARSAL_PATHS // sampler.paths_each
-            number = int(np.clip(self.photons / self.kept_share, WARM_UP_CANDIDATES[0], most))
-            accepted = self._try(sampler, number)
-            # Rare light shows on few tiles at a time, so tiles farther away are raised too.
-            self.majorant.lift(accepted.exceeding, reach=min(1 + turn // 2, MAX_REACH_TILES))
-            of_films = float(sampler.mass.mean()) * self.kept_share
-            ratio = accepted.ratio.astype(np.float64)
-            above = float(np.maximum(ratio - 1, 0).sum()) / max(float(ratio.sum()), 1.0)
-            shares.append(above * of_films / (of_films + direct))
-            self.excess_share = float(np.mean(shares[-MEAN_OF:]))
-            if (turn == 0 or turn >= MEAN_OF - 1) and self.excess_share <= allowed:
-                return True
-        return False
-
-    def sampler(self) -> CandidateSampler:
-        """Candidates by the majorant as it is now."""
-        return sampler_for(self.setup, self.majorant, self.groups, self.ambient)
-
-    def _try(self, sampler: CandidateSampler, number: int) -> Accepted:
-        path_seed = seeds.integer(EXPLORATION_SEED, stage="warm-up", round_number=self.rounds)
-        accepted = sampler.try_candidates(np.arange(number) % len(self.groups), None, path_seed)
-        self.rounds += 1
-        self.paths += paths_of(sampler, number, accepted.ratio.size)
-        self.kept_share = max(accepted.photons.k.size / number, MIN_KEPT_SHARE)
-        return accepted
+            kept_share = max(kept_share / factor, MIN_KEPT_SHARE)
+            majorant.scale(factor)
+        # Rare light shows on few tiles at a time, so tiles farther away are raised too.
+        majorant.lift(accepted.exceeding, reach=int(np.clip(1 + turn // 2, 1, MAX_REACH_TILES)))
+        if turn < 0:
+            continue
+        of_films = float(sampler.mass.mean()) * kept_share
+        ratio = accepted.ratio.astype(np.float64)
+        above = float(np.maximum(ratio - 1, 0).sum()) / max(float(ratio.sum()), 1.0)
+        shares.append(above * of_films / (of_films + direct))
+        excess_share = float(np.mean(shares[-MEAN_OF:]))
+        is_bounded = (turn == 0 or turn >= MEAN_OF - 1) and excess_share <= allowed
+        if is_bounded:
+            break
+    mass = make_sampler(setup, majorant, groups, explored.ambient).mass.mean()
+    outcome = {"kept_share": kept_share, "is_bounded": is_bounded, "excess_share": excess_share}
+    return replace(explored, paths=paths, **outcome), float(mass)
 
 
 def _factor(ratio: np.ndarray) -> float:

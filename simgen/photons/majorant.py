@@ -15,12 +15,12 @@ may be left out for having looked black.
 Plain NumPy; see `candidates` for use.
 """
 
-from copy import copy
+from copy import deepcopy
 
 import numpy as np
 
 from pcii.core.camera_grid import CameraGrid
-from simgen.photons.disparity_layers import DisparityLayers, Samples
+from simgen.photons.disparity_layers import DisparityLayers, Samples, squares_around
 from simgen.truth.first_hits import over_squares
 
 COARSE_TILES = 8
@@ -54,8 +54,9 @@ class Majorant:
     def __init__(self, grid: CameraGrid, layers: DisparityLayers, dim: np.ndarray) -> None:
         self.layers, self.dim = layers, dim
         self.coarse_px = COARSE_TILES * layers.tile_px
+        self.coarse_rows = -(-grid.height // self.coarse_px)
         self.coarse_cols = -(-grid.width // self.coarse_px)
-        self.coarse_count = -(-grid.height // self.coarse_px) * self.coarse_cols
+        self.coarse_count = self.coarse_rows * self.coarse_cols
         self.row, self.col = np.divmod(np.arange(self.coarse_count), self.coarse_cols)
         self.layer = np.full(self.coarse_count, -1)
         self.bound = np.tile(DIM_MARGIN * dim, (self.coarse_count, 1))
@@ -64,11 +65,7 @@ class Majorant:
 
     def copy(self) -> "Majorant":
         """Another of the same bounds, which is lifted on its own."""
-        other = copy(self)
-        # What `list_tiles` appends to is replaced; these are changed in place.
-        for name in ("bound", "radiance_ratio_bound", "entry_of"):
-            setattr(other, name, getattr(self, name).copy())
-        return other
+        return deepcopy(self)
 
     @property
     def side_px(self) -> np.ndarray:
@@ -88,10 +85,9 @@ class Majorant:
 
         `bound` is raised to `dim`.
         """
-        layer, row, col = self.layers.layer_row_col(tiles)
         self.entry_of[tiles] = np.arange(self.layer.size, self.layer.size + tiles.size)
-        self.layer, self.row = np.append(self.layer, layer), np.append(self.row, row)
-        self.col = np.append(self.col, col)
+        known, new = (self.layer, self.row, self.col), self.layers.layer_row_col(tiles)
+        self.layer, self.row, self.col = map(np.append, known, new)
         self.bound = np.concatenate([self.bound, np.maximum(bound, self.dim)])
         self.radiance_ratio_bound = np.concatenate([self.radiance_ratio_bound, radiance_ratio_bound])
 
@@ -112,7 +108,7 @@ class Majorant:
             return
         around = self.layers.around(self.layers.tiles_of(exceeding), reach)
         near = around.ravel()
-        unlisted = _distinct(near[self.entry_of[near] < 0])
+        unlisted = np.unique(near[self.entry_of[near] < 0])
         nothing = np.zeros((unlisted.size, exceeding.light.shape[1]))
         self.list_tiles(unlisted, nothing, nothing)
         self._raise_to(self.entry_of[around], exceeding)
@@ -126,10 +122,8 @@ class Majorant:
         coarse = owner < self.coarse_count
         if coarse.any():
             row, col = self.row[owner[coarse]], self.col[owner[coarse]]
-            near = np.argwhere(np.ones((2 * reach - 1, 2 * reach - 1))) - (reach - 1)
-            rows = np.clip(row[:, None] + near[:, 0], 0, self.row[self.coarse_count - 1])
-            entry = rows * self.coarse_cols + np.clip(col[:, None] + near[:, 1], 0, self.coarse_cols - 1)
-            self._raise_to(entry, exceeding.take(coarse))
+            rows, cols = squares_around(row, col, reach - 1, self.coarse_rows, self.coarse_cols)
+            self._raise_to(rows * self.coarse_cols + cols, exceeding.take(coarse))
         if not coarse.all():
             entry = owner[~coarse]
             tiles = layers.flat(self.layer[entry], self.row[entry], self.col[entry])
@@ -138,10 +132,8 @@ class Majorant:
 
     def _raise_to(self, entries: np.ndarray, exceeding: Samples) -> None:
         """Raise the limits of entries (N, M) above the radiance of paths (N,)."""
-        for levels, needed in (
-            (self.bound, exceeding.light),
-            (self.radiance_ratio_bound, exceeding.light / exceeding.guess),
-        ):
+        light, ratio = exceeding.light, exceeding.light / exceeding.guess
+        for levels, needed in ((self.bound, light), (self.radiance_ratio_bound, ratio)):
             _raise(levels, entries.ravel(), LIFT * needed.repeat(entries.shape[1], axis=0))
 
     def is_above(self, below: "Majorant") -> np.ndarray:
@@ -158,8 +150,7 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
     are listed too, with the largest guess around them: a surface goes on between the places where rays
     happened to hit it.
     """
-    above_dim = np.any(np.fmax(samples.light, samples.guess) > dim, axis=1)
-    samples = samples.take(np.asarray(above_dim))
+    samples = samples.take(np.any(np.fmax(samples.light, samples.guess) > dim, axis=1))
     tiles, followed = layers.tiles_of(samples), samples.followed
     light = samples.light[followed]
     near = _Near(layers, tiles[followed], np.concatenate([light, light / samples.guess[followed]], axis=1))
@@ -167,41 +158,28 @@ def fit(grid: CameraGrid, layers: DisparityLayers, samples: Samples, dim: np.nda
     _raise(table, tiles, samples.guess)
     hit = np.flatnonzero(table.any(axis=1))
     is_bright = (table[hit] * near.largest(hit)[:, dim.size :] > dim).any(axis=1)
-    listed = _without_gaps(layers, _distinct(layers.around(hit[is_bright]).ravel()))
-    guess = _filled(layers, listed, _highest(table, layers.around(listed)))
-    highest = near.largest(listed)
-    light, radiance_ratio_bound = highest[:, : dim.size], highest[:, dim.size :]
+    listed = _without_gaps(layers, layers.around(hit[is_bright]).ravel())
+    guess = _highest(table, layers.around(listed))
+    empty = guess.max(axis=1, initial=0) <= 0
+    table[:], table[listed] = 0, guess
+    guess[empty] = _highest(table, layers.around(listed[empty], GAP_TILES))
+    light, radiance_ratio_bound = np.split(near.largest(listed), 2, axis=1)
     majorant = Majorant(grid, layers, dim)
     majorant.list_tiles(listed, np.minimum(light, guess * radiance_ratio_bound), radiance_ratio_bound)
     return majorant
 
 
 def _without_gaps(layers: DisparityLayers, tiles: np.ndarray) -> np.ndarray:
-    """These tiles (N,), sorted, and those in gaps between them: a closing of each layer by a square."""
-    if not tiles.size:
-        return tiles
-    closed = []
-    side, per_layer = 2 * GAP_TILES + 1, layers.rows * layers.cols
-    for in_layer in np.split(tiles, np.flatnonzero(np.diff(tiles // per_layer)) + 1):
-        layer, row, col = layers.layer_row_col(in_layer)
-        top, left = row.min(), col.min()
-        margin = side - 1
-        mask = np.zeros((row.max() - top + 1 + 2 * margin, col.max() - left + 1 + 2 * margin), dtype=bool)
-        mask[row - top + margin, col - left + margin] = True
-        row, col = np.nonzero(over_squares(np.minimum, over_squares(np.maximum, mask, side), side))
-        closed.append(layers.flat(layer[0], row + top, col + left))
-    return np.concatenate(closed)
-
-
-def _filled(layers: DisparityLayers, tiles: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """The guesses (N, C) of tiles, and where there is none the largest of those up to `GAP_TILES` away."""
-    empty = guess.max(axis=1, initial=0) <= 0
-    if not empty.any():
-        return guess
-    table = np.zeros((layers.tiles, guess.shape[1]), guess.dtype)
-    table[tiles] = guess
-    guess[empty] = _highest(table, layers.around(tiles[empty], GAP_TILES))
-    return guess
+    """These tiles (N,), each once, and those in gaps between them: a closing of each layer by a square."""
+    side = 2 * GAP_TILES + 1
+    shape = len(layers.row_shift), layers.rows, layers.cols
+    mask = np.zeros(shape, dtype=bool)
+    mask.flat[tiles] = True
+    closed = [
+        over_squares(np.minimum, over_squares(np.maximum, np.pad(of_layer, side - 1), side), side)
+        for of_layer in mask
+    ]
+    return np.flatnonzero(closed)
 
 
 class _Near:
@@ -211,25 +189,20 @@ class _Near:
         self.layers, self.anywhere = layers, values.max(axis=0)
         self.levels: list[tuple[int, DisparityLayers, np.ndarray, np.ndarray]] = []
         for side in (1, 2, 4, COARSE_TILES):
-            merged = layers.merged(side)
-            blocks = layers.merge(tiles, side)
+            merged, blocks = layers.merged(side), layers.merge(tiles, side)
             largest = np.zeros((merged.tiles, values.shape[1]), dtype=np.float32)
             _raise(largest, blocks, values)
-            number = np.bincount(blocks, minlength=merged.tiles)
-            self.levels.append((side, merged, largest, number))
+            self.levels.append((side, merged, largest, np.bincount(blocks, minlength=merged.tiles)))
 
     def largest(self, tiles: np.ndarray) -> np.ndarray:
         """The largest near each tile (M,), in its layer only or else anywhere: (M, C)."""
         result = np.tile(self.anywhere, (tiles.size, 1))
         missing = np.arange(tiles.size)
         for side, merged, largest, number in self.levels:
-            if not missing.size:
-                break
             blocks, inverse = np.unique(self.layers.merge(tiles[missing], side), return_inverse=True)
             around = merged.around(blocks)
             enough = (number[around].sum(axis=1) >= SMALL_SAMPLE)[inverse]
-            highest = _highest(largest, around)
-            result[missing[enough]] = highest[inverse[enough]]
+            result[missing[enough]] = _highest(largest, around)[inverse[enough]]
             missing = missing[~enough]
         return result
 
@@ -240,12 +213,6 @@ def _highest(table: np.ndarray, near: np.ndarray) -> np.ndarray:
     for index in near.T[1:]:
         np.maximum(highest, table[index], out=highest)
     return highest
-
-
-def _distinct(keys: np.ndarray) -> np.ndarray:
-    """Each once, sorted: faster than `np.unique` on some hundred thousand."""
-    keys = np.sort(keys)
-    return keys[np.diff(keys, prepend=-1) > 0]
 
 
 def _raise(table: np.ndarray, rows: np.ndarray, values: np.ndarray) -> None:

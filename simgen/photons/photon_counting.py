@@ -1,6 +1,7 @@
 """The photon counts of a dataset: thinned or drawn from views, counted by the sensor, written."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,29 +17,17 @@ from pcii.io.dataset_writer import write_photon_truth
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan
-from simgen.photons.scopes import Scopes, places
+from simgen.photons.scopes import places
 from simgen.photons.thinning import thin_photons
-from simgen.sensor.detector import (
-    counts_of,
-    detect,
-    draw_counts,
-    fixed_totals,
-    in_frames,
-    nested_subset,
-    read_out,
-)
+from simgen.sensor import detector
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import MOST_PHOTONS, Sensor
 
 
 def thin(
-    capture: Capture,
-    setup: Setup,
-    plan: Plan,
-    report: Report = silent,
+    capture: Capture, setup: Setup, plan: Plan, report: Report = silent
 ) -> tuple[PhotonTable, dict[str, Any]]:
     """Photons of all views drawn one by one, and what the manifest says of them; see `thin_photons`."""
-    grid = capture.grid
     photons, log = thin_photons(
         setup,
         capture.photons,
@@ -48,10 +37,8 @@ def thin(
         keeps_origins=plan.keeps_origins,
         report=report,
     )
-    return photons, log | {
-        "dense_paths_instead": plan.samples * grid.view_count * grid.height * grid.width,
-        "normaliser_standard_error": 0.0,
-    }
+    dense_paths = plan.samples * math.prod(capture.grid.shape_KLHW)
+    return photons, log | {"dense_paths_instead": dense_paths, "normaliser_standard_error": 0.0}
 
 
 def draw_from_views(
@@ -70,10 +57,14 @@ def draw_from_views(
     scopes, cfa, photons, gain = capture.scopes, capture.cfa, capture.photons, capture.photons_per_radiance
     views = list(np.ndindex(capture.grid.rows, capture.grid.cols))
     energies = np.array([scope_energies(mosaic_of(k, l), cfa, photons.scope) for k, l in views])
-    normalisers = energies
+    normalisers, gains = energies, np.full_like(energies, 0.0 if gain is None else gain)
     if scopes.is_of_all_views:
-        normalisers = np.tile(energies.sum(axis=0), (len(views), 1))
-    noise = _measure_noise(scopes, energies, normalisers, [variance_of(k, l) for k, l in views])
+        normalisers = np.broadcast_to(energies.sum(axis=0), energies.shape)
+    if gain is None:
+        np.divide(photons.budget, normalisers, out=gains, where=normalisers > 0)
+    expected = float((gains * energies).sum())
+    added = float((gains**2 * np.stack([variance_of(k, l) for k, l in views])).sum())
+    noise = added / expected if expected > 0 else 0.0
     if noise > MAX_NOISE_SHARE:
         most = 0.95 * plan.photons_per_view * MAX_NOISE_SHARE / noise
         raise InputError(
@@ -81,8 +72,8 @@ def draw_from_views(
             f"their own variance to the counts, and {MAX_NOISE_SHARE:g} is allowed, as some light comes in "
             f"rare and bright paths; take at most {most:.2g} photons per view, larger lamps or rougher metals"
         )
-    totals = fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
-    columns: list[list[np.ndarray]] = []
+    totals = detector.fixed_totals(photons, energies, seeds.generator(capture.seed, stage="budget totals"))
+    columns = []
     for number, (k, l) in enumerate(views):
         raw = mosaic_of(k, l)
         if gain is not None:
@@ -95,7 +86,7 @@ def draw_from_views(
             light = Light(photons.budget, photons.scope)
             rates = photon_rates(raw, cfa, light, normalisers[number])
         rng = seeds.generator(capture.seed, view=number, stage="photons")
-        counts = draw_counts(rates, cfa, rng, None if totals is None else totals[number])
+        counts = detector.draw_counts(rates, cfa, rng, None if totals is None else totals[number])
         i, j = np.nonzero(counts)
         columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
         report("counts", number + 1, len(views))
@@ -113,22 +104,6 @@ def draw_from_views(
     }
 
 
-def _measure_noise(
-    scopes: Scopes, energies: np.ndarray, normalisers: np.ndarray, variances: Sequence[np.ndarray]
-) -> float:
-    """Variance that the noise of all views adds to counts, as a share of their own.
-
-    Energies and what they are divided by are (V, S), of each view and scope; variances are (C,) of each view.
-    """
-    if scopes.photons_per_radiance is not None:
-        gain = np.full_like(energies, scopes.photons_per_radiance)
-    else:
-        is_lit = normalisers > 0
-        gain = np.divide(scopes.photons.budget, normalisers, out=np.zeros_like(energies), where=is_lit)
-    photons = float((gain * energies).sum())
-    return float((gain**2 * np.stack(variances)).sum()) / photons if photons > 0 else 0.0
-
-
 def write_counts(
     capture: Capture,
     sensor: Sensor,
@@ -144,16 +119,16 @@ def write_counts(
     Returns what the manifest says of them.
     """
     grid, cfa, photons = capture.grid, capture.cfa, capture.photons
-    counts = detect(arrivals, grid, cfa, sensor, capture.seed)
+    counts = detector.detect(arrivals, grid, cfa, sensor, capture.seed)
     log: dict[str, Any] = {"arrived": int(arrivals.n.sum()), "detected": int(counts.n.sum())}
     if photons.nested and (sensor.bits is not None or keeps_frames):
-        counts = in_frames(counts, sensor, capture.seed)  # the same ones in each budget
+        counts = detector.in_frames(counts, sensor, capture.seed)  # the same ones in each budget
     for budget in (None, *photons.nested):
         of_budget = counts
         if budget is not None:
-            of_budget = counts.take(nested_subset(counts, arrivals, photons, budget, capture.seed))
-        of_budget = read_out(of_budget, grid, sensor, capture.seed, keeps_frames=keeps_frames)
-        events = counts_of(of_budget, grid, cfa, sensor, keeps_frames=keeps_frames)
+            of_budget = counts.take(detector.nested_subset(counts, arrivals, photons, budget, capture.seed))
+        of_budget = detector.read_out(of_budget, grid, sensor, capture.seed, keeps_frames=keeps_frames)
+        events = detector.counts_of(of_budget, grid, cfa, sensor, keeps_frames=keeps_frames)
         save_counts(out / nested_name(COUNTS, budget), events)
         if with_origins and of_budget.object_id is not None and of_budget.z_mm is not None:
             origins = of_budget.object_id.repeat(of_budget.n), of_budget.z_mm.repeat(of_budget.n)

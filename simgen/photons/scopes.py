@@ -24,19 +24,13 @@ class Scopes:
     """The scopes (S,) of the photons of all views of `grid`, behind the Bayer pattern `cfa`.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for an exposure; None for a
-    budget. Raises ValueError for an exposure without it, and for a budget with it.
+    budget.
     """
 
     photons: Photons
     grid: CameraGrid
     cfa: str | None
     photons_per_radiance: float | None
-
-    def __post_init__(self) -> None:
-        if (self.photons_per_radiance is None) == (self.photons.scope == "exposure"):
-            raise ValueError(
-                "photons_per_radiance: needed for photons of scope 'exposure', and for no others"
-            )
 
     @cached_property
     def cell_groups(self) -> list[np.ndarray]:
@@ -60,8 +54,7 @@ class Scopes:
     @cached_property
     def group(self) -> np.ndarray:
         """Number of each scope's group of cells (S,)."""
-        groups = np.arange(len(self.cell_groups))
-        return np.tile(groups, self.view.size // groups.size)
+        return np.arange(self.view.size) % len(self.cell_groups)
 
     @property
     def photons_per_view(self) -> float | None:
@@ -95,15 +88,13 @@ class Scopes:
             return np.full(self.view.size, ENDLESS)
         if self.photons.statistics == "multinomial":
             return np.full(self.view.size, round(self.photons.budget))
-        rng = seeds.generator(seed, stage="budget totals")
-        return rng.poisson(self.photons.budget, self.view.size)
+        return seeds.generator(seed, stage="budget totals").poisson(self.photons.budget, self.view.size)
 
     def scope_of(self, photons: PhotonTable) -> np.ndarray:
         """Number of the scope that each row (N,) of a table is counted in."""
         if self.is_of_all_views:
             return np.zeros(photons.k.size, dtype=np.int64)
-        view = photons.k.astype(np.int64) * self.grid.cols + photons.l
-        groups = len(self.cell_groups)
+        view, groups = photons.k.astype(np.int64) * self.grid.cols + photons.l, len(self.cell_groups)
         return view * groups + photons.colours(self.cfa) if groups > 1 else view
 
 

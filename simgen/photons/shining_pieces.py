@@ -14,11 +14,10 @@ Plain NumPy, double precision; see `emission_sampler` for use.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from pcii.base.srgb import LUMINANCE
 from simgen.cameras.rig import Rig, as_rig, corners
 from simgen.renderer.emission import ShiningSurface
 
@@ -36,17 +35,7 @@ ROUNDING = 1 + 1e-9
 """The bound is raised by this factor, above the rounding of what it is compared with."""
 
 
-@dataclass(frozen=True, eq=False)
-class Look:
-    """How surfaces look on films: the radiance (C,) of each in the sensor's colours, and its picture."""
-
-    radiance: tuple[np.ndarray, ...]
-    pictures: tuple[np.ndarray | None, ...]
-    """(H, W, C) each."""
-
-
-@dataclass(frozen=True, eq=False)
-class Pieces:
+class Pieces(NamedTuple):
     """Flat triangles (P, 3, 3) in mm, the surface that each belongs to, and its bound in radiance px / mm^2.
 
     `texcoords` (P, 3, 2) are 0 where the surface has no picture. Of a ball `height_mm` is the distance of
@@ -72,49 +61,20 @@ class Pieces:
 
     def take(self, which: np.ndarray) -> "Pieces":
         """Some of them, by mask or index."""
-        return Pieces(**{name: column[which] for name, column in vars(self).items()})
+        return Pieces(*(column[which] for column in self))
 
 
-def look_of(surfaces: Sequence[ShiningSurface], cfa: str | None, is_spectral: bool) -> Look:
-    """Surfaces in the colours of the sensor: luminance alone for a monochrome one."""
-
-    def sensed(values: np.ndarray) -> np.ndarray:
-        return values if is_spectral or cfa is not None else (values @ LUMINANCE)[..., None]
-
-    pictures = [None if one.picture is None else sensed(one.picture.astype(np.float64)) for one in surfaces]
-    radiance = [
-        sensed(one.radiance) if picture is None else np.full(picture.shape[-1], one.radiance[0])
-        for one, picture in zip(surfaces, pictures, strict=True)
-    ]
-    return Look(tuple(radiance), tuple(pictures))
-
-
-def pieces_in_view(surfaces: Sequence[ShiningSurface], look: Look, rig: Rig) -> Pieces:
+def pieces_in_view(surfaces: Sequence[ShiningSurface], rig: Rig) -> Pieces:
     """All pieces that a camera may see; there may be none."""
-    pieces = _whole(surfaces)
-    bound, is_loose = _bounds(pieces, surfaces, look, rig)
+    pieces, is_loose = _bounded(_whole(surfaces), surfaces, rig)
     while True:
-        pieces, is_loose = _with_bound(pieces, bound).take(bound > 0), is_loose[bound > 0]
         sent = pieces.bound * pieces.area_mm2
         halved = is_loose & (sent > FINE_SHARE * sent.sum())
         if not halved.any() or sent.size + halved.sum() > MOST_PIECES:
             return pieces
-        halves = _halves(pieces.take(halved))
-        new_bound, new_loose = _bounds(halves, surfaces, look, rig)
-        pieces = _joined(pieces.take(~halved), _with_bound(halves, new_bound))
-        bound, is_loose = pieces.bound, np.concatenate([is_loose[~halved], new_loose])
-
-
-def points_on_ball(
-    flat_mm: np.ndarray, height_mm: np.ndarray, centre_mm: np.ndarray, radius_mm: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points (N, 3) of inscribed triangles moved outwards onto the ball, the normals there, and how much more
-    area (N,) the ball has at each than its triangle."""
-    outwards = flat_mm - centre_mm
-    length = np.linalg.norm(outwards, axis=1, keepdims=True)
-    normal = outwards / length
-    stretch = radius_mm**2 * height_mm / length[:, 0] ** 3
-    return centre_mm + radius_mm[:, None] * normal, normal, stretch
+        halves, are_loose = _bounded(_halves(pieces.take(halved)), surfaces, rig)
+        pieces = _joined([pieces.take(~halved), halves])
+        is_loose = np.concatenate([is_loose[~halved], are_loose])
 
 
 def _whole(surfaces: Sequence[ShiningSurface]) -> Pieces:
@@ -122,31 +82,25 @@ def _whole(surfaces: Sequence[ShiningSurface]) -> Pieces:
     parts = []
     for number, one in enumerate(surfaces):
         corners_mm = one.corners_mm.astype(np.float64)
-        across = _across(corners_mm)
-        has_area = np.linalg.norm(across, axis=1) > SLIVER * _longest_side_mm(corners_mm) ** 2
-        corners_mm, across = corners_mm[has_area], across[has_area]
-        count = len(corners_mm)
-        texcoords = np.zeros((count, 3, 2)) if one.texcoords is None else one.texcoords[has_area]
-        height_mm = np.zeros(count)
+        twice_mm2 = np.linalg.norm(_across(corners_mm), axis=1)
+        has_area = twice_mm2 > SLIVER * _sides_mm(corners_mm).max(axis=1) ** 2
+        count, texcoords = int(has_area.sum()), one.texcoords
+        texcoords = np.zeros((count, 3, 2)) if texcoords is None else texcoords[has_area]
+        zero = np.zeros(count)
+        part = Pieces(np.full(count, number), corners_mm[has_area], texcoords, zero, zero)
         if one.ball is not None:
-            normal = across / np.linalg.norm(across, axis=1, keepdims=True)
-            height_mm = ((corners_mm[:, 0] - one.ball[0]) * normal).sum(axis=1)
-        parts.append(Pieces(np.full(count, number), corners_mm, texcoords, height_mm, np.zeros(count)))
-    return _joined(*parts)
+            height_mm = ((part.corners_mm[:, 0] - one.ball[0]) * part.normal).sum(axis=1)
+            part = part._replace(height_mm=height_mm)
+        parts.append(part)
+    return _joined(parts)
 
 
-def _bounds(
-    pieces: Pieces, surfaces: Sequence[ShiningSurface], look: Look, rig: Rig
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds (P,), and whether each is much above what the piece sends, (P,) bool."""
-    count = pieces.surface.size
-    centre_mm, radius_mm = np.zeros((count, 3)), np.zeros(count)
-    for number, one in enumerate(surfaces):
-        if one.ball is not None:
-            here = pieces.surface == number
-            centre_mm[here], radius_mm[here] = one.ball[0], one.ball[1]
+def _bounded(pieces: Pieces, surfaces: Sequence[ShiningSurface], rig: Rig) -> tuple[Pieces, np.ndarray]:
+    """The pieces that may be seen, with their bounds, and whether each is much above what the piece sends."""
+    count, normal = pieces.surface.size, pieces.normal
+    balls = [(np.zeros(3), 0.0) if one.ball is None else one.ball[:2] for one in surfaces]
+    centre_mm, radius_mm = (np.array(column)[pieces.surface] for column in zip(*balls, strict=True))
     is_round = radius_mm > 0
-    normal = pieces.normal
     # How far the surface bulges out of its triangle, and how much more area it has at most.
     bulge_mm = np.where(is_round, radius_mm - pieces.height_mm, 0)
     stretch = np.where(is_round, radius_mm / np.where(is_round, pieces.height_mm, 1), 1) ** 2
@@ -191,16 +145,17 @@ def _bounds(
     sent = np.where(is_seen, (above_mm + aperture_mm) / nearest_mm**3, 0)
     is_loose = sent > LOOSE * np.maximum(least_above_mm, 0) / np.maximum(farthest_mm, nearest_mm) ** 3
     is_loose |= ((low_px < -0.5) | (high_px > size_px - 0.5)).any(axis=1)
-    brightest, is_uneven = _brightest(pieces, look)
-    return ROUNDING * scale_px**2 * sent * stretch * brightest, is_loose | is_uneven
+    brightest, is_uneven = _brightest(pieces, surfaces)
+    bound = ROUNDING * scale_px**2 * sent * stretch * brightest
+    return pieces._replace(bound=bound).take(bound > 0), (is_loose | is_uneven)[bound > 0]
 
 
-def _brightest(pieces: Pieces, look: Look) -> tuple[np.ndarray, np.ndarray]:
+def _brightest(pieces: Pieces, surfaces: Sequence[ShiningSurface]) -> tuple[np.ndarray, np.ndarray]:
     """Radiance (P,) in its brightest colour at most, and whether parts of the piece have much less."""
     brightest, is_uneven = np.empty(pieces.surface.size), np.zeros(pieces.surface.size, dtype=bool)
-    for number, (radiance, picture) in enumerate(zip(look.radiance, look.pictures, strict=True)):
-        here = np.flatnonzero(pieces.surface == number)
-        brightest[here] = radiance.max()
+    for number, one in enumerate(surfaces):
+        here, picture = np.flatnonzero(pieces.surface == number), one.picture
+        brightest[here] = one.radiance.max()
         if picture is None:
             continue
         size = np.array(picture.shape[1::-1])
@@ -225,37 +180,26 @@ def _extreme_cameras(rig: Rig) -> list[tuple[int, int]]:
 
 def _halves(pieces: Pieces) -> Pieces:
     """Each piece cut in two at the middle of its longest side."""
-    sides = np.linalg.norm(pieces.corners_mm - np.roll(pieces.corners_mm, -1, axis=1), axis=2)
-    order = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    rows = np.arange(len(order))[:, None]
-    halves = []
-    for kept in (0, 1):
-        columns = {}
-        for name in ("corners_mm", "texcoords"):
-            corner = getattr(pieces, name)[rows, order]
-            middle = corner[:, :2].mean(axis=1)
-            # The first half keeps the side's first corner and the second its other one; both turn as before.
-            columns[name] = (
-                np.stack([corner[:, 0], middle, corner[:, 2]], axis=1)
-                if kept == 0
-                else np.stack([middle, corner[:, 1], corner[:, 2]], axis=1)
-            )
-        halves.append(Pieces(pieces.surface, bound=pieces.bound, height_mm=pieces.height_mm, **columns))
-    return _joined(*halves)
+    number = np.arange(pieces.surface.size)
+    order = (_sides_mm(pieces.corners_mm).argmax(axis=1)[:, None] + np.arange(3)) % 3
+
+    def cut(values: np.ndarray) -> np.ndarray:
+        """The first half keeps the side's first corner and the second its other one; both turn as before."""
+        first, second = values[number[:, None], order], values[number[:, None], order]
+        first[:, 1] = second[:, 0] = first[:, :2].mean(axis=1)
+        return np.concatenate([first, second])
+
+    halves = pieces.take(np.tile(number, 2))
+    return halves._replace(corners_mm=cut(pieces.corners_mm), texcoords=cut(pieces.texcoords))
 
 
-def _joined(*parts: Pieces) -> Pieces:
-    return Pieces(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])}
-    )
+def _joined(parts: Sequence[Pieces]) -> Pieces:
+    return Pieces(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _with_bound(pieces: Pieces, bound: np.ndarray) -> Pieces:
-    return Pieces(**(vars(pieces) | {"bound": bound}))
-
-
-def _longest_side_mm(corners_mm: np.ndarray) -> np.ndarray:
-    return np.linalg.norm(corners_mm - np.roll(corners_mm, -1, axis=1), axis=2).max(axis=1)
+def _sides_mm(corners_mm: np.ndarray) -> np.ndarray:
+    """Lengths (P, 3) of the triangles' sides, each from the corner of its number to the next."""
+    return np.linalg.norm(corners_mm - np.roll(corners_mm, -1, axis=1), axis=2)
 
 
 def _across(corners_mm: np.ndarray) -> np.ndarray:

@@ -15,8 +15,9 @@ Nothing is drawn again and nothing discarded, so the result does not depend on w
 photons come of one path. docs/theory.md has the proof.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from dataclasses import replace
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -24,11 +25,11 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from simgen.base import random_streams as seeds
-from simgen.photons.candidates import Accepted, CandidateSampler, Setup, paths_of
+from simgen.photons.candidates import Accepted, CandidateSampler, Setup
 from simgen.photons.disparity_layers import Samples
-from simgen.photons.exploration import MIN_KEPT_SHARE, Exploration, explore, sampler_for
+from simgen.photons.exploration import MIN_KEPT_SHARE, Exploration, explore, sampler_class
 from simgen.photons.majorant import Majorant
-from simgen.photons.scopes import ENDLESS, Scopes, places
+from simgen.photons.scopes import Scopes, places
 from simgen.sensor.photon_table import PhotonTable, joined, no_photons
 from simgen.spec.recipe import Photons
 
@@ -60,210 +61,174 @@ def thin_photons(
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
-    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it;
     `InputError` for radiance that is not finite, and for light that exceeds every bound.
     """
     scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)
-    draw = _Drawing(setup, scopes, seed, explored or explore(setup, photons, photons_per_radiance), report)
-    table = draw.single_photons() if keeps_origins else draw.counts()
-    return table.by_pixel(setup.grid), draw.log()
+    drawing = _Drawing(setup, scopes, seed, explored or explore(setup, photons, photons_per_radiance), report)
+    if keeps_origins:
+        table = drawing.draw(drawing.totals, photons_per_radiance)
+    else:
+        table = drawing.draw_counts(photons_per_radiance)
+    return table.by_pixel(setup.grid), drawing.log()
 
 
-@dataclass
-class _Progress:
-    """How far scopes (S,) are: photons that each wants and has, candidates tried, and the time drawn.
+class _Photons:
+    """Photons of scopes (S,) so far: how many each wants and has, candidates tried, and the time drawn.
 
-    Time is in candidates per unit of majorant.
+    Time is in candidates per unit of majorant. `parts` are photons with the scope and time of each,
+    `exceeding` paths that exceeded the majorant.
     """
 
-    wanted: np.ndarray
+    def __init__(self, wanted: np.ndarray) -> None:
+        self.wanted = wanted
+        self.number, self.tried = np.zeros((2, wanted.size), dtype=np.int64)
+        self.time = np.zeros(wanted.size)
+        self.parts = [(no_photons(), np.zeros(0, np.int64), np.zeros(0))]
+        self.exceeding: list[Samples] = []
 
-    def __post_init__(self) -> None:
-        self.photons = np.zeros(self.wanted.size, dtype=np.int64)
-        self.tried = np.zeros(self.wanted.size, dtype=np.int64)
-        self.time = np.zeros(self.wanted.size)
+    def add(self, table: PhotonTable, scope: np.ndarray, time: np.ndarray) -> None:
+        """Photons (N,), each with its scope and time."""
+        self.parts.append((table, scope, time))
+        self.number += np.bincount(scope, minlength=self.number.size)
 
-    def unfinished(self, max_dark_candidates: int) -> np.ndarray:
-        """Numbers of scopes that still want photons and are not dark.
-
-        Dark are those of which `max_dark_candidates` found nothing.
-        """
-        is_dark = (self.photons == 0) & (self.tried >= max_dark_candidates)
-        return np.flatnonzero((self.photons < self.wanted) & ~is_dark)
-
-    def part(self, number: int, parts: int) -> "_Progress":
-        """The start of a draw of the `number`-th of `parts` equal shares of the photons."""
-        share = self.wanted * (number + 1) // parts - self.wanted * number // parts
-        return _Progress(np.where(self.wanted == ENDLESS, ENDLESS, share))
-
-    def blocks(self) -> Iterator[np.ndarray]:
-        """Numbers of scopes to be drawn together: as many as are likely to fit a wavefront."""
-        block = (np.cumsum(self.wanted) - 1) // (WAVEFRONT // 4)
-        yield from np.split(np.arange(self.wanted.size), np.flatnonzero(np.diff(block)) + 1)
-
-
-@dataclass
-class _Photons:
-    """Photons so far, each with its scope and its time, and paths that exceeded the majorant."""
-
-    tables: list[PhotonTable] = field(default_factory=lambda: [no_photons()])
-    scope: list[np.ndarray] = field(default_factory=lambda: [np.zeros(0, np.int64)])
-    time: list[np.ndarray] = field(default_factory=lambda: [np.zeros(0)])
-    exceeding: list[Samples] = field(default_factory=list)
-
-    def take_exceeding(self) -> Samples | None:
-        """The paths that exceeded the majorant since the last call, None if there are none."""
-        parts, self.exceeding = [part for part in self.exceeding if part.k.size], []
-        return Samples.joined(parts) if parts else None
-
-    def first_of_each(self, wanted: np.ndarray) -> PhotonTable:
+    def first_of_each(self) -> PhotonTable:
         """The photons in order of time, of each scope as many as it wants."""
-        scope, time = np.concatenate(self.scope), np.concatenate(self.time)
-        order = np.lexsort((time, scope))
+        tables, scopes, times = zip(*self.parts, strict=True)
+        scope = np.concatenate(scopes)
+        order = np.lexsort((np.concatenate(times), scope))
         scope = scope[order]
         rank = places(scope)
-        is_wanted = rank < wanted[scope]
-        photons = joined(self.tables).take(order[is_wanted])
+        is_wanted = rank < self.wanted[scope]
+        photons = joined(tables).take(order[is_wanted])
         return replace(photons, scope=scope[is_wanted], rank=rank[is_wanted])
 
 
-@dataclass
-class _Tally:
-    candidates: int = 0
-    followed: int = 0
-    photons: int = 0
-    paths: int = 0
-    raises: int = 0
-    exceeding: int = 0
-
-
 class _Drawing:
-    """One run: the settings, what was explored, and what has been drawn so far."""
+    """One run: the settings, what was explored, and what has been drawn so far.
+
+    `totals` (S,) are the photons that each scope is to have, `number` (S,) those that it has.
+    """
 
     def __init__(
         self, setup: Setup, scopes: Scopes, seed: int, explored: Exploration, report: Report
     ) -> None:
         self.setup, self.scopes, self.seed, self.report = setup, scopes, seed, report
         self.explored, self.kept_share = explored, explored.kept_share
-        self.progress = _Progress(scopes.draw_totals(seed))
+        self.totals = scopes.draw_totals(seed)
+        self.number = np.zeros(self.totals.size, dtype=np.int64)
         self.majorant = None if explored.majorant is None else explored.majorant.copy()
-        self.tally = _Tally(paths=explored.paths)
-        self.stream = 0
-        """Number of the next round's random numbers."""
+        self.tally = Counter(paths=explored.paths)
 
-    def single_photons(self) -> PhotonTable:
-        """Every photon one by one."""
-        return self._draw(self.progress, self.scopes.photons_per_radiance)
+    def draw(self, wanted: np.ndarray, gain: float | None) -> PhotonTable:
+        """Every photon one by one: of the exposure `gain`, or without one as many as each scope wants."""
+        photons = _Photons(wanted)
+        if self.majorant is not None or self.explored.emission.mass:
+            if gain is None:
+                self._fill_budgets(photons)
+            else:
+                self._expose(photons, gain)
+            self._draw_above(photons)
+        table = photons.first_of_each()
+        assert table.scope is not None
+        self.number += np.bincount(table.scope, minlength=wanted.size)
+        return table
 
-    def counts(self) -> PhotonTable:
+    def draw_counts(self, gain: float | None) -> PhotonTable:
         """A row for each pixel that caught photons, drawn in parts that memory holds.
 
         Each part is a draw of its own for a share of the budgets or of the exposure. What one part has
         learned of the light the next ones know; the parts before it are not gone back to.
         """
-        grid, gain = self.setup.grid, self.scopes.photons_per_radiance
+        grid, wanted = self.setup.grid, self.totals
         total = np.zeros(int(np.prod(grid.shape_KLHW)), dtype=np.int64)
-        expected = float(self.progress.wanted.sum())
+        expected = float(wanted.sum())
         if gain is not None:
-            views = self.scopes.view.size
-            expected = float(gain * self._mass(self._film_sampler()).sum() * views * self.kept_share)
+            expected = float(gain * self._mass(self._film_sampler()).sum() * wanted.size * self.kept_share)
         parts = int(np.ceil(expected / (MAX_SINGLE_PHOTONS / 4)))
-        for number in range(parts):
-            progress = self.progress.part(number, parts)
-            photons = self._draw(progress, None if gain is None else gain / parts)
+        for part in range(parts):
+            if gain is not None:
+                photons = self.draw(wanted, gain / parts)
+            else:
+                photons = self.draw(wanted * (part + 1) // parts - wanted * part // parts, None)
             np.add.at(total, photons.flat_pixels(grid), 1)
-            self.progress.photons += progress.photons
-            self.report("parts of the photons", number + 1, parts)
+            self.report("parts of the photons", part + 1, parts)
         pixel = np.flatnonzero(total)
         k, l, i, j = np.unravel_index(pixel, grid.shape_KLHW)
         return PhotonTable(k, l, i, j, total[pixel])
 
     def log(self) -> dict[str, Any]:
         """What the manifest says of the draw."""
-        tally, progress = self.tally, self.progress
+        tally, kept = self.tally, int(self.number.sum())
         return {
             "method": "thinning",
-            "candidates": tally.candidates,
-            "followed": tally.followed,
-            "kept": tally.photons,
-            "kept_share": round(tally.photons / max(tally.candidates, 1), 4),
-            "paths_above_bound": tally.exceeding,
-            "bound_raised": tally.raises,
+            "candidates": tally["candidates"],
+            "followed": tally["followed"],
+            "kept": kept,
+            "kept_share": round(kept / max(tally["candidates"], 1), 4),
+            "paths_above_bound": tally["exceeding"],
+            "bound_raised": tally["raises"],
             "share_above_bound_before": float(f"{self.explored.excess_share:.3g}"),
-            "paths": tally.paths,
-            "scopes_without_light": int(((progress.photons == 0) & (progress.wanted > 0)).sum()),
+            "paths": tally["paths"],
+            "scopes_without_light": int(((self.number == 0) & (self.totals > 0)).sum()),
         }
 
-    def _draw(self, progress: _Progress, gain: float | None) -> PhotonTable:
-        """Photons of the exposure `gain`, or without one as many as each scope wants."""
-        photons = _Photons()
-        if self.majorant is not None or self.explored.emission.mass:
-            if gain is None:
-                self._fill_budgets(progress, photons)
-            else:
-                self._expose(progress, gain, photons)
-            self._draw_above(progress, photons)
-        table = photons.first_of_each(progress.wanted)
-        assert table.scope is not None
-        progress.photons[:] = np.bincount(table.scope, minlength=progress.photons.size)
-        self.tally.photons += table.n.size
-        return table
+    def _fill_budgets(self, photons: _Photons) -> None:
+        """Rounds of candidates until all scopes have their photons, or are dark.
 
-    def _fill_budgets(self, progress: _Progress, photons: _Photons) -> None:
-        """Blocks of scopes, each in rounds of candidates until all have their photons, or are dark."""
-        sampler, wanted = self._film_sampler(), int(progress.wanted.sum())
-        max_dark_candidates = self.explored.max_dark_candidates
-        for block in progress.blocks():
-            round_number = 0
-            while (some := np.intersect1d(progress.unfinished(max_dark_candidates), block)).size:
-                missing = progress.wanted[some] - progress.photons[some]
+        Scopes are drawn in blocks whose photons are likely to fit a wavefront.
+        """
+        sampler, wanted = self._film_sampler(), photons.wanted
+        max_dark_candidates = sampler_class(self.setup).max_dark_candidates
+        for block in _split(np.arange(wanted.size), (np.cumsum(wanted) - 1) // (WAVEFRONT // 4)):
+            for round_number in count():
+                is_dark = (photons.number == 0) & (photons.tried >= max_dark_candidates)
+                some = block[((photons.number < wanted) & ~is_dark)[block]]
+                if not some.size:
+                    break
+                missing = wanted[some] - photons.number[some]
                 candidates = candidates_needed(missing, round_number, self.kept_share)
                 time = candidates / self._mass(sampler)[self.scopes.group[some]]
-                self._round(sampler, progress, some, progress.time[some], time, photons, emits=True)
-                progress.time[some] += time
-                round_number += 1
-                self.report("photons", int(np.minimum(progress.photons, progress.wanted).sum()), wanted)
+                self._round(photons, sampler, some, photons.time[some], time, emits=True)
+                photons.time[some] += time
+                self.report("photons", int(np.minimum(photons.number, wanted).sum()), int(wanted.sum()))
 
-    def _expose(self, progress: _Progress, gain: float, photons: _Photons) -> None:
+    def _expose(self, photons: _Photons, gain: float) -> None:
         """The exposure in as many equal parts as make their candidates fit a wavefront each."""
-        sampler, everything = self._film_sampler(), np.arange(progress.wanted.size)
+        sampler, everything = self._film_sampler(), np.arange(photons.wanted.size)
         parts = int(np.ceil(gain * self._mass(sampler).max() * everything.size / (WAVEFRONT / 2)))
         for part in range(parts):
             time = np.full(everything.size, gain / parts)
-            self._round(sampler, progress, everything, progress.time, time, photons, emits=True)
-            progress.time += time
+            self._round(photons, sampler, everything, photons.time, time, emits=True)
+            photons.time += time
             self.report("parts of the exposure", part + 1, parts)
 
-    def _draw_above(self, progress: _Progress, photons: _Photons) -> None:
+    def _draw_above(self, photons: _Photons) -> None:
         """Raise the majorant where paths exceeded it, and draw what lies between, until none exceeds."""
-        for raises in range(1, MAX_RAISES + 1):
-            exceeding = photons.take_exceeding()
-            if exceeding is None:
+        for raises in count(1):
+            parts, photons.exceeding = [part for part in photons.exceeding if part.k.size], []
+            if not parts:
                 return
             assert self.majorant is not None
-            self.tally.raises += 1
-            self.tally.exceeding += exceeding.k.size
-            below, before = self.majorant.copy(), max(self.tally.candidates, WAVEFRONT)
+            exceeding = Samples.joined(parts)
+            self.tally.update(raises=1, exceeding=exceeding.k.size)
+            below, before = self.majorant.copy(), max(self.tally["candidates"], WAVEFRONT)
             self.majorant.raise_bounds(exceeding, reach=raises)
             sampler = self._sampler(self.majorant, below)
-            expected = progress.time * sampler.mass[self.scopes.group]
-            if expected.sum() > MAX_EXTRA_RATIO * before:
-                break
+            expected = photons.time * sampler.mass[self.scopes.group]
+            if raises > MAX_RAISES or expected.sum() > MAX_EXTRA_RATIO * before:
+                raise InputError(
+                    "photons: some light paths are so much brighter than all that were met before that "
+                    "single photons of them cannot be drawn; make lamps larger, metals rougher, or "
+                    "openings wider"
+                )
             scopes = np.flatnonzero(expected)
-            block = expected[scopes].cumsum() // (WAVEFRONT / 2)
-            for some in np.split(scopes, np.flatnonzero(np.diff(block)) + 1):
-                self._round(sampler, progress, some, np.zeros(some.size), progress.time[some], photons)
+            for some in _split(scopes, expected[scopes].cumsum() // (WAVEFRONT / 2)):
+                self._round(photons, sampler, some, np.zeros(some.size), photons.time[some])
             self.report("photons above the raised bound", raises, raises)
-        else:
-            if photons.take_exceeding() is None:
-                return
-        raise InputError(
-            "photons: some light paths are so much brighter than all that were met before that single "
-            "photons of them cannot be drawn; make lamps larger, metals rougher, or openings wider"
-        )
 
     def _sampler(self, majorant: Majorant, below: Majorant | None = None) -> CandidateSampler:
-        return sampler_for(self.setup, majorant, self.scopes.cell_groups, self.explored.ambient, below)
+        groups, ambient = self.scopes.cell_groups, self.explored.ambient
+        return sampler_class(self.setup)(self.setup, majorant, groups, ambient, below)
 
     def _film_sampler(self) -> CandidateSampler | None:
         return None if self.majorant is None else self._sampler(self.majorant)
@@ -275,56 +240,53 @@ class _Drawing:
 
     def _round(
         self,
+        photons: _Photons,
         sampler: CandidateSampler | None,
-        progress: _Progress,
         some: np.ndarray,
         begin: np.ndarray,
         duration: np.ndarray,
-        photons: _Photons,
         *,
         emits: bool = False,
     ) -> None:
         """Candidates of some scopes, from time `begin` on: of films, and with `emits` of what shines."""
-        numbers = {"seed": self.seed, "round_number": self.stream}
-        self.stream += 1
+        numbers = {"seed": self.seed, "round_number": self.tally["rounds"]}
         rng = seeds.generator(stage="candidate numbers", **numbers)
-        scopes, emission, photons_before = self.scopes, self.explored.emission, progress.photons.sum()
-        candidates = 0
+        scopes, emission, tally = self.scopes, self.explored.emission, self.tally
+        candidates_before, photons_before = tally["candidates"], photons.number.sum()
 
-        def add(part: Accepted, scope: np.ndarray, number: np.ndarray) -> None:
-            nonlocal candidates
-            start, length = begin.repeat(number)[part.candidate], duration.repeat(number)[part.candidate]
-            photons.tables.append(part.photons)
-            photons.scope.append(scope[part.candidate])
-            photons.time.append(start + length * rng.random(part.candidate.size))
-            progress.photons += np.bincount(scope[part.candidate], minlength=progress.photons.size)
-            progress.tried[some] += number
-            candidates += scope.size
+        def add(part: Accepted, number: np.ndarray, paths: int) -> None:
+            of_scope = np.arange(some.size).repeat(number)[part.candidate]
+            time = begin[of_scope] + duration[of_scope] * rng.random(of_scope.size)
+            photons.add(part.photons, some[of_scope], time)
+            photons.exceeding.append(part.exceeding)
+            photons.tried[some] += number
+            tally.update(candidates=int(number.sum()), followed=part.ratio.size, paths=paths)
 
         if sampler is not None:
             number = rng.poisson(duration * sampler.mass[scopes.group[some]])
             scope = some.repeat(number)
-            views = None if scopes.is_of_all_views else scopes.view[scope]
+            view = None if scopes.is_of_all_views else scopes.view[scope]
             path_seed = seeds.integer(stage="candidate paths", **numbers)
-            part = sampler.try_candidates(scopes.group[scope], views, path_seed)
-            add(part, scope, number)
-            photons.exceeding.append(part.exceeding)
-            self.tally.followed += part.ratio.size
-            self.tally.paths += paths_of(sampler, scope.size, part.ratio.size)
+            part = sampler.try_candidates(scopes.group[scope], view, path_seed)
+            add(part, number, sampler.count_paths(scope.size, part.ratio.size))
         if emits and emission.mass:
             number = rng.poisson(duration * emission.mass)
             scope = some.repeat(number)
-            views = scopes.view[scope]
+            view = scopes.view[scope]
             if scopes.is_of_all_views:
-                views = rng.integers(0, self.setup.grid.view_count, scope.size)
+                view = rng.integers(0, self.setup.grid.view_count, scope.size)
             path_seed = seeds.integer(stage="emission candidates", **numbers)
-            part = emission.try_candidates(scopes.group[scope], views, scopes.cell_groups, path_seed)
-            add(part, scope, number)
-            self.tally.paths += scope.size
-        self.tally.candidates += candidates
+            part = emission.try_candidates(scopes.group[scope], view, scopes.cell_groups, path_seed)
+            add(part, number, scope.size)
+        tally["rounds"] += 1
         if emits:
-            share = (progress.photons.sum() - photons_before) / max(candidates, 1)
-            self.kept_share = max(share, MIN_KEPT_SHARE)
+            candidates = max(tally["candidates"] - candidates_before, 1)
+            self.kept_share = max((photons.number.sum() - photons_before) / candidates, MIN_KEPT_SHARE)
+
+
+def _split(scopes: np.ndarray, block: np.ndarray) -> list[np.ndarray]:
+    """Scopes (N,) in runs of the same number of `block` (N,)."""
+    return np.split(scopes, np.flatnonzero(np.diff(block)) + 1)
 
 
 def candidates_needed(missing: np.ndarray, round_number: int, kept_share: float) -> np.ndarray:

@@ -22,7 +22,7 @@ from simgen.photons.counting_plan import Plan, probe
 from simgen.photons.emission_sampler import EmissionSampler
 from simgen.photons.exploration import explore
 from simgen.photons.photon_counting import draw_from_views
-from simgen.photons.shining_pieces import look_of, pieces_in_view
+from simgen.photons.shining_pieces import pieces_in_view
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend
 from simgen.renderer.emission import ShiningSurface
@@ -141,7 +141,7 @@ def area_of(rig: Rig, surface: ShiningSurface, cfa: str | None = None) -> tuple[
         return 0.0, 0.0
     view = np.arange(4096) % rig.grid.view_count
     found = sampler.film_points(view, np.random.default_rng(1))
-    highest = max(float(radiance.max()) for radiance in sampler.look.radiance)
+    highest = max(float(one.radiance.max()) for one in sampler.surfaces)
     row, col = found.row_px, found.col_px
     inside = (row > -0.5) & (row < rig.grid.height - 0.5) & (col > -0.5) & (col < rig.grid.width - 0.5)
     used = inside * found.sent * highest / found.bound
@@ -189,8 +189,7 @@ def test_pieces_of_a_ball_cover_half_of_it() -> None:
         np.ones(3),
         ball=(centre, radius, np.eye(3)),
     )
-    look = look_of([surface], "GRBG", is_spectral=False)
-    pieces = pieces_in_view([surface], look, as_rig(GRID))
+    pieces = pieces_in_view([surface], as_rig(GRID))
     assert 0.5 < pieces.area_mm2.sum() / (4 * np.pi * radius**2) < 0.75  # what no camera sees is left out
 
 

@@ -78,7 +78,7 @@ def test_lifting_lists_what_was_missed_and_covers_what_came(majorant: Majorant) 
 @pytest.mark.parametrize("is_listed", [True, False])
 def test_lifting_reaches_so_many_tiles_around(majorant: Majorant, is_listed: bool, reach: int) -> None:
     lifted = majorant if is_listed else Majorant(GRID, majorant.layers, DIM)
-    over = replace(pilot(3).take(np.array([0])), row=np.array([48]), col=np.array([64]))
+    over = pilot(3).take(np.array([0]))._replace(row=np.array([48]), col=np.array([64]))
     over.light[:], over.z_mm[:] = [[0.0, 40.0, 0.0]], 300.0
     lifted.lift(over, reach)
     _, row, col = lifted.layers.layer_row_col(lifted.layers.tiles_of(over))
