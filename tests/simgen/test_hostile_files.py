@@ -64,7 +64,7 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "index 0": ("a.obj", obj("f 0 1 2"), "line 5"),
     "empty": ("a.obj", b"", "has no faces"),
     "XML": ("scene.xml", b"<scene version='3.0.0'/>", "not named .ply or .obj"),
-    "bomb": ("a.png", png(width=60_000, height=60_000, data=BOMB), "60000 x 60000 px, and at most 67108864"),
+    "bomb": ("a.png", png(width=60_000, height=60_000, data=BOMB), "exceeds limit"),
     "text bomb": ("a.png", png(extra=chunk(b"zTXt", b"a\0\0" + BOMB)), "too large"),
     "truncated": ("a.png", png()[:-30], "its header cannot be read"),
     "checksum": ("a.png", png()[:-20] + b"\0\0\0\0" + png()[-16:], "damaged or cut off"),
@@ -118,7 +118,7 @@ def test_links_out_of_the_folder_pipes_and_devices(tmp_path: Path) -> None:
 def test_a_file_of_a_gigabyte_is_not_read(tmp_path: Path) -> None:
     scene_with(tmp_path, "large.png", png())
     os.truncate(tmp_path / "large.png", 1 << 30)
-    assert "1073741824 bytes, more than" in refusal(tmp_path)
+    assert "larger than the 268435456 bytes" in refusal(tmp_path)
     os.truncate(tmp_path / "scene.toml", 1 << 30)
     assert "524288 bytes" in refusal(tmp_path)
 

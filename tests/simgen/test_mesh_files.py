@@ -117,8 +117,10 @@ def test_16_bits_are_kept(channels: int, tmp_path: Path) -> None:
     np.testing.assert_allclose(image_of(tmp_path, "deep.png"), expected, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.parametrize("mode", ["1", "L", "P", "RGB", "RGBA"])
-@pytest.mark.parametrize("name", ["a.png", "a.tif"])
+@pytest.mark.parametrize(
+    ("mode", "name"),
+    [*((mode, "a.png") for mode in ("1", "L", "P", "RGB", "RGBA")), ("L", "a.tif"), ("RGBA", "a.tif")],
+)
 def test_common_pictures_are_read(mode: str, name: str, tmp_path: Path) -> None:
     image = Image.new("RGB", (3, 2), "white")
     image.putpixel((2, 1), (0, 0, 0))

@@ -88,7 +88,7 @@ def test_fewer_than_no_photons_cannot_be_kept(most: float) -> None:
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint32, np.uint64, np.float32, ">i4"])
 def test_counts_of_every_type_are_the_same(dtype: object) -> None:
-    grid = unit_grid(2, 2, 3, 3)
+    grid = unit_grid(2, 2, 3, 5)
     film = np.random.default_rng(1).integers(0, 100, grid.shape_KLHW)
     optics = pcii.Optics(pitch_mm=(1.0, 1.0), focal_mm=1.0, pixel_mm=1.0)
     same = np.asarray(film).astype(dtype)  # type: ignore[arg-type]

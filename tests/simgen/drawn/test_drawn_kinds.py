@@ -125,9 +125,7 @@ def test_a_name_that_two_packages_register_is_refused(
 
 
 def test_a_number_is_required_for_drawn_scenes_and_refused_for_others() -> None:
-    with pytest.raises(InputError, match=r"^scene_number: .* say which one, such as scene_number = 0"):
-        load_scene("drawn_room")
-    for number in (-1, 1 << 63, True):
+    for number in (None, -1, 1 << 63, True):
         with pytest.raises(InputError, match="from 0 to"):
             load_scene("drawn_room", number=number)
     with pytest.raises(InputError, match=r"^scene_number: .*desk.* leave it out$"):
