@@ -1,12 +1,14 @@
-"""The network of depth in PyTorch, and its export.
+"""The network of depth and masks in PyTorch.
 
-All planes of B films are treated alike: they are the batch (B Z, C, h, w) of two-dimensional
-convolutions, between which those of a film exchange features with the planes 1 and 4 steps away and with the
-largest and the mean over all planes. A U-net from cells of 4 px up to cells of 64 px sees shapes; a head of
-blocks of 2 px sees outlines.
+All planes of B films are treated alike: they are the batch (B Z, C, h, w) of two-dimensional convolutions,
+between which those of a film exchange features with the planes 1 and 4 steps away and with the largest and the
+mean over all planes. A U-net from cells of 4 px up to cells of 64 px sees shapes; a head of blocks of 2 px sees
+outlines. A hint says how near each plane is to one whose mask is asked for. From the same features each plane
+has two logits: that its depth is the surface's, and that the surface belongs to an object in focus there.
 """
 
 from itertools import pairwise
+from pathlib import Path
 
 import torch
 import torch.nn.functional as f
@@ -69,12 +71,16 @@ class Blocks(nn.ModuleList):
 
 
 class Trunk(nn.Module):
-    """Features (B Z, 16, h, w) of cells of 4 px, logits (B Z, 1, h, w), that of no surface (B, 1, h, w)."""
+    """Features (B Z, 16, h, w) of cells of 4 px, their logits, and that of no surface (B, 1, h, w).
+
+    Logits (B Z, 1, h, w) are those of depth and of masks.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         first = WIDTHS[0]
         self.stem = nn.Conv2d(5, first, 3, padding=1)
+        self.hint = nn.Linear(2, first, bias=False)
         self.down = nn.ModuleList(nn.Conv2d(fine, coarse, 2, stride=2) for fine, coarse in pairwise(WIDTHS))
         self.up = nn.ModuleList(nn.Conv2d(coarse, fine, 1) for fine, coarse in pairwise(WIDTHS))
         self.before = nn.ModuleList(Blocks(2, width) for width in WIDTHS[1:-1])
@@ -82,18 +88,27 @@ class Trunk(nn.Module):
         self.after = nn.ModuleList(Blocks(1, width) for width in WIDTHS[1:-1])
         self.last = nn.Conv2d(first, first, 3, padding=1)
         self.logit = nn.Conv2d(first, 1, 1)
+        self.mask = nn.Conv2d(first, 1, 1)
         self.trust = nn.Parameter(torch.tensor(0.5))
         self.nothing = nn.Sequential(nn.Conv2d(2 * first, first, 1), nn.ReLU(), nn.Conv2d(first, 1, 1))
-        nn.init.zeros_(self.logit.weight)
+        for start_at_zero in (self.hint, self.logit, self.mask):
+            nn.init.zeros_(start_at_zero.weight)
 
     def forward(
-        self, evidence: Tensor, brightness: Tensor, coverage: Tensor, surface: Tensor, light: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
+        self,
+        evidence: Tensor,
+        brightness: Tensor,
+        coverage: Tensor,
+        surface: Tensor,
+        light: Tensor,
+        hint: Tensor,
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         films = surface.shape[0]
         cell_brightness = f.avg_pool2d(brightness**2, 2).clamp(min=1e-6).sqrt()
         level = (light / 3).view(-1, 1, 1, 1).expand_as(surface)
         parts = [f.avg_pool2d(evidence, 2), cell_brightness, coverage, surface / 4, level]
-        fine = x = f.relu(self.stem(torch.stack(parts, dim=2).flatten(0, 1)))
+        of_planes = self.hint(hint).flatten(0, 1)[:, :, None, None]
+        fine = x = f.relu(self.stem(torch.stack(parts, dim=2).flatten(0, 1)) + of_planes)
         kept = []
         for down, blocks in zip(self.down, self.before, strict=False):
             x = blocks(down(x), films)
@@ -105,38 +120,72 @@ class Trunk(nn.Module):
         x = f.relu(fine + f.interpolate(self.up[0](x), scale_factor=2.0, mode="nearest"))
         x = x + f.relu(self.last(x))
         logit = self.logit(x) + self.trust * surface.flatten(0, 1)[:, None]
-        return x, logit, self.nothing(over_all(by_film(x, films)))
+        return x, logit, self.mask(x), self.nothing(over_all(by_film(x, films)))
 
 
 class Head(nn.Module):
-    """Logits (B, Z, h, w) of blocks of 2 px."""
+    """Logits (B, Z, h, w) of blocks of 2 px: of depth, and of masks."""
 
     def __init__(self) -> None:
         super().__init__()
         self.spread = nn.Conv2d(WIDTHS[0], 4 * HEAD, 1)
         self.mix = nn.Conv2d(HEAD + 4, HEAD, 3, padding=1)
         self.logit = nn.Conv2d(HEAD, 1, 1)
+        self.mask = nn.Conv2d(HEAD, 1, 1)
         nn.init.zeros_(self.logit.weight)
+        nn.init.zeros_(self.mask.weight)
 
-    def forward(self, features: Tensor, cell_logit: Tensor, evidence: Tensor, brightness: Tensor) -> Tensor:
+    def forward(
+        self,
+        features: Tensor,
+        cell_logit: Tensor,
+        cell_mask: Tensor,
+        evidence: Tensor,
+        brightness: Tensor,
+    ) -> tuple[Tensor, Tensor]:
         own = evidence[:, :, None]
-        given = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
-        x = torch.cat([f.pixel_shuffle(self.spread(features), 2), given.flatten(0, 1)], dim=1)
-        logit = self.logit(f.relu(self.mix(x))) + f.interpolate(cell_logit, scale_factor=2.0, mode="nearest")
-        return by_film(logit, evidence.shape[0])[:, :, 0]
+        of_blocks = torch.cat([own, moved(own, 1), moved(own, -1), brightness[:, :, None]], dim=2)
+        x = torch.cat([f.pixel_shuffle(self.spread(features), 2), of_blocks.flatten(0, 1)], dim=1)
+        x = f.relu(self.mix(x))
+        logits = self.logit(x) + f.interpolate(cell_logit, scale_factor=2.0, mode="nearest")
+        masks = self.mask(x) + f.interpolate(cell_mask, scale_factor=2.0, mode="nearest")
+        films = evidence.shape[0]
+        return by_film(logits, films)[:, :, 0], by_film(masks, films)[:, :, 0]
 
 
-class DepthNetwork(nn.Module):
-    """Log-probabilities (B, Z + 1, h, w) of the planes and, last, of no surface, for blocks of 2 px."""
+class SurfaceNetwork(nn.Module):
+    """Log-probabilities (B, Z + 1, h, w) of the planes and, last, of no surface; logits of masks (B, Z, h, w).
+
+    Both are of blocks of 2 px. A mask's logit is relative to that of belonging to none of the planes, which
+    is 0.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.trunk, self.head = Trunk(), Head()
 
     def forward(
-        self, evidence: Tensor, brightness: Tensor, coverage: Tensor, surface: Tensor, light: Tensor
-    ) -> Tensor:
-        features, cell_logit, nothing = self.trunk(evidence, brightness, coverage, surface, light)
-        logit = self.head(features, cell_logit, evidence, brightness)
+        self,
+        evidence: Tensor,
+        brightness: Tensor,
+        coverage: Tensor,
+        surface: Tensor,
+        light: Tensor,
+        hint: Tensor,
+    ) -> tuple[Tensor, Tensor]:
+        *cells, nothing = self.trunk(evidence, brightness, coverage, surface, light, hint)
+        logit, mask = self.head(*cells, evidence, brightness)
         nothing = f.interpolate(nothing, scale_factor=2.0, mode="nearest")
-        return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1)
+        return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1), mask
+
+    def load_exported(self, folder: Path) -> None:
+        """Take the weights of `trunk.onnx` and `head.onnx`; layers that these do not have stay as they are."""
+        import onnx
+        from onnx import numpy_helper
+
+        for part, name in ((self.trunk, "trunk"), (self.head, "head")):
+            graph = onnx.load(folder / f"{name}.onnx").graph
+            own = part.state_dict()
+            weights = {one.name: numpy_helper.to_array(one) for one in graph.initializer if one.name in own}
+            state = {key: torch.from_numpy(values.copy()) for key, values in weights.items()}
+            part.load_state_dict(own | state)

@@ -1,15 +1,18 @@
-"""Examples to train on: inputs of the network for datasets, at random amounts of light, with the true depth.
+"""Examples to train on: inputs of the network for datasets, at random amounts of light, with the truth.
 
     python -m training.samples DATASETS... --out FOLDER [--each 2]
 
 DATASETS are collections that `simgen generate training/recipes/NAME.toml` makes. Each example is a file;
 those that are there are not made again. Photons are thinned at random, by which Poisson counts stay Poisson
-counts, to between `LEAST_PHOTONS` per view and all, evenly in their logarithm.
+counts, to between `MIN_PHOTONS` per view and all, evenly in their logarithm. Which planes are asked for is not
+part of an example: `training.requests` draws it anew each time that one is used.
 """
 
 import argparse
 import io
 import zlib
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +27,13 @@ from pcii.evidence.texture_evidence import evidence_of_texture
 from pcii.io.dataset import Dataset
 from pcii.store.safe_files import write_bytes_safely
 
-LEAST_PHOTONS = 60.0
+MIN_PHOTONS = 30.0
 NEAR, FAR = (0.75, 0.95), (1.05, 1.4)
-"""How far the range of depths goes beyond the planes of a scene."""
-MOST_VALUES = 1 << 22
-"""Blocks times planes of an example; what is larger is cut to a part of the film."""
+"""How far the range of depths goes beyond the planes of a scene, as factors of the depth of its ends."""
+MAX_VALUES = 1 << 22
+"""Largest number of blocks times planes of an example; what is larger is cut to a part of the film."""
+
+Example = dict[str, np.ndarray]
 
 
 def main() -> None:
@@ -39,74 +44,102 @@ def main() -> None:
     parser.add_argument("collections", nargs="+", type=Path)
     parser.add_argument("--out", required=True, type=Path)
     parser.add_argument("--each", type=int, default=2, help="examples of a dataset")
+    parser.add_argument("--workers", type=int, default=1)
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
-    for collection in arguments.collections:
+    requests = list(missing_examples(arguments.collections, arguments.each, arguments.out))
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        for number, _ in enumerate(pool.map(write_example, *zip(*requests, strict=True)), start=1):
+            print(f"{number} of {len(requests)} examples", end="\r", flush=True)
+
+
+def missing_examples(collections: list[Path], count: int, out: Path) -> Iterator[tuple[Path, Path]]:
+    """Folders of datasets, and the files of their examples that are not there yet."""
+    for collection in collections:
         for folder in sorted(path.parent for path in collection.glob("*/manifest.json")):
-            write_examples(
-                pcii.open_dataset(folder), f"{collection.name}_{folder.name}", arguments.each, arguments.out
-            )
+            for number in range(count):
+                file = out / f"{collection.name}_{folder.name}_{number}.npz"
+                if not file.exists():
+                    yield folder, file
 
 
-def write_examples(dataset: Dataset, name: str, count: int, out: Path) -> None:
-    """Write so many examples of a dataset, those that are not there yet."""
-    for number in range(count):
-        file = out / f"{name}_{number}.npz"
-        if not file.exists():
-            write_example(file, example_of(dataset, np.random.default_rng(zlib.crc32(file.stem.encode()))))
+def write_example(folder: Path, file: Path) -> None:
+    """Write an example of a dataset as one file, at once; its name decides on all that is random."""
+    example = example_of(pcii.open_dataset(folder), np.random.default_rng(zlib.crc32(file.stem.encode())))
+    content = io.BytesIO()
+    np.savez(content, **example)  # type: ignore[arg-type]
+    write_bytes_safely(file, content.getvalue())
 
 
-def example_of(dataset: Dataset, rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """Inputs at half precision, and `plane` (H, W) float32, the true plane as a fraction; NaN beyond them."""
+def example_of(dataset: Dataset, rng: np.random.Generator) -> Example:
+    """Inputs without a hint at half precision, and the truth.
+
+    `plane` (H, W) float32 is the true plane as a fraction, NaN beyond them; `object_id` (H, W) int16;
+    `objects` (N, 4) float32 are id, median plane, planes that the object reaches over, and share of the film;
+    `named_planes` (R,) float32 the planes that the scene names.
+    """
     counts, truth, grid = dataset.counts, dataset.truth, dataset.grid
     assert truth is not None
     views = grid.view_count
-    photons = views * np.exp(
-        rng.uniform(np.log(LEAST_PHOTONS), np.log(max(counts.total / views, LEAST_PHOTONS)))
-    )
+    brightest = max(counts.total / views, MIN_PHOTONS)
+    photons = views * np.exp(rng.uniform(np.log(MIN_PHOTONS), np.log(brightest)))
     z_mm = np.asarray(dataset.analysis["z_mm"])
     planes = FocalPlanes.between(grid, rng.uniform(*NEAR) * z_mm.min(), rng.uniform(*FAR) * z_mm.max(), 1.0)
     method = PosteriorDepth()
     dimmed = counts.subsample(photons, rng)
     evidence = evidence_of_texture(dimmed, planes, method.block_px, method.model)
-    inputs = method.network_inputs(evidence, planes, method.block_px)
-    example = {name: part.astype(np.float16) for name, part in inputs._asdict().items()}
-    return _part(example | {"plane": true_plane(truth, grid, planes)}, rng)
+    inputs = method.network_inputs(evidence, planes, method.block_px)._asdict()
+    del inputs["hint"]
+    example = {name: part.astype(np.float16) for name, part in inputs.items()}
+    place = plane_of(planes, total_disparity_px(grid, np.where(truth.z_mm > 0, truth.z_mm, np.inf)))
+    is_inside = (place > -0.5) & (place < len(planes) - 0.5) & np.isfinite(truth.z_mm)
+    example |= {
+        "plane": np.where(is_inside, place, np.nan).astype(np.float32),
+        "object_id": truth.object_id.astype(np.int16),
+        "objects": objects_of(truth, place),
+        "named_planes": plane_of(planes, total_disparity_px(grid, z_mm)).astype(np.float32),
+    }
+    return cut(example, rng)
 
 
-def true_plane(truth: Truth, grid: CameraGrid, planes: FocalPlanes) -> np.ndarray:
-    """Where among the planes the surface is (H, W) float32, 0 the first; NaN where none is between them."""
+def plane_of(planes: FocalPlanes, total_px: np.ndarray) -> np.ndarray:
+    """Where among the planes total disparities are, 0 the first, as fractions."""
     total = planes.total_disparity_px
-    step = (total[-1] - total[0]) / (len(planes) - 1)
-    with np.errstate(divide="ignore"):
-        place = (total_disparity_px(grid, truth.z_mm) - total[0]) / step
-    inside = (place > -0.5) & (place < len(planes) - 0.5) & np.isfinite(truth.z_mm)
-    return np.where(inside, place, np.nan).astype(np.float32)
+    return (total_px - total[0]) / ((total[-1] - total[0]) / (len(planes) - 1))
 
 
-def _part(example: dict[str, np.ndarray], rng: np.random.Generator) -> dict[str, np.ndarray]:
-    """The example, or a part of its film of at most `MOST_VALUES`."""
+def objects_of(truth: Truth, place: np.ndarray) -> np.ndarray:
+    """Id, median plane, planes between the 2nd and 98th percentile, share of the film: (N, 4) float32."""
+    rows = []
+    for number in np.unique(truth.object_id[truth.object_id > 0]):
+        own = place[truth.object_id == number]
+        low, middle, high = np.percentile(own[np.isfinite(own)], [2, 50, 98])
+        rows.append((number, middle, high - low, own.size / place.size))
+    return np.array(rows, np.float32).reshape(-1, 4)
+
+
+def cut(example: Example, rng: np.random.Generator) -> Example:
+    """The example, or a part of its film of at most `MAX_VALUES`."""
     Z, h, w = example["evidence"].shape
-    side = int(np.sqrt(MOST_VALUES / Z)) // 16 * 16
-    cut = {}
+    side = int(np.sqrt(MAX_VALUES / Z)) // 16 * 16
     top, left = (int(rng.integers(0, max(1, (size - side) // 16 + 1))) * 16 for size in (h, w))
-    for name, values in example.items():
-        if values.ndim == 1:
-            cut[name] = values
-            continue
-        per_block = {"plane": PosteriorDepth.block_px, "coverage": 0.5, "surface": 0.5}.get(name, 1)
-        rows, columns = (
-            slice(int(first * per_block), int((first + side) * per_block)) for first in (top, left)
-        )
-        cut[name] = values[..., rows, columns]
-    return cut
+    return {name: window(name, values, top, left, side) for name, values in example.items()}
 
 
-def write_example(file: Path, example: dict[str, np.ndarray]) -> None:
-    """Write an example as one file, at once."""
-    content = io.BytesIO()
-    np.savez(content, **example)  # type: ignore[arg-type]
-    write_bytes_safely(file, content.getvalue())
+def window(name: str, values: np.ndarray, top: int, left: int, side: int) -> np.ndarray:
+    """The rows and columns of a part of an example, whose ends are given in blocks."""
+    per_block = {
+        "plane": PosteriorDepth.block_px,
+        "object_id": PosteriorDepth.block_px,
+        "evidence": 1,
+        "brightness": 1,
+        "coverage": 0.5,
+        "surface": 0.5,
+    }.get(name)
+    if per_block is None:
+        return values
+    rows, columns = (slice(int(at * per_block), int((at + side) * per_block)) for at in (top, left))
+    return values[..., rows, columns]
 
 
 if __name__ == "__main__":

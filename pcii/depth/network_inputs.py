@@ -20,6 +20,8 @@ LEAST_LOG_RATIO, MOST_LOG_RATIO = -8.0, 8.0
 """Ends of the logarithm of a probability relative to all planes being alike."""
 LEAST_PHOTONS, MOST_PHOTONS = 1e-2, 1e3
 """Ends of the mean number of photons in a cell."""
+HINT_WIDTHS_PX = (1.5, 6.0)
+"""Standard deviations, in total disparity, of how near a plane is to one that is asked for."""
 
 
 class NetworkInputs(NamedTuple):
@@ -28,7 +30,7 @@ class NetworkInputs(NamedTuple):
     `evidence` (Z, h, w): asinh of the nats of a block; `brightness` (Z, h, w): square root of its mean over
     that of the film; `coverage` (Z, h / 2, w / 2): share of the views' samples that a cell has; `surface`
     (Z, h / 2, w / 2): logarithm of the posterior of a smooth surface relative to equally likely planes;
-    `light` (1,): log10 of the mean number of photons in a cell.
+    `light` (1,): log10 of the mean number of photons in a cell; `hint` (Z, 2): see `hint_of`.
     """
 
     evidence: np.ndarray
@@ -36,6 +38,7 @@ class NetworkInputs(NamedTuple):
     coverage: np.ndarray
     surface: np.ndarray
     light: np.ndarray
+    hint: np.ndarray
 
     def part(self, rows: slice, cols: slice) -> "NetworkInputs":
         """The inputs of some rows and columns of blocks, whole cells; the light stays that of the film."""
@@ -49,11 +52,27 @@ class NetworkInputs(NamedTuple):
             self.coverage[cells],
             self.surface[cells],
             self.light,
+            self.hint,
         )
 
 
+def hint_of(total_px: np.ndarray, requested_px: np.ndarray) -> np.ndarray:
+    """How near planes of total disparities (Z,) are to requested ones (R,): (Z, 2) float32.
+
+    For either of `HINT_WIDTHS_PX` a Gaussian of the distance to the nearest one; 0 where none is requested.
+    """
+    if requested_px.size == 0:
+        return np.zeros((total_px.size, len(HINT_WIDTHS_PX)), np.float32)
+    distance_px = np.abs(total_px[:, None] - requested_px).min(axis=1, keepdims=True)
+    return np.exp(-((distance_px / HINT_WIDTHS_PX) ** 2) / 2).astype(np.float32)
+
+
 def inputs_of(
-    evidence: TextureEvidence, samples_per_block: float, prior: SurfacePrior, multiple: int
+    evidence: TextureEvidence,
+    samples_per_block: float,
+    prior: SurfacePrior,
+    multiple: int,
+    hint: np.ndarray,
 ) -> NetworkInputs:
     """Inputs from the evidence of blocks, in which all views have `samples_per_block` samples.
 
@@ -88,4 +107,5 @@ def inputs_of(
         mirrored(in_cells[1] / np.float32(of_cell), CELL_SIDE_BLOCKS),
         mirrored(np.minimum(ratio, np.float32(MOST_LOG_RATIO)), CELL_SIDE_BLOCKS),
         np.array([np.log10(np.clip(photons, LEAST_PHOTONS, MOST_PHOTONS))], np.float32),
+        hint,
     )

@@ -16,7 +16,7 @@ from pcii.core.geometry import depth_of_total_disparity_mm
 from pcii.core.images import Views
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
-from pcii.depth.network_inputs import NetworkInputs, inputs_of
+from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
 from pcii.depth.surface_network import MULTIPLE, network_posterior
 from pcii.evidence.cells import CELL_PX
@@ -26,6 +26,7 @@ from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, Texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
 
+NOTHING_REQUESTED = np.zeros(0)
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
 
@@ -128,9 +129,16 @@ class PosteriorDepth:
         smooth = gaussian_filter(nats, self.interpolation_blocks, axes=(1, 2))
         return peak_depth_mm(planes, plane, neighbours_of(smooth, plane))
 
-    def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
+    def network_inputs(
+        self,
+        evidence: TextureEvidence,
+        planes: FocalPlanes,
+        block_px: int,
+        requested_px: np.ndarray = NOTHING_REQUESTED,
+    ) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
-        return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE)
+        hint = hint_of(planes.total_disparity_px, requested_px)
+        return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:
         """In how many of eight directions a block (h, w) meets one where the halves `agree`, at its depth."""
