@@ -56,7 +56,8 @@ class Examples:
                 self.of_planes.setdefault(self.plane_count[file], []).append(file)
 
     def batches(self, rng: np.random.Generator, pool: ThreadPoolExecutor) -> Iterator[Batch]:
-        """Batches without end: an example of any kind of scene, all kinds alike, and others of as many planes."""
+        """Batches without end: an example of any kind of scene, all kinds alike, and others of as many
+        planes."""
         kinds, waiting = list(self.kinds.values()), deque[Future[Batch]]()
         while True:
             while len(waiting) < WAITING_BATCHES:

@@ -3,11 +3,11 @@
     python -m training.fit EXAMPLES --out weights.pt --minutes 90 [--resume] [--anew]
 
 EXAMPLES is a folder made by `training.samples`. Training starts from the weights that ship, or with `--anew`
-from random ones. The objective is the sum of two cross-entropies, in nats per block of 2 px: of the true plane,
-minus the logarithm of the probability of the two planes beside the true depth, by how near they are, or of no
-surface; and of the requested plane that the block's object belongs to, or none of them. One dataset in
-`HELD_OUT` is kept for the curve that is printed. With each line of it the state is written beside the weights,
-from which `--resume` goes on.
+from random ones. The objective is the sum of two cross-entropies, in nats per block of 2 px: of the true
+plane, minus the logarithm of the probability of the two planes beside the true depth, by how near they are,
+or of no surface; and of the requested plane that the block's object belongs to, or none of them. One dataset
+in `HELD_OUT` is kept for the curve that is printed. With each line of it the state is written beside the
+weights, from which `--resume` goes on.
 """
 
 import argparse

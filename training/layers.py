@@ -1,10 +1,11 @@
 """The network of depth and masks in PyTorch.
 
 All planes of B films are treated alike: they are the batch (B Z, C, h, w) of two-dimensional convolutions,
-between which those of a film exchange features with the planes 1 and 4 steps away and with the largest and the
-mean over all planes. A U-net from cells of 4 px up to cells of 64 px sees shapes; a head of blocks of 2 px sees
-outlines. A hint says how near each plane is to one whose mask is asked for. From the same features each plane
-has two logits: that its depth is the surface's, and that the surface belongs to an object in focus there.
+between which those of a film exchange features with the planes 1 and 4 steps away and with the largest and
+the mean over all planes. A U-net from cells of 4 px up to cells of 64 px sees shapes; a head of blocks of 2
+px sees outlines. A hint says how near each plane is to one whose mask is asked for. From the same features
+each plane has two logits: that its depth is the surface's, and that the surface belongs to an object in focus
+there.
 """
 
 from itertools import pairwise
@@ -154,7 +155,8 @@ class Head(nn.Module):
 
 
 class SurfaceNetwork(nn.Module):
-    """Log-probabilities (B, Z + 1, h, w) of the planes and, last, of no surface; logits of masks (B, Z, h, w).
+    """Log-probabilities (B, Z + 1, h, w) of the planes and, last, of no surface; logits of masks (B, Z, h,
+    w).
 
     Both are of blocks of 2 px. A mask's logit is relative to that of belonging to none of the planes, which
     is 0.
@@ -179,7 +181,8 @@ class SurfaceNetwork(nn.Module):
         return f.log_softmax(torch.cat([logit, nothing], dim=1), dim=1), mask
 
     def load_exported(self, folder: Path) -> None:
-        """Take the weights of `trunk.onnx` and `head.onnx`; layers that these do not have stay as they are."""
+        """Take the weights of `trunk.onnx` and `head.onnx`; layers that these do not have stay as they
+        are."""
         import onnx
         from onnx import numpy_helper
 

@@ -1,8 +1,8 @@
 """Which planes an example is asked for, and which object belongs to which of them.
 
-An object belongs to the requested plane that its median is nearest to, if within `NEAR_PX` of total disparity,
-and to none of them beyond `FAR_PX`. In between, and where it leans over more than `LEANING_PX` near a requested
-plane, it does not count.
+An object belongs to the requested plane that its median is nearest to, if within `NEAR_PX` of total
+disparity, and to none of them beyond `FAR_PX`. In between, and where it leans over more than `LEANING_PX`
+near a requested plane, it does not count.
 """
 
 from typing import NamedTuple
@@ -11,16 +11,17 @@ import numpy as np
 
 NEAR_PX, FAR_PX, LEANING_PX = 5.0, 12.0, 16.0
 WALL_SHARE = 0.2
-"""Objects that fill a larger share of the film, away from all planes that the scene names, are walls: they are
-asked for as often as not."""
+"""Objects that fill a larger share of the film, away from all planes that the scene names, are walls: they
+are asked for as often as not."""
 NO_REQUEST, LEFT_OUT, EMPTY_PLANE = 0.15, 0.3, 0.2
-"""Shares of examples without a request, of planes that are left out of one, and of requests for an empty plane
-more."""
+"""Shares of examples without a request, of planes that are left out of one, and of requests for an empty
+plane more."""
 NOT_COUNTED = -1
 
 
 class Request(NamedTuple):
-    """Requested planes (R,), as fractions of the planes of an example, and the targets (N + 1,) of its objects.
+    """Requested planes (R,), as fractions of the planes of an example, and the targets (N + 1,) of its
+    objects.
 
     A target is the number of a plane, R for none of them, or `NOT_COUNTED`; the first is that of no object.
     """

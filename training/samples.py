@@ -4,8 +4,8 @@
 
 DATASETS are collections that `simgen generate training/recipes/NAME.toml` makes. Each example is a file;
 those that are there are not made again. Photons are thinned at random, by which Poisson counts stay Poisson
-counts, to between `MIN_PHOTONS` per view and all, evenly in their logarithm. Which planes are asked for is not
-part of an example: `training.requests` draws it anew each time that one is used.
+counts, to between `MIN_PHOTONS` per view and all, evenly in their logarithm. Which planes are asked for is
+not part of an example: `training.requests` draws it anew each time that one is used.
 """
 
 import argparse
@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 import pcii
-from pcii.core.camera_grid import CameraGrid
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.geometry import total_disparity_px
 from pcii.core.truth import Truth
