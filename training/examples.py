@@ -13,7 +13,7 @@ from torch import Tensor
 
 from pcii.depth.network_inputs import NetworkInputs, hint_of
 from pcii.depth.surface_network import MULTIPLE
-from training.requests import NOT_COUNTED, draw_request
+from training.requests import draw_request
 from training.samples import Example, window
 
 HELD_OUT = 24
@@ -92,8 +92,6 @@ class Examples:
             hints.append(hint_of(np.arange(self.plane_count[files[0]]), request.planes))
         for target, request in zip(targets, requests, strict=True):
             target[target == request.planes.size] = most
-            if request.planes.size == 0:
-                target[:] = NOT_COUNTED
         stacked = {name: np.stack([part[name] for part in parts]) for name in NetworkInputs._fields[:-1]}
         inputs = [torch.from_numpy(values.astype(np.float32)) for values in stacked.values()]
         return Batch(

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.surface_network import WEIGHTS
-from training.layers import WIDTHS, DepthNetwork
+from training.layers import WIDTHS, SurfaceNetwork
 
 OPSET = 18
 
@@ -24,12 +24,12 @@ def main() -> None:
     parser.add_argument("weights", type=Path)
     parser.add_argument("--out", type=Path, default=WEIGHTS)
     arguments = parser.parse_args()
-    network = DepthNetwork().eval()
+    network = SurfaceNetwork().eval()
     network.load_state_dict(torch.load(arguments.weights, weights_only=True, map_location="cpu"))
     export(network, arguments.out)
 
 
-def export(network: DepthNetwork, folder: Path) -> None:
+def export(network: SurfaceNetwork, folder: Path) -> None:
     """Write `trunk.onnx` and `head.onnx` into the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     Z, h, w = 5, 64, 32
@@ -37,18 +37,21 @@ def export(network: DepthNetwork, folder: Path) -> None:
     evidence, surface = torch.zeros(1, Z, h, w), torch.zeros(1, Z, h // 2, w // 2)
     inputs = (evidence, torch.ones_like(evidence), torch.ones_like(surface), surface, torch.ones(1, 1))
     features = {0: "planes", 2: "cell_rows", 3: "cell_columns"}
-    outputs = {"features": features, "cell_logit": features, "nothing": {2: "cell_rows", 3: "cell_columns"}}
+    outputs = dict.fromkeys(("features", "cell_logit", "cell_mask"), features)
+    outputs["nothing"] = {2: "cell_rows", 3: "cell_columns"}
     names = NetworkInputs._fields
     _write(
         network.trunk,
-        inputs,
+        (*inputs, torch.zeros(1, Z, 2)),
         folder / "trunk.onnx",
-        dict(zip(names, (blocks, blocks, cells, cells, {}), strict=True)),
+        dict(zip(names, (blocks, blocks, cells, cells, {}, {1: "planes"}), strict=True)),
         outputs,
     )
-    parts = torch.zeros(Z, WIDTHS[0], h // 2, w // 2), torch.zeros(Z, 1, h // 2, w // 2), evidence, evidence
-    given = {"features": features, "cell_logit": features, "evidence": blocks, "brightness": blocks}
-    _write(network.head, parts, folder / "head.onnx", given, {"logit": blocks})
+    of_cells = torch.zeros(Z, 1, h // 2, w // 2)
+    parts = torch.zeros(Z, WIDTHS[0], h // 2, w // 2), of_cells, of_cells, evidence, evidence
+    axes = dict.fromkeys(("features", "cell_logit", "cell_mask"), features)
+    axes |= {"evidence": blocks, "brightness": blocks}
+    _write(network.head, parts, folder / "head.onnx", axes, {"logit": blocks, "mask": blocks})
 
 
 def _write(

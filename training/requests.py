@@ -54,9 +54,9 @@ def draw_request(
 def targets_of(objects: np.ndarray, planes: np.ndarray) -> np.ndarray:
     """The target (N + 1,) of no object and of each of the `objects` (N, 4), int64."""
     targets = np.full(len(objects) + 1, NOT_COUNTED)
-    targets[0] = planes.size
     if planes.size == 0:
         return targets
+    targets[0] = planes.size
     distance = np.abs(objects[:, 1, None] - planes)
     nearest, reach = distance.min(axis=1), objects[:, 2]
     is_none = (nearest > FAR_PX) & (nearest - reach / 2 > NEAR_PX)

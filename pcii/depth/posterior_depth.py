@@ -26,7 +26,6 @@ from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, Texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
 
-NOTHING_REQUESTED = np.zeros(0)
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""
 
@@ -129,15 +128,9 @@ class PosteriorDepth:
         smooth = gaussian_filter(nats, self.interpolation_blocks, axes=(1, 2))
         return peak_depth_mm(planes, plane, neighbours_of(smooth, plane))
 
-    def network_inputs(
-        self,
-        evidence: TextureEvidence,
-        planes: FocalPlanes,
-        block_px: int,
-        requested_px: np.ndarray = NOTHING_REQUESTED,
-    ) -> NetworkInputs:
+    def network_inputs(self, evidence: TextureEvidence, planes: FocalPlanes, block_px: int) -> NetworkInputs:
         """What the network is given for the evidence of blocks of photon counts."""
-        hint = hint_of(planes.total_disparity_px, requested_px)
+        hint = hint_of(planes.total_disparity_px, np.zeros(0))  # no plane is asked for
         return inputs_of(evidence, planes.grid.view_count * block_px**2, self.prior, MULTIPLE, hint)
 
     def _directions(self, agree: np.ndarray, plane: np.ndarray, posterior: DepthPosterior) -> np.ndarray:

@@ -40,7 +40,7 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
     Z, h, w = inputs.evidence.shape
     # The network takes several films at once; here it is one.
     given = {name: part[None] for name, part in inputs._asdict().items()}
-    features, cell_logit, cell_nothing = map(np.asarray, trunk.run(None, given, options))
+    *of_cells, cell_nothing = map(np.asarray, trunk.run(None, given, options))
     nothing = cell_nothing[0, 0].repeat(CELL_SIDE_BLOCKS, axis=0).repeat(CELL_SIDE_BLOCKS, axis=1)
     probability, none = np.empty((Z, h, w), np.float32), np.empty((h, w), np.float32)
     rows = max(1, BAND_VALUES // (Z * w)) * CELL_SIDE_BLOCKS
@@ -50,9 +50,13 @@ def network_posterior(inputs: NetworkInputs) -> tuple[np.ndarray, np.ndarray]:
         first, last = max(top - CELL_SIDE_BLOCKS, 0), min(end + CELL_SIDE_BLOCKS, h)
         cells = np.s_[:, :, first // CELL_SIDE_BLOCKS : last // CELL_SIDE_BLOCKS]
         blocks = np.s_[:, :, first:last]
-        parts = features[cells], cell_logit[cells], given["evidence"][blocks], given["brightness"][blocks]
+        parts = (
+            *(part[cells] for part in of_cells),
+            given["evidence"][blocks],
+            given["brightness"][blocks],
+        )
         names = [argument.name for argument in head.get_inputs()]
-        (logit,) = head.run(None, dict(zip(names, parts, strict=True)), options)
+        (logit,) = head.run(["logit"], dict(zip(names, parts, strict=True)), options)
         own = np.asarray(logit)[0, :, top - first : end - first]
         none[top:end] = expit(nothing[top:end] - logsumexp(own, axis=0))
         probability[:, top:end] = softmax(own / np.float32(TEMPERATURE), axis=0) * (1 - none[top:end])

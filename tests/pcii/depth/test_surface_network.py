@@ -9,7 +9,7 @@ from pcii.core.estimates import DepthPosterior
 from pcii.core.focal_planes import FocalPlanes
 from pcii.core.photon_counts import PhotonCounts
 from pcii.depth import surface_network
-from pcii.depth.network_inputs import NetworkInputs, inputs_of
+from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import network_posterior
@@ -31,6 +31,7 @@ def random_inputs(Z: int = 5, h: int = 64, w: int = 96, seed: int = 0) -> Networ
         np.ones(cells, np.float32),
         normal(*cells),
         np.ones(1, np.float32),
+        np.zeros((Z, 2), np.float32),
     )
 
 
@@ -76,8 +77,8 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
     grid = two_squares.counts.grid
     planes = FocalPlanes.at_total_disparity(grid, np.arange(2.0, 8.0))
     evidence = evidence_of_texture(two_squares.counts, planes, METHOD.block_px, METHOD.model)
-    samples = grid.view_count * METHOD.block_px**2
-    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1)
+    samples, hint = grid.view_count * METHOD.block_px**2, hint_of(planes.total_disparity_px, np.array([4.0]))
+    own = inputs_of(evidence, samples, SurfacePrior(), multiple=1, hint=hint)
     turned = inputs_of(
         evidence._replace(
             nats=evidence.nats[:, ::-1], sums=evidence.sums[:, ::-1], samples=evidence.samples[:, ::-1]
@@ -85,9 +86,18 @@ def test_a_mirrored_film_has_mirrored_inputs(two_squares) -> None:
         samples,
         SurfacePrior(),
         multiple=1,
+        hint=hint,
     )
     for part, other in zip(own[:4], turned[:4], strict=True):
         np.testing.assert_allclose(part[:, ::-1], other, rtol=1e-4, atol=1e-4)
+
+
+def test_a_hint_says_how_near_a_plane_is_to_the_nearest_requested_one() -> None:
+    total_px = np.arange(2.0, 8.0)
+    hint = hint_of(total_px, np.array([3.0, 30.0]))
+    np.testing.assert_allclose(hint[:, 0], np.exp(-(((total_px - 3) / 1.5) ** 2) / 2), rtol=1e-6)
+    assert (np.diff(hint[1:, 1]) < 0).all()
+    assert not hint_of(total_px, np.zeros(0)).any()
 
 
 def test_the_depth_is_read_between_the_planes_and_the_confidence_from_three() -> None:
