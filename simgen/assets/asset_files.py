@@ -26,6 +26,8 @@ from simgen.base.strict_models import shorten
 MOST_TEXTURE_PIXELS = 1 << 26
 _TEXCOORDS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _FACES = ("vertex_indices", "vertex_index")
+_LEFT_OUT = {"", "mtllib", "usemtl", "o", "g", "s", "mg", "l", "p", "vp", "lod", "usemap", "maplib"}
+"""Statements of OBJ files that change no surface: materials, groups, points and lines."""
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,8 @@ def _read_ply(data: bytes) -> Triangles:
     else:
         counts, corners = np.full(len(lists), lists.shape[1]), lists.ravel()
     texcoords = next((pair for names in _TEXCOORDS if (pair := columns(*names)) is not None), None)
+    if corners.dtype.kind not in "iu":
+        raise ValueError("has a face whose vertex is not a whole number")
     triangles = fan_all(corners.astype(np.int64), counts)
     return Triangles.checked(positions, triangles, columns("nx", "ny", "nz"), texcoords)
 
@@ -176,7 +180,7 @@ def _parsed_ply(data: bytes) -> PlyData:
 def _read_obj(data: bytes) -> Triangles:
     """Raises `ValueError` with the end of a sentence if there is no mesh.
 
-    Materials and groups are the scene's business, points and lines have no surface: they are passed over.
+    Statements that change no surface are left out; others, such as curved surfaces, are refused.
     """
     points: dict[str, list[list[float]]] = {"v": [], "vt": [], "vn": []}
     corners: list[list[int]] = []
@@ -195,6 +199,8 @@ def _read_obj(data: bytes) -> Triangles:
             elif keyword in points:
                 x, y, z = words[:3]
                 points[keyword].append([float(x), float(y), float(z)])
+            elif keyword not in _LEFT_OUT:
+                raise ValueError
         except ValueError:
             raise ValueError(f"has a line {number} that cannot be used: {line.strip()[:60]!r}") from None
     if not corners:

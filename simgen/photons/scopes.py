@@ -24,13 +24,19 @@ class Scopes:
     """The scopes (S,) of the photons of all views of `grid`, behind the Bayer pattern `cfa`.
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for an exposure; None for a
-    budget.
+    budget. Raises ValueError for an exposure without it, and for a budget with it.
     """
 
     photons: Photons
     grid: CameraGrid
     cfa: str | None
     photons_per_radiance: float | None
+
+    def __post_init__(self) -> None:
+        if (self.photons_per_radiance is None) == (self.photons.scope == "exposure"):
+            raise ValueError(
+                "photons_per_radiance: needed for photons of scope 'exposure', and for no others"
+            )
 
     @cached_property
     def cell_groups(self) -> list[np.ndarray]:

@@ -61,6 +61,7 @@ def thin_photons(
 
     `photons_per_radiance` are those that a pixel catches of a unit of radiance, for scope `exposure`.
     `explored` is what `explore` found for the same setup and settings, if it is known already. Raises
+    ValueError for scope `exposure` without `photons_per_radiance`, and for another scope with it;
     `InputError` for radiance that is not finite, and for light that exceeds every bound.
     """
     scopes = Scopes(photons, setup.grid, setup.cfa, photons_per_radiance)

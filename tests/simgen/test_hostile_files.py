@@ -63,6 +63,12 @@ FILES: dict[str, tuple[str, bytes, str]] = {
     "index of an OBJ": ("a.obj", obj("f 1 2 2000000000"), "line 5 that cannot be used: 'f 1 2 2000000000'"),
     "index 0": ("a.obj", obj("f 0 1 2"), "line 5"),
     "empty": ("a.obj", b"", "has no faces"),
+    "curved surface": ("a.obj", obj("f 1 2 3\nsurf 0 1 0 1"), "line 6 that cannot be used: 'surf 0 1 0 1'"),
+    "part of a vertex": (
+        "a.ply",
+        ply(faces="3 0 1 1.5\n").replace(b"list uchar int", b"list uchar float"),
+        "a face whose vertex is not a whole number",
+    ),
     "XML": ("scene.xml", b"<scene version='3.0.0'/>", "not named .ply or .obj"),
     "bomb": ("a.png", png(width=60_000, height=60_000, data=BOMB), "exceeds limit"),
     "text bomb": ("a.png", png(extra=chunk(b"zTXt", b"a\0\0" + BOMB)), "too large"),
