@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build
 from simgen.renderer.radiance import render_view

@@ -26,7 +26,7 @@ from pcii.base.progress import Report, Stages
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.rows import recipe_of
 from pcii.evaluation.tables import Table
-from pcii.io.dataset_layout import read_manifest
+from pcii.store.dataset_layout import read_manifest
 from simgen.base.strict_models import Strict, read_toml, validate
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe

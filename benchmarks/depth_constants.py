@@ -13,12 +13,12 @@ import numpy as np
 
 from benchmarks.corpus import chosen_works, make
 from pcii.base.progress import Stages
-from pcii.core.estimates import DepthMap
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.evaluation.tables import Table, markdown
-from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.suggested_depths import depth_range_of
 from pcii.metrics.depth_accuracy import depth_errors
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.suggested_depths import depth_range_of
+from pcii.types.estimates import DepthMap
 
 CHOSEN = PosteriorDepth()
 FACTORS = (0.5, 2.0)

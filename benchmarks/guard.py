@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks.results import Record
 from pcii.base.errors import InputError
-from pcii.store.safe_files import write_json_safely
+from pcii.base.safe_files import write_json_safely
 
 REFERENCE = Path(__file__).with_name("reference_ratios.json")
 LOSS = 0.25

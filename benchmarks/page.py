@@ -9,8 +9,8 @@ from typing import Any
 from benchmarks.figures import draw
 from benchmarks.machine import was_busy
 from benchmarks.results import Record, Row, Study, Value, label
+from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.tables import Table, markdown
-from pcii.store.safe_files import write_bytes_safely
 
 PICTURES = "benchmarks"
 """Folder of the figures, beside the Markdown page."""

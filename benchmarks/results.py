@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import write_json_safely
 from pcii.evaluation.paired_tests import positive_mean_interval
-from pcii.store.safe_files import write_json_safely
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

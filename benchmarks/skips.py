@@ -15,14 +15,14 @@ import numpy as np
 
 from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from pcii.base.progress import silent
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import sense
-from pcii.core.section_stack import Sections
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import MANIFEST, TRUTH
 from pcii.sections import reconstruction
 from pcii.sections.reconstruction import extend, reconstruct
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import MANIFEST, TRUTH
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import sense
+from pcii.types.section_stack import Sections
 from simgen.dataset.generation import Reuse, generate, make
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.photons.candidates import Setup

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.core.bayer import mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
+from pcii.types.bayer import mosaic
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
 
 CONTRAST = 0.15
 """Standard deviation of the texture, about a mean of 0.5."""

@@ -14,9 +14,9 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 
 import pcii
-from pcii.core.bayer import colour_index
 from pcii.figures.exposure import filled_means, smoothed, smoothing_for
 from pcii.figures.pictures import depth_image, to_srgb8, white_level
+from pcii.types.bayer import colour_index
 
 PART = np.s_[394:640, 300:720]
 """Ball and bird, in pixels of the virtual centre."""

@@ -3,8 +3,8 @@
 import shutil
 
 import simgen
-from pcii.io.sample_dataset import SAMPLE
-from pcii.io.verification import verify
+from pcii.store.sample_dataset import SAMPLE
+from pcii.store.verification import verify
 
 LARGEST_BYTES = 2_000_000
 

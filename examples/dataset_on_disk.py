@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pcii
 import simgen
-from pcii.io.verification import verify
+from pcii.store.verification import verify
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out/example")
 recipe = simgen.load_recipe("small", ["photons.nested=[1000]", "products.radiance=none"])

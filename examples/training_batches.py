@@ -13,8 +13,8 @@ import numpy as np
 
 import pcii
 import simgen
-from pcii.core.focal_planes import FocalPlanes
 from pcii.metrics.true_masks import TrueFocus
+from pcii.types.focal_planes import FocalPlanes
 
 
 def examples(

@@ -8,13 +8,6 @@ __version__ = "0.1.0"
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import srgb_to_linear
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap, DepthPosterior, Score, Segmented
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import limit_photons
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
 from pcii.depth.methods import depth_methods, depth_posterior, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.exchange.camera_fit import check_grid
@@ -23,15 +16,22 @@ from pcii.exchange.export_formats import export_dataset
 from pcii.exchange.hci_scenes import import_hci
 from pcii.exchange.image_folders import Optics, ViewOrder, import_images
 from pcii.exchange.lens_arrays import LensArray, import_lens_array
-from pcii.io.collection import Collection, open_collection
-from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.dataset_writer import save_dataset
-from pcii.io.sample_dataset import sample
 from pcii.metrics.scoring import score
 from pcii.removal.methods import removal_methods, segment
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.demosaicing import demosaic
 from pcii.sections.reconstruction import reconstruct, reconstruct_each
+from pcii.store.collection import Collection, open_collection
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset_writer import save_dataset
+from pcii.store.sample_dataset import sample
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap, DepthPosterior, Score, Segmented
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import limit_photons
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 __all__ = [
     "CameraGrid",

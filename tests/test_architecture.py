@@ -15,11 +15,10 @@ HEAVY = {"mitsuba", "drjit", "colour"}
 ROOMS = {
     "pcii": [
         "base",
-        "store",
         "imaging",
         "figures",
-        "core",
-        "io",
+        "types",
+        "store",
         "sections",
         "exchange",
         "evidence",
@@ -30,7 +29,6 @@ ROOMS = {
         "baselines",
         "metrics",
         "evaluation",
-        "benchmark",
         "app",
     ],
     "simgen": [
@@ -53,14 +51,14 @@ ROOMS = {
 # What simgen may share with pcii: store of files, image tools, types, masks, file formats and how commands
 # behave. Not its geometry or anything built on it, so that simulation and reconstruction cannot share a sign
 # mistake. Figures make pictures of plain arrays: they know no camera, and stand before the types.
-SHARED_ROOMS = {"base", "store", "imaging", "figures", "core", "io", "exchange"}
+SHARED_ROOMS = {"base", "store", "imaging", "figures", "types", "exchange"}
 NOT_SHARED = {
-    "pcii.core.estimates",
-    "pcii.core.focal_planes",
-    "pcii.core.geometry",
-    "pcii.core.section_stack",
+    "pcii.types.estimates",
+    "pcii.types.focal_planes",
+    "pcii.types.geometry",
+    "pcii.types.section_stack",
     "pcii.exchange.camera_fit",
-    "pcii.io.suggested_depths",
+    "pcii.store.suggested_depths",
 }
 MOST_FILES, FEWEST_FILES = 14, 2
 LONGEST_FILE = 450

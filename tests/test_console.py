@@ -16,7 +16,7 @@ from property_settings import mostly_slow
 
 from pcii.app import commands as pcii_cli
 from pcii.base import command_line
-from pcii.io.dataset_layout import MARKER
+from pcii.store.dataset_layout import MARKER
 from simgen.app import commands as simgen_cli
 
 

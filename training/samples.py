@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 
 import pcii
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import total_disparity_px
-from pcii.core.truth import Truth
+from pcii.base.safe_files import write_bytes_safely
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.evidence.texture_evidence import evidence_of_texture
-from pcii.io.dataset import Dataset
-from pcii.store.safe_files import write_bytes_safely
+from pcii.store.dataset import Dataset
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import total_disparity_px
+from pcii.types.truth import Truth
 
 MIN_PHOTONS = 30.0
 NEAR, FAR = (0.75, 0.95), (1.05, 1.4)

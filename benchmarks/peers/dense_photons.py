@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pcii.core.photon_limit import Light, photon_rates, scope_energies, sense
+from pcii.types.photon_limit import Light, photon_rates, scope_energies, sense
 from simgen.photons.candidates import Setup
 from simgen.renderer.radiance import render_view
 

@@ -14,7 +14,7 @@ from benchmarks.figures import curve, frame
 from benchmarks.results import Measured, Row, Size, Study
 from benchmarks.timing import median_of
 from pcii.base.executor import ALONE, Executor
-from pcii.io.collection import open_collection
+from pcii.store.collection import open_collection
 from simgen.dataset.dataset_collection import generate_collection
 from simgen.spec.sweeps import load_sweep
 

@@ -17,8 +17,8 @@ from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
 from benchmarks.textures import Texture
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from pcii.core.bayer import mosaic
 from pcii.sections.demosaicing import METHODS, demosaic
+from pcii.types.bayer import mosaic
 from simgen.renderer.radiance import render_view
 from simgen.spec.recipe import load_recipe
 from simgen.spectral.spectra import colour_science

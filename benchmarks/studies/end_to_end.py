@@ -30,7 +30,7 @@ ANALYSIS = """
 import json, sys
 from pathlib import Path
 from pcii.app.single_run import run
-from pcii.io.dataset import open_dataset
+from pcii.store.dataset import open_dataset
 print(json.dumps(run(open_dataset(Path(sys.argv[1])), Path(sys.argv[2]), None).timings_s))
 """
 """What `pcii run` does, but for the command line; it tells the seconds of its stages."""

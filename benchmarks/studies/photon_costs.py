@@ -18,7 +18,7 @@ from benchmarks.peers.dense_photons import drawn_counts, rendered_mosaic
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value, mean_of
 from benchmarks.scenes import film, setup_of
 from benchmarks.timing import median_of, ratio_of, side_by_side, timed
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
 from simgen.photons.candidates import Setup

@@ -17,10 +17,10 @@ from benchmarks.machine import has
 from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
 from benchmarks.results import Measured, Ratio, Row, Size, Study, Value
 from benchmarks.timing import median_of, ratio_of, side_by_side
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.reconstruction import reconstruct, reconstruct_each
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

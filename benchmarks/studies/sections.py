@@ -15,10 +15,10 @@ from benchmarks.peers.shifted_means import by_opencv, by_scipy, by_slices
 from benchmarks.results import Measured, Row, Size, Study, Value, mean_of
 from benchmarks.textures import CONTRAST, Texture, plane_views
 from benchmarks.timing import median_of, side_by_side
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

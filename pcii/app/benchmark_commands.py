@@ -9,7 +9,7 @@ from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from pcii.io.collection_layout import IN_FRAMES, Half
+from pcii.store.collection_layout import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
@@ -58,8 +58,8 @@ def run(
     budget
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
-    from pcii.benchmark.benchmark_collection import open_benchmark
-    from pcii.benchmark.submission_scores import run_method
+    from pcii.evaluation.benchmark_collection import open_benchmark
+    from pcii.evaluation.submission_scores import run_method
 
     with Stages() as report:
         result = run_method(
@@ -92,8 +92,8 @@ def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor
     out
         Folder for the scores: new, empty, or those of an earlier call.
     """
-    from pcii.benchmark.benchmark_collection import open_benchmark
-    from pcii.benchmark.submission_scores import score_submission
+    from pcii.evaluation.benchmark_collection import open_benchmark
+    from pcii.evaluation.submission_scores import score_submission
 
     with Stages() as report:
         result = score_submission(
@@ -117,7 +117,7 @@ def page(folder: Path, *, out: Out) -> None:
     out
         The page to write, in a folder that exists.
     """
-    from pcii.benchmark.benchmark_page import write_page
+    from pcii.evaluation.benchmark_page import write_page
 
     count = write_page(folder, out)
     say(f"{out}: {count} submission{'' if count == 1 else 's'}")

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import CoercionError, Parameter
 
-from pcii.core.arrays import MOST_DEPTHS
-from pcii.io.dataset import Dataset, budget_of, open_dataset
+from pcii.store.dataset import Dataset, budget_of, open_dataset
+from pcii.types.arrays import MOST_DEPTHS
 
 if TYPE_CHECKING:
     from cyclopts import Token

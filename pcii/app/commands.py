@@ -38,7 +38,7 @@ def sample(*, out: Out) -> None:
     out
         Folder for the dataset: new or empty.
     """
-    from pcii.io.sample_dataset import copy_sample
+    from pcii.store.sample_dataset import copy_sample
 
     copy_sample(out)
     say(f"{out}")
@@ -121,8 +121,8 @@ def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False
     """
     from pcii.app.pipeline import full_light_sections
     from pcii.base.errors import InputError
-    from pcii.core.focal_planes import FocalPlanes
     from pcii.metrics.scoring import score as compare
+    from pcii.types.focal_planes import FocalPlanes
 
     data = opened(dataset, budget)
     results = Results(out, data)
@@ -220,7 +220,7 @@ def verify(folder: Path, *, json: Json = False) -> None:
     json
         Print the number of files, or what is wrong, as JSON.
     """
-    from pcii.io.verification import verify_and_tell
+    from pcii.store.verification import verify_and_tell
 
     verify_and_tell(folder, as_json=json)
 

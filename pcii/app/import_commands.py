@@ -10,10 +10,6 @@ from pcii.app.command_options import Depths, Out
 from pcii.base.command_output import answer, results_folder, say, say_next
 from pcii.base.errors import InputError
 from pcii.base.progress import Stages
-from pcii.core.arrays import check_z_mm
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import Light, limit_photons
 from pcii.exchange.camera_fit import CameraFit, check_grid
 from pcii.exchange.image_folders import ViewOrder
 from pcii.exchange.import_requests import (
@@ -26,7 +22,11 @@ from pcii.exchange.import_requests import (
     read,
     values_of,
 )
-from pcii.io.dataset_writer import check_depth_range, held_dataset, save_dataset
+from pcii.store.dataset_writer import check_depth_range, held_dataset, save_dataset
+from pcii.types.arrays import check_z_mm
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import Light, limit_photons
 
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()

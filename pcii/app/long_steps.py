@@ -10,11 +10,11 @@ from threading import Lock
 from typing import Any, TypeVar
 
 from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Results, StepRecord, masks_name
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.core.section_stack import Sections
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.provenance import software_of
 from pcii.store.hashes import hash_json
+from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.section_stack import Sections
 
 DEPTH_STEP = "depth"
 Made = TypeVar("Made")

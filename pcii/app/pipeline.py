@@ -8,16 +8,16 @@ from typing import Any
 
 from pcii.app.long_steps import ALL_STEPS, DEPTH_STEP, Made, Steps, removal_step, timed
 from pcii.base.progress import Report, silent
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.focal_planes import FocalPlanes, check_depth_counts
-from pcii.core.images import ArrayLike5D, Views
-from pcii.core.section_stack import Sections
 from pcii.depth.methods import DEFAULT_METHOD, estimate_depth, find_depth_method
-from pcii.io.dataset import Dataset
-from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.scoring import score
 from pcii.removal.methods import DEFAULT_METHODS, find_method
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import Dataset
+from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.focal_planes import FocalPlanes, check_depth_counts
+from pcii.types.images import ArrayLike5D, Views
+from pcii.types.section_stack import Sections
 
 FULL_LIGHT_STEP = "sections at full light"
 

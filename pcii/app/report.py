@@ -15,8 +15,8 @@ from pcii.app.report_origin import origin
 from pcii.app.report_slider import slider
 from pcii.app.report_tables import depth_table, key_facts, score_table, table1
 from pcii.base.progress import Report, silent
+from pcii.base.safe_files import write_bytes_safely
 from pcii.evaluation.pages import page
-from pcii.store.safe_files import write_bytes_safely
 
 PAPER_SCENE, PAPER_PLANES_MM = "two_objects", [540.0, 620.0]
 PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))

@@ -10,10 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from pcii.app.pipeline import Outcome
-from pcii.core.camera_grid import CameraGrid, middle_camera
-from pcii.core.estimates import Segmented
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import (
     encoded,
@@ -26,6 +22,10 @@ from pcii.figures.exposure import (
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.demosaicing import demosaic
+from pcii.types.camera_grid import CameraGrid, middle_camera
+from pcii.types.estimates import Segmented
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 LONGEST_PX = 640
 """Longer sides of pictures are shown at one of 2 x 2 pixels, or of more."""

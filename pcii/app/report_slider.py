@@ -14,16 +14,16 @@ import numpy as np
 from pcii.app.pipeline import Outcome
 from pcii.app.report_figures import Crop, Shown, block_estimate, smoothing_words
 from pcii.base.progress import Report
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import total_disparity_px
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.figures import pictures as picture
 from pcii.figures.exposure import encoded
 from pcii.imaging.blocks import evenly_chosen
 from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import total_disparity_px
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 MOST_PLANES = 20
 """Planes of the slider beside those of the analysis: a report of 1024 x 1024 pixels is then below 8 MB."""

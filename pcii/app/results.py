@@ -25,15 +25,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.section_stack import Sections
-from pcii.io.dataset import Dataset
-from pcii.io.results_list import FINISH, LOCK, RESULTS, RESULTS_FOLDER, read_results
-from pcii.io.zarr_groups import read_array, write_arrays
-from pcii.sections.reconstruction import reconstruct
-from pcii.store.file_list import list_files, lists_part
-from pcii.store.safe_files import (
+from pcii.base.safe_files import (
     locked,
     named_in_errors,
     replace_folder,
@@ -42,6 +34,14 @@ from pcii.store.safe_files import (
     temporary_folder,
     write_json_safely,
 )
+from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import Dataset
+from pcii.store.file_list import list_files, lists_part
+from pcii.store.results_list import FINISH, LOCK, RESULTS, RESULTS_FOLDER, read_results
+from pcii.store.zarr_groups import read_array, write_arrays
+from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
+from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.section_stack import Sections
 
 REMEDY = "make it again"
 DEPTH = "depth.zarr"

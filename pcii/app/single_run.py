@@ -10,7 +10,7 @@ from pcii.app.results import REPORT, Results
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.depth.methods import DEFAULT_METHOD
-from pcii.io.dataset import Dataset
+from pcii.store.dataset import Dataset
 
 
 def run(

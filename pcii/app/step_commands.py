@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from pcii.app.command_options import Budget, Depths, Out, budget_words, opened
 from pcii.app.results import Results
 from pcii.base.command_output import say, say_next
-from pcii.io.dataset import Dataset
+from pcii.store.dataset import Dataset
 
 Steps = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(name="--without")]
 
@@ -45,9 +45,9 @@ def reconstruct(
         `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
     from pcii.figures.pictures import to_srgb8, white_level, write_png
-    from pcii.io.suggested_depths import planes_of
     from pcii.sections.demosaicing import demosaic
     from pcii.sections.reconstruction import reconstruct as make
+    from pcii.store.suggested_depths import planes_of
 
     data = opened(dataset, budget)
     sections = make(data.counts_or_views, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
@@ -92,7 +92,7 @@ def depth(
     """
     from pcii.depth.methods import estimate_depth
     from pcii.figures.pictures import depth_image, write_png
-    from pcii.io.suggested_depths import depth_range_of
+    from pcii.store.suggested_depths import depth_range_of
 
     data = opened(dataset, budget)
     z_range = depth_range_of(data, z_mm)
@@ -141,10 +141,10 @@ def segment(
     """
     from pcii.base.errors import InputError
     from pcii.figures.pictures import mask_image, write_png
-    from pcii.io.suggested_depths import planes_of
     from pcii.removal.methods import find_method
     from pcii.removal.methods import segment as remove
     from pcii.removal.three_step.three_step_method import ThreeStep
+    from pcii.store.suggested_depths import planes_of
 
     if method != "three-step" and (without or subpixel != 1):
         option = "--without" if without else "--subpixel"

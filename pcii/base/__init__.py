@@ -8,14 +8,15 @@ dask_cluster      A job's pieces as tasks of a Dask cluster, all of whose worker
                   system.
 errors            The exception that is raised for invalid input.
 executor          Who does a job: this process, several of this machine, or a Dask cluster.
-extensions        Methods by name: built-in ones and entry points of installed packages; calls of functions
-                  of theirs.
+extensions        Methods by name: built-in ones and entry points of installed packages; calls of
+                  functions of theirs.
 jobs              Jobs of many pieces.
 plain_text        Display of text from untrusted files: markup is escaped, invisible characters are made
                   visible.
 progress          Progress of long work, compilation included: bars on a terminal, plain lines in a log.
-short_form        Short representations of objects that hold large arrays: one line; in notebooks a table and
-                  pictures.
+safe_files        Atomic writing of files and folders: whatever has its final name is complete.
+short_form        Short representations of objects that hold large arrays: one line; in notebooks a table
+                  and pictures.
 srgb              sRGB (IEC 61966-2-1): encoding for screens, decoding of pictures to linear values,
                   luminance.
 worker_processes  Worker processes of this machine that share a job's pieces; one that dies harms no other

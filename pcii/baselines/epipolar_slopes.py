@@ -7,11 +7,11 @@ half a pixel apart (Diebold and Goldluecke 2013), and the plane with the cleares
 
 import numpy as np
 
-from pcii.core.estimates import DepthMap
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px
-from pcii.core.images import Views, binary_scale
 from pcii.sections.demosaicing import demosaic
+from pcii.types.estimates import DepthMap
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px
+from pcii.types.images import Views, binary_scale
 
 INNER_SIGMA_PX, OUTER_SIGMA_PX = 0.8, 2.5
 """Standard deviations of the Gaussians before derivatives, and of the window of the tensor."""

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views, in_binary_unit
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.depth.depth_planes import peak_depth_mm
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.estimates import DepthMap
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views, in_binary_unit
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 STEP_PX = 1.0
 """Total disparity between neighbouring planes."""

@@ -7,15 +7,15 @@ of the photons in a window, whose noise does not depend on the brightness (see
 
 import numpy as np
 
-from pcii.core.estimates import Segmented
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import SMALLEST_REGION_PX, without_specks
 from pcii.imaging.bright_regions import brightness as root_photons
 from pcii.sections.photon_statistics import pooled_estimate, section_window_px, view_samples
 from pcii.sections.reconstruction import extend, view_coverage, with_probes
+from pcii.types.estimates import Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 NOISE = 0.5
 """Standard deviation of the square root of a Poisson count."""

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.arrays import check_z_mm
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
+from pcii.types.arrays import check_z_mm
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
 
 MOST_SPAN_PX = 2000.0
 """Largest change of total disparity between the ends of a range that is searched."""

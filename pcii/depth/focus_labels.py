@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from pcii.core.estimates import DepthMap
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import FocusEvidence, best_labels, focus_evidence, windowed
 from pcii.evidence.half_agreement import halves_of
 from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.imaging.blocks import on_pixels
+from pcii.types.estimates import DepthMap
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 PLANE_STEP_PX = 2.0
 """Total disparity between neighbouring planes: a blur half-extent of 1 px."""

@@ -15,14 +15,14 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import MethodRegistry, called
-from pcii.core.estimates import DepthMap, DepthPosterior
-from pcii.core.focal_planes import check_data
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import check_range_mm
 from pcii.depth.focus_labels import focus_depth
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.sections.photon_statistics import warn_of_saturation
+from pcii.types.estimates import DepthMap, DepthPosterior
+from pcii.types.focal_planes import check_data
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 GROUP = "pcii.depth_methods"
 Method = Callable[..., DepthMap]

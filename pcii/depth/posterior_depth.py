@@ -10,11 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pcii.core.estimates import DepthMap, DepthPosterior
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import depth_of_total_disparity_mm
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.depth_planes import neighbours_of, peak_depth_mm
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.smooth_surface import SurfacePrior, surface_posterior
@@ -25,6 +20,11 @@ from pcii.evidence.hot_pixels import without_hot_pixels
 from pcii.evidence.texture_evidence import CELL_BLOCKS, TextureEvidence, TextureModel, evidence_of_texture
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import box_around
+from pcii.types.estimates import DepthMap, DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 MOST_VALUES = 1 << 25
 """Blocks times planes, which decides on the memory: some 2 GB. Where there are more, blocks are larger."""

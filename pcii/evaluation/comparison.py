@@ -12,10 +12,7 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
+from pcii.base.safe_files import named_in_errors
 from pcii.depth.methods import estimate_depth
 from pcii.evaluation.evaluation_pages import write_evaluation
 from pcii.evaluation.method_names import Function, Method, estimator_of, named_functions
@@ -34,16 +31,19 @@ from pcii.evaluation.rows import (
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tasks import Task, tasks_of
 from pcii.evaluation.timing import timed
-from pcii.io.collection_layout import is_collection, read_index
-from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.dataset_layout import MANIFEST, MARKER
-from pcii.io.suggested_depths import depth_range_of, planes_of
 from pcii.metrics.bounds import object_bounds
 from pcii.metrics.scoring import score
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import reconstruct
-from pcii.store.safe_files import named_in_errors
+from pcii.store.collection_layout import is_collection, read_index
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset_layout import MANIFEST, MARKER
 from pcii.store.software import differences
+from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 
 def evaluate(

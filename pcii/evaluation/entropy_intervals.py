@@ -7,9 +7,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
 from pcii.evaluation.paired_tests import mean_interval
 from pcii.imaging.bright_regions import box_around
 from pcii.metrics.scoring import entropy_region
@@ -20,6 +17,9 @@ from pcii.sections.photon_statistics import (
     section_window_px,
 )
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 GROUPS = 10
 """Intervals of so few pseudo-values are 15 % longer than those of many, and take a fraction of the time."""

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.plain_text import in_markdown
+from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots, calibration_plots
 from pcii.evaluation.pooling import pooled_tables
@@ -16,9 +17,8 @@ from pcii.evaluation.tables import (
     tables_of,
     with_interval,
 )
-from pcii.io.evaluation_layout import ROWS, seal_evaluation
+from pcii.store.evaluation_layout import ROWS, seal_evaluation
 from pcii.store.hashes import hash_file
-from pcii.store.safe_files import sweep_temporaries, write_bytes_safely
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any], others: Sequence[str] = ()) -> None:

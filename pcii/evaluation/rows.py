@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
-from pcii.io.dataset import FULL_LIGHT, Budget, Dataset
-from pcii.io.evaluation_layout import EVALUATION_FOLDER, ROWS
+from pcii.base.safe_files import locked, named_in_errors
+from pcii.store.dataset import FULL_LIGHT, Budget, Dataset
+from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
 from pcii.store.hashes import hash_json
-from pcii.store.safe_files import locked, named_in_errors
 from pcii.store.sealed_json import check_seal, sealed
 
 Row = dict[str, Any]

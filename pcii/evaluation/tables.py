@@ -6,7 +6,7 @@ from typing import Any
 
 from pcii.base.plain_text import in_markdown
 from pcii.evaluation.rows import by_light
-from pcii.io.dataset import FULL_LIGHT, Budget
+from pcii.store.dataset import FULL_LIGHT, Budget
 
 Entry = Mapping[str, Any]
 Column = tuple[str, Callable[[Any], str]]

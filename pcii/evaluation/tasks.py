@@ -7,9 +7,9 @@ from pcii.base.errors import InputError
 from pcii.depth.depth_planes import check_range_mm
 from pcii.evaluation.method_names import Function, estimator_of, full_name, methods_for
 from pcii.evaluation.rows import Key, identity_of
-from pcii.io.dataset import FULL_LIGHT, Budget, Dataset, budget_of
-from pcii.io.dataset_layout import RADIANCE, TRUTH
-from pcii.io.suggested_depths import depth_range_of, planes_of
+from pcii.store.dataset import FULL_LIGHT, Budget, Dataset, budget_of
+from pcii.store.dataset_layout import RADIANCE, TRUTH
+from pcii.store.suggested_depths import depth_range_of, planes_of
 
 
 @dataclass(frozen=True)

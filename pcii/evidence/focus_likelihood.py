@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.bayer import sites_of_colours
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
+from pcii.types.bayer import sites_of_colours
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 WINDOW_CELLS = 2.0
 WIDER_CELLS = (4.0, 8.0, 16.0)

@@ -27,13 +27,13 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.weighted_sums import camera_sums, whole_shifts_px
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.bright_regions import box_around
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 FALSE_RATE = 1e-3
 """Largest share of pure noise in which the halves may seem to agree."""

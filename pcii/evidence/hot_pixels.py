@@ -6,7 +6,7 @@ like a point at infinity. A point of the scene is at another pixel in each view.
 
 import numpy as np
 
-from pcii.core.photon_counts import PhotonCounts
+from pcii.types.photon_counts import PhotonCounts
 
 RATIO, EXCESS = 2.0, 5.0
 """A hot pixel has more than twice the photons of its brightest neighbour plus 5, in most views. By Poisson

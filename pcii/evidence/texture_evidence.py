@@ -31,11 +31,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views, binary_scale
-from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.blocks import block_sums, sum_of
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views, binary_scale
+from pcii.types.photon_counts import PhotonCounts
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px, shifts_to_centre_px
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import BLOCK_PX
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px, shifts_to_centre_px
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 
 def whole_shifts_px(grid: CameraGrid, total_disparity_px: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,13 +14,13 @@ from functools import cache
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import depth_of_total_disparity_mm, parallax_px, total_disparity_px
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.exchange.image_folders import AS_STORED, ViewOrder
 from pcii.imaging.blocks import block_sums, evenly_chosen
-from pcii.io.dataset_writer import check_depth_range
+from pcii.store.dataset_writer import check_depth_range
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.geometry import depth_of_total_disparity_mm, parallax_px, total_disparity_px
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 MOST_CAMERAS = 5
 """Largest number of camera rows, and of columns, that are used: first, last, and equally spread between."""

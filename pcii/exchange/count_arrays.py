@@ -13,9 +13,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.core.arrays import LARGEST_COUNT, whole_counts
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.exchange.image_folders import (
     AS_STORED,
     Optics,
@@ -31,6 +28,9 @@ from pcii.exchange.image_folders import (
 )
 from pcii.exchange.photon_cubes import FrameStack, binary_counts, frames_of_files, map_array, span_of_frames
 from pcii.exchange.pixel_files import LARGEST_BYTES, Encoding, Picture, check_encoding, decode, to_radiance
+from pcii.types.arrays import LARGEST_COUNT, whole_counts
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 NUMPY = ".npy"
 HIGH_BITS = (16, 32, 64, 128)

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.plain_text import in_json, in_markdown, web_address
-from pcii.io.collection_layout import COLLECTION, is_collection, read_collection, read_index
-from pcii.io.dataset_layout import CARD, MANIFEST, read_manifest
-from pcii.store.safe_files import locked, temporaries_of, write_bytes_safely
+from pcii.base.safe_files import locked, temporaries_of, write_bytes_safely
+from pcii.store.collection_layout import COLLECTION, is_collection, read_collection, read_index
+from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 
 PROJECT = "photon-integral-imaging"
 LICENCE = "BSD-3-Clause"

@@ -20,8 +20,7 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.photon_events import FrameEvents
-from pcii.core.truth import OPTIONAL_MAPS, Truth
+from pcii.base.safe_files import json_bytes, named_in_errors, new_folder_safely
 from pcii.exchange.export_hci import write_hci
 from pcii.exchange.export_pictures import (
     TRANSFORMS,
@@ -31,11 +30,12 @@ from pcii.exchange.export_pictures import (
     view_name,
     write_nerfstudio,
 )
-from pcii.io.collection import Collection, open_collection
-from pcii.io.collection_layout import is_collection
-from pcii.io.dataset import Dataset, open_dataset
+from pcii.store.collection import Collection, open_collection
+from pcii.store.collection_layout import is_collection
+from pcii.store.dataset import Dataset, open_dataset
 from pcii.store.folder_kind import check_free
-from pcii.store.safe_files import json_bytes, named_in_errors, new_folder_safely
+from pcii.types.photon_events import FrameEvents
+from pcii.types.truth import OPTIONAL_MAPS, Truth
 
 Format = Literal["hci", "nerfstudio", "photoncube", "events"]
 ARCHIVE = "events.npz"

@@ -23,7 +23,7 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.exchange.export_pictures import pictures_of, write_pfm, write_png
-from pcii.io.dataset import Dataset
+from pcii.store.dataset import Dataset
 
 PARAMETERS = "parameters.cfg"
 README = "README.txt"

@@ -15,11 +15,11 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.core.images import Views
-from pcii.core.truth import Truth
 from pcii.exchange.image_folders import Optics, Tell, import_images, listed_names, warn
 from pcii.exchange.pixel_files import Encoding, decode, picture_of
 from pcii.store.sealed_json import read_small
+from pcii.types.images import Views
+from pcii.types.truth import Truth
 
 PARAMETERS = "parameters.cfg"
 PATTERN = "input_Cam{index:03d}.png"

@@ -15,9 +15,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.core.bayer import mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
 from pcii.exchange.pixel_files import (
     LARGEST_BYTES,
     Encoding,
@@ -28,6 +25,9 @@ from pcii.exchange.pixel_files import (
     picture_of,
     radiance_of,
 )
+from pcii.types.bayer import mosaic
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
 
 VIEWS = ("PNG", "JPEG", "TIFF", "EXR")
 """Kinds of pictures of views."""

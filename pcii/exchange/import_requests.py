@@ -14,9 +14,6 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
 from pcii.exchange.count_arrays import import_arrays, import_counts
 from pcii.exchange.hci_scenes import PARAMETERS, import_hci
 from pcii.exchange.image_folders import Optics, Tell, ViewOrder, import_images, is_picture
@@ -25,6 +22,9 @@ from pcii.exchange.photon_cubes import import_packed_frames
 from pcii.exchange.pixel_files import Encoding, check_encoding
 from pcii.exchange.posed_views import import_cubes, import_posed_pictures
 from pcii.exchange.transforms_file import read_transforms, transforms_in
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 WholePair = tuple[int, int] | None
 Pair = tuple[float, float] | None

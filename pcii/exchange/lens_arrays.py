@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.images import Views
 from pcii.exchange.image_folders import AS_STORED, VIEWS, Optics, ViewOrder, check_size, views_of
 from pcii.exchange.pixel_files import Encoding, check_encoding, decode, picture_of, radiance_of
+from pcii.types.images import Views
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,8 +14,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.plain_text import visible
 from pcii.base.progress import Report, silent
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
 from pcii.exchange.image_folders import (
     AS_STORED,
     Optics,
@@ -25,6 +23,8 @@ from pcii.exchange.image_folders import (
     files_by_camera,
     warn,
 )
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_counts import PhotonCounts
 
 PIECE_BYTES = 1 << 23
 """Bytes of frames that are read at once."""

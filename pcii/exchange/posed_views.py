@@ -13,10 +13,6 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
 from pcii.exchange.export_pictures import DEPTH_UNIT_M, MM_PER_M
 from pcii.exchange.image_folders import Tell, check_size, headers_of, views_of, warn
 from pcii.exchange.photon_cubes import (
@@ -28,6 +24,10 @@ from pcii.exchange.photon_cubes import (
 )
 from pcii.exchange.pixel_files import Encoding, check_encoding, decode, kind_of, picture_of, radiance_of
 from pcii.exchange.transforms_file import MOST_PX, TransformsFile
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 MOST_CAMERAS = 1000
 """All pairs of rows, and of columns, are compared: half a million of a single row."""

@@ -142,6 +142,6 @@ def photo_uri(image: np.ndarray) -> str:
 
 def write_png(path: Path, image: np.ndarray) -> None:
     """Write an 8-bit RGB image (H, W, 3)."""
-    from pcii.store.safe_files import write_bytes_safely
+    from pcii.base.safe_files import write_bytes_safely
 
     write_bytes_safely(path, png_bytes(image))

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import Segmented
-from pcii.core.geometry import blur_half_extent_px, parallax_px, total_disparity_px
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
 from pcii.metrics.true_masks import FOCUS_TOLERANCE_PX, KINDS, Kind, TrueFocus, intersection_over_union
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import Segmented
+from pcii.types.geometry import blur_half_extent_px, parallax_px, total_disparity_px
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 TEXTURE_SIGMA_PX = 0.5
 """Standard deviation by which rates are smoothed before their gradient is taken: enough to fill voxels
@@ -61,7 +61,7 @@ def depth_bound_px(grid: CameraGrid, photons: float, gradient_squared: tuple[flo
     texture of which all views together have N = `photons`; `gradient_squared` is (<g_x^2>, <g_y^2>), means
     over the photons. None without information on depth: no photons, no texture or a single camera.
 
-    >>> from pcii.core.camera_grid import CameraGrid
+    >>> from pcii.types.camera_grid import CameraGrid
     >>> grid = CameraGrid(
     ...     rows=10, cols=10, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=9, width=9
     ... )

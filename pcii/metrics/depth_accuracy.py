@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap
-from pcii.core.geometry import parallax_px, total_disparity_px
-from pcii.core.truth import Truth
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap
+from pcii.types.geometry import parallax_px, total_disparity_px
+from pcii.types.truth import Truth
 
 MEASURES = (
     "mae_mm",

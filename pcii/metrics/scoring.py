@@ -7,11 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.geometry import blur_half_extent_px
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
 from pcii.imaging.mask_outlines import object_share
 from pcii.metrics.bounds import object_bounds, plane_bounds
 from pcii.metrics.depth_accuracy import depth_errors
@@ -22,6 +17,11 @@ from pcii.sections.photon_statistics import (
     region_entropy_bits,
     section_window_px,
 )
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.geometry import blur_half_extent_px
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 
 def score(

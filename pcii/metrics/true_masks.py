@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.estimates import Segmented
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import blur_half_extent_px
-from pcii.core.truth import PhotonTruth, Truth
 from pcii.imaging.mask_outlines import boundary_f
+from pcii.types.estimates import Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import blur_half_extent_px
+from pcii.types.truth import PhotonTruth, Truth
 
 FOCUS_TOLERANCE_PX = 1.0
 """A point is in focus where its blur half-extent is at most this."""

@@ -1,15 +1,15 @@
 """Removal methods by name: which points of each section are in focus."""
 
 from pcii.base.extensions import MethodRegistry
-from pcii.core.estimates import Segmented
-from pcii.core.focal_planes import check_depth_counts
-from pcii.core.photon_counts import PhotonCounts
 from pcii.removal import plugins
 from pcii.removal.likelihood.likelihood_method import remove_by_likelihood
 from pcii.removal.posterior_masks import PosteriorMasks
 from pcii.removal.three_step.three_step_method import ThreeStep
 from pcii.sections.photon_statistics import warn_of_saturation
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.estimates import Segmented
+from pcii.types.focal_planes import check_depth_counts
+from pcii.types.photon_counts import PhotonCounts
 
 
 def segment(counts: PhotonCounts, z_mm: object, *, method: str | plugins.Method = "likelihood") -> Segmented:

@@ -16,9 +16,9 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.extensions import called
-from pcii.core.estimates import Segmented
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
+from pcii.types.estimates import Segmented
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 GROUP = "pcii.methods"
 Method = Callable[[PhotonCounts, Sections], Segmented]

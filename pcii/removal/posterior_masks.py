@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pcii.core.estimates import DepthPosterior, Segmented
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import depth_of_total_disparity_mm
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.imaging.blocks import on_pixels
 from pcii.removal.likelihood.likelihood_method import FOCUS_PX
+from pcii.types.estimates import DepthPosterior, Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 
 @dataclass(frozen=True)

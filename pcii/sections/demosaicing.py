@@ -13,7 +13,7 @@ from importlib import import_module
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import check_cfa, colour_cells
+from pcii.types.bayer import check_cfa, colour_cells
 
 
 def demosaic(
@@ -26,7 +26,7 @@ def demosaic(
     Raises `InputError` for an unknown pattern or method, an image below 2 x 2, NaN or infinity, and values
     so large that those of neighbours cannot be added up.
 
-    >>> from pcii.core.bayer import mosaic
+    >>> from pcii.types.bayer import mosaic
     >>> image = demosaic(mosaic(np.full((4, 6, 3), [1.0, 2.0, 3.0]), "GRBG"), cfa="GRBG")
     >>> image.shape, image[1, 2].tolist()
     ((4, 6, 3), [1.0, 2.0, 3.0])

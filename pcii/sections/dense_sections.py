@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import colour_cells
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import ArrayLike5D, Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Shifts
+from pcii.types.bayer import colour_cells
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import ArrayLike5D, Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Shifts
 
 BATCH = 8
 """Views that are read from disk at a time; as many are added meanwhile."""

@@ -16,13 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.bayer import colour_index
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_events import NEGLIGIBLE_LOSS, Readout
-from pcii.core.section_stack import Sections
 from pcii.imaging.blocks import sum_of
+from pcii.types.bayer import colour_index
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_events import NEGLIGIBLE_LOSS, Readout
+from pcii.types.section_stack import Sections
 
 GREY_LEVELS = 256
 """Levels of the histogram of Eq. 9: the paper's images have 8 bits."""

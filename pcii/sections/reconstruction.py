@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.arrays import LARGEST_COUNT, is_whole
-from pcii.core.bayer import colour_cells
-from pcii.core.focal_planes import FocalPlanes, check_data, planes_at
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_events import PLAIN
-from pcii.core.section_stack import Sections, Shifts
 from pcii.sections.dense_sections import colours_apart, step_px, sum_counts, sum_fine, sum_views
+from pcii.types.arrays import LARGEST_COUNT, is_whole
+from pcii.types.bayer import colour_cells
+from pcii.types.focal_planes import FocalPlanes, check_data, planes_at
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_events import PLAIN
+from pcii.types.section_stack import Sections, Shifts
 
 DENSE_SHARE = 1 / 16
 """If a larger share of the pixels has photons, adding whole images takes less time than adding each photon.

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import json_bytes, write_bytes_safely
 from pcii.store.hashes import hash_bytes
-from pcii.store.safe_files import json_bytes, write_bytes_safely
 
 LARGEST_DOCUMENT_BYTES = 1 << 24
 """JSON takes up to 30 times its length in memory; a list of 100 000 files is shorter than this."""

@@ -9,7 +9,7 @@ from pcii.base import command_line
 from pcii.base.command_output import answer, answer_json, complain_of, results_folder, say, say_next
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from pcii.io.collection_layout import Half
+from pcii.store.collection_layout import Half
 from simgen.app.scene_commands import (
     Json,
     Out,
@@ -168,7 +168,7 @@ def make(
     scene
         Make this scene only; may be repeated.
     """
-    from pcii.io.benchmark_layout import CERTIFICATE
+    from pcii.store.benchmark_layout import CERTIFICATE
     from simgen.dataset.benchmark_making import certify, load_definition, make_benchmark
     from simgen.renderer import backend
 
@@ -263,7 +263,7 @@ def verify(dataset: Path, *, json: Json = False) -> None:
     dataset
         Folder of a dataset, of a collection, of results or of an evaluation.
     """
-    from pcii.io.verification import verify_and_tell
+    from pcii.store.verification import verify_and_tell
 
     verify_and_tell(dataset, as_json=json)
 

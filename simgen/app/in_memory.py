@@ -10,11 +10,11 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.photon_limit import sense
-from pcii.core.truth import PhotonTruth, Truth
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_limit import sense
+from pcii.types.truth import PhotonTruth, Truth
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import centre_camera
 from simgen.dataset.prepared import Prepared, prepare_scene

@@ -8,7 +8,7 @@ from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
 from pcii.exchange.dataset_card import write_card
-from pcii.io.collection import Collection, open_collection
+from pcii.store.collection import Collection, open_collection
 from simgen.app.pictures import Preview, check_picture_path, draw_preview
 from simgen.check.targets import load_target
 from simgen.dataset import dataset_collection as collections

@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import colours_and_samples
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
+from pcii.base.safe_files import write_bytes_safely
 from pcii.figures.exposure import block_px, exposed
 from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import to_srgb8, white_level
 from pcii.imaging.blocks import evenly_chosen
-from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.dataset_layout import COUNTS
-from pcii.store.safe_files import write_bytes_safely
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset_layout import COUNTS
+from pcii.types.bayer import colours_and_samples
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 from simgen.check.scene_probe import coarser
 from simgen.dataset.prepared import Prepared
 from simgen.renderer import backend

@@ -10,7 +10,7 @@ from pathlib import Path
 from string import Template
 
 from pcii.base.errors import InputError
-from pcii.store.safe_files import new_folder_safely, write_bytes_safely
+from pcii.base.safe_files import new_folder_safely, write_bytes_safely
 from simgen.base.strict_models import shorten
 from simgen.spec.recipe import recipe_file, recipe_names
 from simgen.spec.scene import NAME

@@ -13,7 +13,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
 from pcii.base.errors import InputError
-from pcii.store.safe_files import write_json_safely
+from pcii.base.safe_files import write_json_safely
 
 LONGEST_NAME = 200
 LARGEST_FILE_BYTES = 1 << 28

@@ -1,6 +1,6 @@
 """What a camera grid does to depth: disparities, whole-pixel shifts, and colours that meet.
 
-From first principles and without `pcii.core.geometry`, like the cameras: what is checked before a simulation
+From first principles and without `pcii.types.geometry`, like the cameras: what is checked before a simulation
 must not share a mistake with what reconstructs it. Notation: d disparity in px per camera step, (K, L)
 grid, (k, l) camera. A sample that camera row k sees in row i belongs to row
 i + floor((k - (K-1)/2) d + 1/2) of a section.
@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from pcii.core.bayer import channel_count, colour_cells
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.bayer import channel_count, colour_cells
+from pcii.types.camera_grid import CameraGrid
 
 MAX_PITCH_CHANGE = 0.25
 """Another pitch differs from the present one by at most this share."""

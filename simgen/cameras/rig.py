@@ -1,7 +1,7 @@
 """Where cameras really stand and which way their pixels look, from first principles.
 
-This is written without `pcii.core.geometry` on purpose: simulation and reconstruction must not be able to
-share a sign mistake. A test renders a dot and finds it where `pcii.core.geometry` says.
+This is written without `pcii.types.geometry` on purpose: simulation and reconstruction must not be able to
+share a sign mistake. A test renders a dot and finds it where `pcii.types.geometry` says.
 """
 
 import math
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
 from simgen.spec.recipe import Grid, Lens
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pcii.core.bayer import COLOURS
+from pcii.types.bayer import COLOURS
 from simgen.cameras.disparities import (
     apart_px,
     disparities_px,

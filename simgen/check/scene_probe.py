@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from pcii.core.bayer import channel_count, colour_cells
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_limit import sense
+from pcii.types.bayer import channel_count, colour_cells
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.disparities import apart_px
 from simgen.cameras.rig import corners, with_larger_pixels

@@ -11,7 +11,8 @@ from typing import Any
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
-from pcii.io.benchmark_layout import (
+from pcii.base.safe_files import write_json_safely
+from pcii.store.benchmark_layout import (
     CERTIFICATE,
     REFERENCE_METHOD,
     Content,
@@ -23,11 +24,10 @@ from pcii.io.benchmark_layout import (
     differing_scores,
     published_certificate,
 )
-from pcii.io.collection import open_collection
-from pcii.io.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
-from pcii.io.evaluation_layout import read_evaluation
+from pcii.store.collection import open_collection
+from pcii.store.collection_layout import BENCHMARK_FIELDS, IN_FRAMES, Half
+from pcii.store.evaluation_layout import read_evaluation
 from pcii.store.hashes import hash_json
-from pcii.store.safe_files import write_json_safely
 from simgen.base.file_lookup import find_all
 from simgen.base.strict_models import read_toml, suggestion, validate
 from simgen.dataset.dataset_collection import generate_collection

@@ -9,7 +9,8 @@ from typing import Any, Protocol
 from pcii.base.errors import InputError
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Report, silent
-from pcii.io.collection_layout import (
+from pcii.base.safe_files import locked, named_in_errors, temporaries_of
+from pcii.store.collection_layout import (
     COLLECTION,
     COLLECTION_FOLDER,
     INDEX,
@@ -21,8 +22,7 @@ from pcii.io.collection_layout import (
     read_index,
     write_index,
 )
-from pcii.io.dataset_layout import MANIFEST, MARKER, read_written_manifest
-from pcii.store.safe_files import locked, named_in_errors, temporaries_of
+from pcii.store.dataset_layout import MANIFEST, MARKER, read_written_manifest
 from simgen.dataset.dataset_folder import decisive_versions, find_finished, other_dataset, other_versions
 from simgen.dataset.generation import Reuse, make
 from simgen.dataset.prepared import prepare

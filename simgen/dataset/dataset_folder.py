@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from pcii.base.errors import BusyError, InputError
-from pcii.io.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
-from pcii.io.dataset_writer import check_held
+from pcii.base.safe_files import locked
 from pcii.store import software
-from pcii.store.safe_files import locked
+from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
+from pcii.store.dataset_writer import check_held
 from pcii.store.software import PACKAGE
 
 DECISIVE = (PACKAGE, "mitsuba")

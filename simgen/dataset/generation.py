@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pcii.base.progress import Report, silent
-from pcii.io.dataset_layout import (
+from pcii.base.safe_files import named_in_errors, new_folder_safely, sweep_temporaries
+from pcii.store.dataset_layout import (
     COUNTS,
     MANIFEST,
     PHOTON_TRUTH,
@@ -21,7 +22,6 @@ from pcii.io.dataset_layout import (
     write_manifest,
 )
 from pcii.store.file_list import list_files
-from pcii.store.safe_files import named_in_errors, new_folder_safely, sweep_temporaries
 from simgen.dataset.dataset_folder import claim, find_finished, read_whole, versions
 from simgen.dataset.prepared import Prepared, prepare
 from simgen.dataset.rendered_views import RENDERED, RenderedViews, background_paths_saved

@@ -10,10 +10,10 @@ from typing import Literal
 import numpy as np
 
 from pcii.base.progress import Report
-from pcii.core.bayer import channel_count, colour_index
-from pcii.core.photon_limit import sense
-from pcii.io.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
-from pcii.store.safe_files import write_json_safely
+from pcii.base.safe_files import write_json_safely
+from pcii.store.dataset_layout import RADIANCE, radiance_name, read_exr, write_exr_safely
+from pcii.types.bayer import channel_count, colour_index
+from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig
 from simgen.photons.counting_plan import Capture

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import new_folder_safely
 from pcii.exchange.export_pictures import write_png
-from pcii.store.safe_files import new_folder_safely
 from simgen.assets.asset_files import ply_bytes
 from simgen.assets.triangles import Triangles
 from simgen.base.strict_models import LARGEST_TOML_BYTES, shorten, toml_text, validate

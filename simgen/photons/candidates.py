@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import channel_count, colour_cells
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.bayer import channel_count, colour_cells
+from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import Cameras, Rig, as_rig
 from simgen.photons.disparity_layers import Samples
 from simgen.photons.majorant import Majorant

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_limit import sense
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_limit import sense
 from simgen.base import random_streams as seeds
 from simgen.cameras.rig import Rig, corners, with_larger_pixels
 from simgen.photons.candidates import Setup

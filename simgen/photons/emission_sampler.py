@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pcii.base.srgb import LUMINANCE
-from pcii.core.bayer import colour_cells
+from pcii.types.bayer import colour_cells
 from simgen.cameras.rig import Rig
 from simgen.photons.candidates import Accepted, Setup, is_on_film, nothing
 from simgen.photons.shining_pieces import pieces_in_view

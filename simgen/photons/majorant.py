@@ -19,7 +19,7 @@ from copy import deepcopy
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.photons.disparity_layers import DisparityLayers, Samples, squares_around
 from simgen.truth.first_hits import over_squares
 

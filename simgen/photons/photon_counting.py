@@ -10,10 +10,10 @@ import numpy as np
 
 from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
-from pcii.core.photon_limit import Light, photon_rates, scope_energies
-from pcii.io.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
-from pcii.io.dataset_writer import write_counts as save_counts
-from pcii.io.dataset_writer import write_photon_truth
+from pcii.store.dataset_layout import COUNTS, PHOTON_TRUTH, nested_name
+from pcii.store.dataset_writer import write_counts as save_counts
+from pcii.store.dataset_writer import write_photon_truth
+from pcii.types.photon_limit import Light, photon_rates, scope_energies
 from simgen.base import random_streams as seeds
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, Plan

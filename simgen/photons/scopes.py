@@ -9,8 +9,8 @@ from functools import cached_property
 
 import numpy as np
 
-from pcii.core.bayer import channel_count, colour_cells
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.bayer import channel_count, colour_cells
+from pcii.types.camera_grid import CameraGrid
 from simgen.base import random_streams as seeds
 from simgen.sensor.photon_table import PhotonTable
 from simgen.spec.recipe import Photons

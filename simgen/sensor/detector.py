@@ -19,9 +19,9 @@ from pathlib import Path
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import colour_index, mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
+from pcii.types.bayer import colour_index, mosaic
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_counts import PhotonCounts
 from simgen.base import random_streams as seeds
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable, joined
 from simgen.spec.recipe import Exposure, Photons, Sensor

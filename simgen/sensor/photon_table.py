@@ -5,9 +5,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pcii.core.arrays import read_only
-from pcii.core.bayer import colour_cells
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.arrays import read_only
+from pcii.types.bayer import colour_cells
+from pcii.types.camera_grid import CameraGrid
 
 NO_OBJECT = -1
 """Object id of a count that no photon made."""

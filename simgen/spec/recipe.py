@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, NamedTuple, Self, get_args
 from pydantic import BeforeValidator, Field, model_validator
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from pcii.exchange.dataset_card import Terms
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_events import MOST_BITS, MOST_FRAMES, Readout
 from simgen.base.file_lookup import find, find_all
 from simgen.base.strict_models import (
     LARGEST_MM,

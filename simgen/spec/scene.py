@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 from pydantic import Field, PrivateAttr, field_validator, model_serializer, model_validator
 
 from pcii.base.errors import InputError
+from pcii.base.safe_files import add_files_safely
 from pcii.store.folder_kind import entries
-from pcii.store.safe_files import add_files_safely
 from simgen.base.file_lookup import AssetName, asset, named_files
 from simgen.base.strict_models import (
     LARGEST_MM,

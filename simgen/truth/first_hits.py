@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from pcii.base.progress import Report, silent
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera, Cameras, Rig, as_rig, centre_camera
 from simgen.renderer.intersection import blocked, first_objects
 from simgen.renderer.mitsuba_scene import RenderScene

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from pcii.base.progress import Report
-from pcii.core.array_labels import TRUTH_LABELS
-from pcii.io.dataset_layout import TRUTH
-from pcii.io.zarr_groups import new_array, new_group_safely
+from pcii.store.dataset_layout import TRUTH
+from pcii.store.zarr_groups import new_array, new_group_safely
+from pcii.types.array_labels import TRUTH_LABELS
 from simgen.cameras.rig import Rig, centre_camera
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.spec.recipe import Products, ViewPass

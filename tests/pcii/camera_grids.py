@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 
 grids = st.builds(
     CameraGrid,

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from twins import bayer_photons, blocky_texture, patch_views, square_mask, unit_grid
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_counts import PhotonCounts
 
 if TYPE_CHECKING:
     from report_outcomes import Written

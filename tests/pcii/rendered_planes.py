@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.array_labels import TRUTH_LABELS
-from pcii.core.bayer import mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.io.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
-from pcii.io.zarr_groups import write_arrays_safely
+from pcii.store.dataset_layout import RADIANCE, TRUTH, radiance_name, write_exr_safely, write_manifest
 from pcii.store.file_list import list_files
+from pcii.store.zarr_groups import write_arrays_safely
+from pcii.types.array_labels import TRUTH_LABELS
+from pcii.types.bayer import mosaic
+from pcii.types.camera_grid import CameraGrid
 
 ABOVE_MM, BELOW_MM = 500.0, 800.0
 

@@ -9,8 +9,7 @@ import pytest
 from twins import unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
-from pcii.io.dataset_layout import (
+from pcii.store.dataset_layout import (
     COUNTS,
     FRAME,
     PHOTON_TRUTH,
@@ -20,8 +19,9 @@ from pcii.io.dataset_layout import (
     write_exr_safely,
     write_manifest,
 )
-from pcii.io.zarr_groups import write_arrays_safely
 from pcii.store.file_list import list_files
+from pcii.store.zarr_groups import write_arrays_safely
+from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
 
 GRID = unit_grid(2, 3, 4, 5)
 Z_MM = np.where(np.arange(20).reshape(4, 5) % 3, 540.0, np.inf)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.core.bayer import PATTERNS
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.bayer import PATTERNS
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 pytestmark = pytest.mark.parametrize("number", [400, pytest.param(10_000, marks=pytest.mark.slow)])
 

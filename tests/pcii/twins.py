@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_counts import PhotonCounts
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_counts import PhotonCounts
 
 
 def unit_grid(

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pcii.core.bayer import colour_index, mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.io.dataset_layout import write_exr_safely
+from pcii.store.dataset_layout import write_exr_safely
+from pcii.types.bayer import colour_index, mosaic
+from pcii.types.camera_grid import CameraGrid
 from simgen.photons.candidates import Setup
 from simgen.photons.thinning import thin_photons
 from simgen.renderer import backend

@@ -10,7 +10,7 @@ from png_files import chunk
 
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.io.dataset_layout import write_exr_safely
+from pcii.store.dataset_layout import write_exr_safely
 from simgen.app import commands
 from simgen.assets.asset_files import read_assets, read_environment
 from simgen.spec.scene_lookup import load_scene

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from property_settings import mostly_slow
 
-from pcii.io.dataset import open_dataset
+from pcii.store.dataset import open_dataset
 from simgen.base import random_streams as seeds
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lit_views import made
 
-from pcii.io.dataset import open_dataset
+from pcii.store.dataset import open_dataset
 from simgen.base import random_streams as seeds
 from simgen.dataset.generation import generate
 from simgen.photons.candidates import Setup

@@ -9,12 +9,12 @@ import pytest
 from PIL import Image
 
 from pcii.base import command_line
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_writer import save_dataset
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_writer import save_dataset
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 from simgen.app import commands as cli
 from simgen.app.pictures import draw_sheet, part_of_interest, photon_tiles
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from lit_scenes import LAMP, ball
 
-from pcii.core.bayer import colour_index, mosaic
+from pcii.types.bayer import colour_index, mosaic
 from simgen.dataset.prepared import capture_of
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build

@@ -9,11 +9,11 @@ import pytest
 from plain_scenes import built, card, grid, sphere
 
 import simgen
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import project_px
-from pcii.core.truth import Truth
 from pcii.metrics.true_masks import TrueFocus
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import project_px
+from pcii.types.truth import Truth
 from simgen.cameras.rig import as_rig, centre_camera
 from simgen.renderer import backend, radiance
 from simgen.renderer.mitsuba_scene import build

@@ -17,8 +17,8 @@ from rational_sections import variance_of
 from twins import unit_grid
 
 import pcii
-from pcii.core.focal_planes import FocalPlanes
 from pcii.sections.photon_statistics import view_samples
+from pcii.types.focal_planes import FocalPlanes
 
 FAR_MM = 1e9
 

@@ -8,8 +8,8 @@ from rational_sections import samples_of, variance_of
 from twins import Reader, blocky_texture, patch_views, unit_grid
 
 import pcii
-from pcii.core.images import binary_scale
 from pcii.sections.photon_statistics import entropy_bits
+from pcii.types.images import binary_scale
 
 FAR_MM = 1e6  # no view shifts
 GRID = unit_grid(2, 2, 4, 4)

@@ -8,9 +8,9 @@ from rational_sections import samples_of, variance_of
 from twins import even_light, unit_grid
 
 import pcii
-from pcii.core.arrays import LARGEST_COUNT
-from pcii.core.focal_planes import FocalPlanes
 from pcii.sections.photon_statistics import view_samples
+from pcii.types.arrays import LARGEST_COUNT
+from pcii.types.focal_planes import FocalPlanes
 
 BUDGETS = [0, 1, 10**3, 10**6, 10**12]
 

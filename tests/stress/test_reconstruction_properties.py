@@ -14,17 +14,17 @@ from twins import unit_grid
 
 import pcii
 from pcii.base.srgb import linear_to_srgb
-from pcii.core.arrays import check_z_mm
-from pcii.core.bayer import PATTERNS
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import depth_of_total_disparity_mm, project_px, total_disparity_px
-from pcii.core.photon_limit import Light, photon_rates, scope_energies
 from pcii.evaluation.paired_tests import mean_interval, paired_difference
 from pcii.imaging.blocks import block_sums, on_pixels
 from pcii.imaging.mask_outlines import boundary_f, object_share
 from pcii.metrics.depth_accuracy import depth_errors
 from pcii.metrics.true_masks import mask_agreement
 from pcii.sections.photon_statistics import view_samples
+from pcii.types.arrays import check_z_mm
+from pcii.types.bayer import PATTERNS
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import depth_of_total_disparity_mm, project_px, total_disparity_px
+from pcii.types.photon_limit import Light, photon_rates, scope_energies
 
 SMALL = unit_grid(2, 3, 4, 5, (1.3, 0.8))
 DEPTHS = st.floats(0.3, 30)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from twins import unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core import geometry
-from pcii.core.bayer import PATTERNS, channel_count
-from pcii.core.camera_grid import CameraGrid
+from pcii.types import geometry
+from pcii.types.bayer import PATTERNS, channel_count
+from pcii.types.camera_grid import CameraGrid
 from simgen.base import random_streams
 from simgen.base.strict_models import validate
 from simgen.cameras import disparities

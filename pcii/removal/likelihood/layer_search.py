@@ -13,13 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX
 from pcii.imaging.bright_regions import box_around, dilated
 from pcii.removal.likelihood.layers import BESIDE_SHARE, Layers, background_bounds
 from pcii.removal.likelihood.proposals import AROUND_CELLS, Proposal, proposals_of
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 MOST_PHOTONS, MOST_PHOTONS_PER_PX = 150_000, 0.15
 """Of brighter films as many photons are drawn, or as many per px of a large one. A layer is flat and things

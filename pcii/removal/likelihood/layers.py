@@ -17,12 +17,12 @@ Notation: D layers from far to near, V views, (h, w) cells of 4 px, N events.
 
 import numpy as np
 
-from pcii.core.bayer import sites_of_colours
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.cells import CELL_PX, in_cells
 from pcii.evidence.focus_likelihood import cell_shape, dark_around, photon_weighted_mean
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
+from pcii.types.bayer import sites_of_colours
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 LENGTH_NATS, AREA_NATS = 0.3, 0.15
 HIDDEN_SHARE, MOSTLY_HIDDEN = 0.5, 0.25

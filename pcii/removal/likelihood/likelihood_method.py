@@ -24,11 +24,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import Segmented
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.focus_likelihood import (
     JUMP_NATS,
@@ -55,6 +50,11 @@ from pcii.removal.likelihood.regions import (
     where_planes_touch,
 )
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 SEARCH_STEP_PX = 2.0
 SEARCHED_PX = 30.0

@@ -15,9 +15,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pcii.base.errors import InputError
-from pcii.core.estimates import Segmented
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.imaging.bright_regions import (
     EDGE_SMOOTHING_PX,
     SMALLEST_REGION_PX,
@@ -33,6 +30,9 @@ from pcii.sections.photon_statistics import (
     section_window_px,
 )
 from pcii.sections.reconstruction import PROBE_STEPS_PX, extend, reconstruct, with_probes
+from pcii.types.estimates import Segmented
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 PROBE_STEP_PX = min(abs(step) for step in PROBE_STEPS_PX)
 LARGEST_BLUR_PX = max(abs(step) for step in PROBE_STEPS_PX) / 2

@@ -5,9 +5,6 @@ The paper gives no T; here it is derived from the Poisson law. docs/theory.md ha
 
 import numpy as np
 
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
 from pcii.imaging.blocks import on_pixels
 from pcii.imaging.bright_regions import large_pieces, roberts_magnitude
 from pcii.sections.photon_statistics import (
@@ -16,6 +13,9 @@ from pcii.sections.photon_statistics import (
     truncated_poisson_variance,
     view_samples,
 )
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
 
 WINDOW_CELLS = 4
 PHOTONS_PER_SAMPLE = 10.0

@@ -11,11 +11,11 @@ import pcii
 from pcii.app import long_steps, pipeline, single_run
 from pcii.app.results import masks_name
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.io.dataset import Dataset
-from pcii.io.results_list import read_results
-from pcii.io.verification import verify
 from pcii.store import folder_kind
+from pcii.store.dataset import Dataset
+from pcii.store.results_list import read_results
+from pcii.store.verification import verify
+from pcii.types.estimates import DepthMap, Segmented
 
 METHODS = ("brightness", "variance")
 REMOVALS = tuple(long_steps.removal_step(method) for method in METHODS)

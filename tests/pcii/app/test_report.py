@@ -14,15 +14,15 @@ from pcii.app.pipeline import Outcome
 from pcii.app.report_figures import Crop, Shown, block_estimate, encoded
 from pcii.app.report_slider import MOST_PLANES, slider, slider_planes
 from pcii.base.progress import silent
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import total_disparity_px
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
-from pcii.core.truth import Truth
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import read_manifest, write_manifest
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import read_manifest, write_manifest
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import total_disparity_px
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
 
 
 def words_of(page: str) -> str:

@@ -12,12 +12,12 @@ from twins import unit_grid
 
 from pcii.app.results import LOCK, Results
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap, Score, Segmented
-from pcii.core.photon_counts import PhotonCounts
-from pcii.io.dataset import Dataset
-from pcii.io.results_list import RESULTS, read_results
-from pcii.io.verification import verify
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import Dataset
+from pcii.store.results_list import RESULTS, read_results
+from pcii.store.verification import verify
+from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.photon_counts import PhotonCounts
 
 GRID = unit_grid(2, 2, 6, 7)
 Z = np.array([0.5, 1.0])
@@ -142,7 +142,7 @@ import numpy as np
 sys.path[:0] = sys.argv[2:]
 from test_results import GRID, dataset_of
 from pcii.app.results import Results
-from pcii.core.estimates import DepthMap
+from pcii.types.estimates import DepthMap
 import zarr, zarr.codecs
 
 root = Path(sys.argv[1])

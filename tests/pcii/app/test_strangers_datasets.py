@@ -10,14 +10,14 @@ from pcii.app import single_run
 from pcii.app.commands import app
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_writer import save_dataset
-from pcii.io.verification import verify
 from pcii.removal.methods import segment
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_writer import save_dataset
+from pcii.store.verification import verify
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 GRID = CameraGrid(rows=2, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
 LIGHT = np.random.default_rng(0).random((*GRID.shape_KLHW, 3)).astype(np.float32)

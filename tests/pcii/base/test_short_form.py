@@ -14,14 +14,14 @@ from twins import unit_grid
 
 from pcii.base.plain_text import visible
 from pcii.base.short_form import listed
-from pcii.core.estimates import DepthMap, DepthPosterior
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
-from pcii.io.dataset import open_dataset
 from pcii.metrics.scoring import score
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import open_dataset
+from pcii.types.estimates import DepthMap, DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ import pytest
 from twins import even_light, intersection_over_union, unit_grid
 
 from pcii.baselines.simple_removals import sum_modified_laplacian
-from pcii.core.photon_counts import PhotonCounts
 from pcii.removal.methods import segment
+from pcii.types.photon_counts import PhotonCounts
 
 OFFSETS = np.arange(7) - 3
 

@@ -6,16 +6,16 @@ from property_settings import mostly_slow
 from twins import bayer_photons, blocky_texture, even_light, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap, DepthPosterior
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.methods import estimate_depth
 from pcii.depth.network_inputs import NetworkInputs
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import surface_posterior
 from pcii.depth.surface_network import network_posterior
 from pcii.evidence.texture_evidence import evidence_of_texture
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap, DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 RANGE_MM = (1 / 9, 1 / 1)
 

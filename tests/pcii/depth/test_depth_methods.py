@@ -6,10 +6,10 @@ import pytest
 from twins import even_light, unit_grid
 
 import pcii
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth.methods import GROUP, depth_methods, estimate_depth
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 RANGE_MM = (1 / 5.9, 1 / 3.1)
 TRUE_PX = 4.3

@@ -5,15 +5,15 @@ import pytest
 from twins import unit_grid
 
 from pcii.base.compiled_loops import threads, use_threads
-from pcii.core.estimates import DepthPosterior
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.depth import surface_network
 from pcii.depth.network_inputs import NetworkInputs, hint_of, inputs_of
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.depth.smooth_surface import SurfacePrior
 from pcii.depth.surface_network import network_posterior
 from pcii.evidence.texture_evidence import evidence_of_texture
+from pcii.types.estimates import DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 METHOD = PosteriorDepth()
 

@@ -18,17 +18,17 @@ from pcii.app import commands as cli
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
-from pcii.core.estimates import DepthMap
 from pcii.evaluation import evaluation_pages
 from pcii.evaluation.comparison import evaluate, find_datasets
 from pcii.evaluation.rows import all_rows, append_row, claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import overview
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
-from pcii.io.evaluation_layout import EVALUATION, ROWS
-from pcii.io.verification import verify
 from pcii.removal.methods import METHODS
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import MANIFEST, TRUTH, read_manifest, write_manifest
+from pcii.store.evaluation_layout import EVALUATION, ROWS
+from pcii.store.verification import verify
+from pcii.types.estimates import DepthMap
 
 HITS = {3: (6, 10), 4: (8, 10), 5: (7, 10)}  # of ten pixels, by seed: at the own budget and the nested one
 FAKES = ("by count", "two rows")

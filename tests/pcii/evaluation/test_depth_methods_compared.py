@@ -13,11 +13,6 @@ from pcii.app import commands as cli
 from pcii.app.results import Results
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
 from pcii.depth.methods import FOR_COUNTS, estimate_depth
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
@@ -25,11 +20,16 @@ from pcii.evaluation.rows import all_rows, claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.evaluation.tables import depth_overview, tables_of
 from pcii.evaluation.tasks import tasks_of
-from pcii.io.dataset import FULL_LIGHT, Dataset, open_dataset
-from pcii.io.dataset_writer import save_dataset
 from pcii.metrics.bounds import object_bounds
 from pcii.removal.methods import removal_methods
 from pcii.sections.reconstruction import reconstruct
+from pcii.store.dataset import FULL_LIGHT, Dataset, open_dataset
+from pcii.store.dataset_writer import save_dataset
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 GRID = CameraGrid(rows=2, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=40, width=48)
 COUNTS = PhotonCounts.from_dense(np.random.default_rng(1).poisson(0.5, GRID.shape_KLHW), GRID)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import Segmented
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import Truth
 from pcii.evaluation import entropy_intervals
 from pcii.evaluation.entropy_intervals import entropy_half_widths
 from pcii.metrics.scoring import score
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import Segmented
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import Truth
 
 GRID = CameraGrid(rows=3, cols=3, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.25, height=48, width=64)
 IDS = np.zeros((48, 64), np.int16)

@@ -18,7 +18,6 @@ from tiny_datasets import NESTED, OWN, two_rows, write_dataset
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.base.plain_text import in_markdown, visible
-from pcii.core.estimates import Segmented
 from pcii.evaluation import pages as pages_module
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.evaluation_pages import write_evaluation
@@ -26,9 +25,10 @@ from pcii.evaluation.pages import page
 from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.rows import claim_rows
 from pcii.evaluation.summary import summarise
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import read_manifest, write_manifest
 from pcii.removal.methods import METHODS
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import read_manifest, write_manifest
+from pcii.types.estimates import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
 ELEMENTS = {"html", "head", "meta", "title", "style", "body", "main", "h1", "h2", "h3", "p", "code", "span"}

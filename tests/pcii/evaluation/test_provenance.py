@@ -17,7 +17,7 @@ from pcii.evaluation.provenance import software_of
 from pcii.evaluation.rows import all_rows, append_row, claim_rows
 from pcii.store.software import differences, hash_of_source
 
-COMPUTES = ("base", "core", "imaging", "sections", "evidence", "depth", "removal", "metrics")
+COMPUTES = ("base", "types", "imaging", "sections", "evidence", "depth", "removal", "metrics")
 DRAWS_OR_TALKS = {"matplotlib", "xarray", "rich", "cyclopts", "distributed"}
 CODE = """
 from pcii import DepthMap, Segmented

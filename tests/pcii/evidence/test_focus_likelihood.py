@@ -9,9 +9,6 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import gammaln, xlogy
 from twins import bayer_photons, blocky_texture, colour_of, even_light, patch_views, unit_grid
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.focus_likelihood import (
     best_labels,
     cell_shape,
@@ -20,6 +17,9 @@ from pcii.evidence.focus_likelihood import (
     windowed,
 )
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 DISPARITIES = np.arange(1, 9)  # z = 1 / d mm on a unit grid
 WINDOW_CELLS, WIDER_CELLS = 2.0, (4.0, 8.0, 16.0)  # 8 px, and up to 64 px where there are no edges

@@ -5,11 +5,11 @@ import pytest
 from property_settings import mostly_slow
 from twins import bayer_photons, blocky_texture, even_light, patch_views, unit_grid
 
-from pcii.core.bayer import colour_cells
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.half_agreement import Halves, Products, halves_of, least_agreement
+from pcii.types.bayer import colour_cells
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 DISPARITIES_PX = (1, 2, 3, 4, 5, 6)
 SIDES_CELLS = (1, 2, 4, 8)  # blocks of 4, 8, 16 and 32 px, cells being of 4 px

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from twins import even_light, unit_grid
 
-from pcii.core.photon_counts import PhotonCounts
 from pcii.evidence.hot_pixels import without_hot_pixels
+from pcii.types.photon_counts import PhotonCounts
 
 PLACES = [(0, 0), (5, 1), (5, 9), (9, 11)]
 

@@ -4,11 +4,11 @@ import numpy as np
 from twins import even_light, unit_grid
 
 from pcii.base.compiled_loops import threads, use_threads
-from pcii.core.bayer import sites_of_colours
 from pcii.evidence.cells import CELL_PX
 from pcii.evidence.prediction_kernels import predict, predict_shared
 from pcii.evidence.prediction_types import PlacedEvents, PlaneView, Predicted
 from pcii.evidence.projection_kernels import cells_of_events
+from pcii.types.bayer import sites_of_colours
 
 
 def test_a_flat_film_is_as_bright_where_half_of_the_views_are_hidden():

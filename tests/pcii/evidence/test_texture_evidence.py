@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from twins import even_light, unit_grid
 
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
 from pcii.evidence.texture_evidence import TextureModel, evidence_of_texture
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
 
 UNBOUNDED = TextureModel(averaging_error=0.0, saturation_nats=1e12)
 

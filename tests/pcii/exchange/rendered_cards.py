@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 
 
 @dataclass(frozen=True)

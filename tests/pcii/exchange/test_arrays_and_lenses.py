@@ -26,8 +26,8 @@ from pcii import (
     limit_photons,
     reconstruct,
 )
-from pcii.core.bayer import mosaic
-from pcii.core.geometry import disparity_px
+from pcii.types.bayer import mosaic
+from pcii.types.geometry import disparity_px
 
 PARAMETERS = """[intrinsics]
 focal_length_mm = 100.0

@@ -11,10 +11,10 @@ from stored_datasets import make_dataset
 
 from pcii.base.errors import InputError
 from pcii.exchange.dataset_card import CITATION, CREATOR, LICENCE, Terms, write_card
-from pcii.io.collection_layout import COLLECTION_FOLDER, index_row, write_index
-from pcii.io.dataset_layout import CARD, MANIFEST, read_manifest
-from pcii.io.verification import verify
+from pcii.store.collection_layout import COLLECTION_FOLDER, index_row, write_index
+from pcii.store.dataset_layout import CARD, MANIFEST, read_manifest
 from pcii.store.sealed_json import write_sealed
+from pcii.store.verification import verify
 
 ROOT = Path(__file__).resolve().parents[3]
 MAX_LINES = 30

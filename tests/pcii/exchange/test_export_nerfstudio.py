@@ -10,10 +10,10 @@ from PIL import Image
 from rendered_planes import ABOVE_MM, plane_z_mm, view, write_planes
 
 import pcii
-from pcii.core.array_labels import TRUTH_LABELS
-from pcii.io.dataset_layout import TRUTH, read_manifest, write_manifest
-from pcii.io.zarr_groups import write_arrays_safely
+from pcii.store.dataset_layout import TRUTH, read_manifest, write_manifest
 from pcii.store.file_list import list_files
+from pcii.store.zarr_groups import write_arrays_safely
+from pcii.types.array_labels import TRUTH_LABELS
 
 
 def grid_of(rows: int, cols: int, **changes: Any) -> pcii.CameraGrid:

@@ -21,7 +21,7 @@ from test_arrays_and_lenses import PARAMETERS, hci_folder, pfm
 
 from pcii import CameraGrid, open_dataset
 from pcii.base.srgb import linear_to_srgb
-from pcii.io.verification import verify
+from pcii.store.verification import verify
 
 CAMERAS = ["--pitch-mm", "2", "2", "--focal-mm", "35", "--sensor-mm", "36"]
 NAMED = ["--pattern", "{col}_{row}.png", *CAMERAS]

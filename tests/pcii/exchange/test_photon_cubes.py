@@ -14,9 +14,9 @@ from photon_cubes import FRAMES, bits_of, packed, write_cubes
 from picture_folders import OPTICS
 
 from pcii import CameraGrid, ViewOrder, import_counts, open_dataset
-from pcii.core.photon_counts import PhotonCounts
 from pcii.exchange import photon_cubes
 from pcii.exchange.photon_cubes import FrameStack, binary_counts, import_packed_frames, places_of_bits
+from pcii.types.photon_counts import PhotonCounts
 
 CAMERAS = ["--pitch-mm", "5", "7", "--focal-mm", "50", "--pixel-mm", "0.05"]
 PACKED = ["--counts", "--bitpack", "--pattern", "{row}_{col}.npy", *CAMERAS]

@@ -13,9 +13,9 @@ from matplotlib.collections import LineCollection
 from twins import unit_grid
 
 import pcii
-from pcii.core.focal_planes import FocalPlanes
 from pcii.figures.object_maps import draw_objects, spread_out
 from pcii.figures.panels import new_figure
+from pcii.types.focal_planes import FocalPlanes
 
 GRID = unit_grid(3, 3, 12, 16, pitch_mm=(10.0, 5.0))
 Z_MM = [1.0, 2.0]

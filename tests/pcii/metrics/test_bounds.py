@@ -4,12 +4,6 @@ import numpy as np
 import pytest
 from twins import unit_grid
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.section_stack import Sections
-from pcii.core.truth import PhotonTruth, Truth
 from pcii.metrics.bounds import (
     camera_information,
     depth_bound_px,
@@ -20,6 +14,12 @@ from pcii.metrics.bounds import (
 )
 from pcii.metrics.true_masks import TrueFocus
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
+from pcii.types.truth import PhotonTruth, Truth
 
 GRID = unit_grid(5, 5, 1, 8)  # total disparity 4 / z px, blur half-extent 2 |1 / z - 1 / z0| px
 Z = np.array([4 / 40, 4 / 30])

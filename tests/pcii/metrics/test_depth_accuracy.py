@@ -7,11 +7,11 @@ import pytest
 from twins import unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.estimates import DepthMap
-from pcii.core.geometry import depth_of_total_disparity_mm, total_disparity_px
-from pcii.core.truth import Truth
 from pcii.metrics.depth_accuracy import calibration, depth_errors, fine_structures, hci_errors, near_edges
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap
+from pcii.types.geometry import depth_of_total_disparity_mm, total_disparity_px
+from pcii.types.truth import Truth
 
 GRID = unit_grid(3, 3, 40, 50)  # disparity 1 / z px, total disparity 2 / z px
 

@@ -5,14 +5,14 @@ import pytest
 from twins import paper_grid
 
 from pcii.base.errors import InputError
-from pcii.core.estimates import DepthMap, Segmented
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.geometry import blur_half_extent_px
-from pcii.core.photon_counts import PhotonCounts
-from pcii.core.truth import PhotonTruth, Truth
 from pcii.metrics.scoring import score
 from pcii.metrics.true_masks import TrueFocus, mask_agreement
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import blur_half_extent_px
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import PhotonTruth, Truth
 
 GRID = paper_grid(24, 32)
 Z = np.array([540.0, 620.0])

@@ -7,12 +7,12 @@ from property_settings import mostly_slow
 from twins import even_light, intersection_over_union, opaque_views, photons_of, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.imaging.bright_regions import roberts_magnitude, without_specks
-from pcii.io.sample_dataset import sample
 from pcii.removal.methods import segment
 from pcii.sections.reconstruction import with_probes
+from pcii.store.sample_dataset import sample
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 ABLE = ["three-step", "likelihood", "posterior"]
 methods = pytest.mark.parametrize("method", [*ABLE, "brightness", "variance", "shape-from-focus"])

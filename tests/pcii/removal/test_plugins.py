@@ -10,8 +10,8 @@ from other_packages import install_package
 from twins import even_light, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.photon_counts import PhotonCounts
 from pcii.removal.methods import METHODS, removal_methods, segment
+from pcii.types.photon_counts import PhotonCounts
 
 CODE = """
 from dataclasses import replace

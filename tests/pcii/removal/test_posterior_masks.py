@@ -1,11 +1,11 @@
 import numpy as np
 from twins import unit_grid
 
-from pcii.core.estimates import DepthPosterior
-from pcii.core.focal_planes import FocalPlanes
 from pcii.depth.posterior_depth import PosteriorDepth
 from pcii.removal.methods import segment
 from pcii.removal.posterior_masks import PosteriorMasks
+from pcii.types.estimates import DepthPosterior
+from pcii.types.focal_planes import FocalPlanes
 
 
 def test_a_plane_has_what_is_nearer_to_it_than_to_the_next_and_within_reach():

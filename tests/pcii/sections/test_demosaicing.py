@@ -6,8 +6,8 @@ from property_settings import at_least
 from twins import demosaic_twin
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import PATTERNS, colour_index, mosaic
 from pcii.sections.demosaicing import demosaic
+from pcii.types.bayer import PATTERNS, colour_index, mosaic
 
 RED, GREEN, BLUE = 0, 1, 2
 # The paper counts rows and columns from 1: its pixel 43 is [3, 2] here.

@@ -10,13 +10,13 @@ from property_settings import at_least
 from twins import Reader, colour_of, samples_of, unit_grid
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import mosaic
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.demosaicing import demosaic
 from pcii.sections.dense_sections import views_around
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.bayer import mosaic
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 patterns = st.sampled_from(["GRBG", "RGGB", "BGGR", "GBRG", None])
 

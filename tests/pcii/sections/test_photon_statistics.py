@@ -7,9 +7,6 @@ from hypothesis import strategies as st
 from property_settings import at_least
 from twins import unit_grid
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.photon_statistics import (
     ViewSamples,
     entropy_bits,
@@ -19,6 +16,9 @@ from pcii.sections.photon_statistics import (
     view_samples,
 )
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 
 PAPER_RATE = 1000 * 3.4e-4
 

@@ -5,11 +5,11 @@ from hypothesis import strategies as st
 from property_settings import at_least
 from twins import bayer_photons, blocky_texture, section_twin, unit_grid
 
-from pcii.core.bayer import PATTERNS, mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.images import Views
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.bayer import PATTERNS, mosaic
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
 
 patterns = st.sampled_from([*PATTERNS, None])
 # Depths whose disparity is exact, so that the twin's order of operations cannot matter.

@@ -7,8 +7,8 @@ from twins import unit_grid
 
 import pcii
 from pcii.base.command_line import run
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.photon_statistics import saturation_loss
+from pcii.types.photon_counts import PhotonCounts
 
 GRID = unit_grid(2, 2, 64, 50)
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 from stored_datasets import flip_a_bit, one_sentence
 
-from pcii.io.collection_layout import COLLECTION_FOLDER
-from pcii.io.dataset_layout import DATASET_FOLDER, MARKER
-from pcii.io.evaluation_layout import EVALUATION_FOLDER, ROWS
-from pcii.io.results_list import LOCK, RESULTS_FOLDER
+from pcii.store.collection_layout import COLLECTION_FOLDER
+from pcii.store.dataset_layout import DATASET_FOLDER, MARKER
+from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
 from pcii.store.folder_kind import FolderKind, check_free
+from pcii.store.results_list import LOCK, RESULTS_FOLDER
 from pcii.store.sealed_json import write_sealed
 
 KINDS = {kind.what: kind for kind in (DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER)}

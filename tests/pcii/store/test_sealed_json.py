@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from stored_datasets import flip_a_bit, one_sentence
 
+from pcii.base.safe_files import write_bytes_safely
 from pcii.store.file_list import list_files, strays
-from pcii.store.safe_files import write_bytes_safely
 from pcii.store.sealed_json import read_sealed, write_sealed
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from pcii.base import command_line
 from pcii.base.errors import InputError
-from pcii.io.verification import verify
+from pcii.store.verification import verify
 from simgen.app import commands as simgen_cli
 from simgen.app.starting_points import list_recipes, list_scenes, write_new_recipe, write_new_scene
 from simgen.check.targets import lint

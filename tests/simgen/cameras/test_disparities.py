@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.focal_planes import FocalPlanes
-from pcii.core.photon_counts import PhotonCounts
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.photon_counts import PhotonCounts
 from simgen.cameras.disparities import (
     apart_px,
     colour_samples,

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import Camera
 from simgen.renderer.radiance import object_windows
 from simgen.spec.recipe import Lens

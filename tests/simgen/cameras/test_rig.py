@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import mosaic
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.geometry import project_px
+from pcii.types.bayer import mosaic
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.geometry import project_px
 from simgen.base.strict_models import validate
 from simgen.cameras.rig import Cameras, Rig, as_rig, rig_of, turn
 from simgen.photons.candidates import Setup

@@ -13,15 +13,15 @@ import pcii
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
-from pcii.io.benchmark_layout import (
+from pcii.store.benchmark_layout import (
     CERTIFICATE,
     Definition,
     compare,
     differing_scores,
     published_certificate,
 )
-from pcii.io.verification import verify
 from pcii.store.hashes import hash_json
+from pcii.store.verification import verify
 from simgen.app.commands import app
 from simgen.dataset.benchmark_making import (
     BenchmarkSeries,

@@ -14,11 +14,11 @@ from tiny import GRID_2_X_3
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.base.executor import Executor
-from pcii.io.collection import open_collection
-from pcii.io.collection_layout import COLLECTION, INDEX
-from pcii.io.dataset_layout import CARD, MARKER
-from pcii.io.verification import verify
 from pcii.store import software
+from pcii.store.collection import open_collection
+from pcii.store.collection_layout import COLLECTION, INDEX
+from pcii.store.dataset_layout import CARD, MARKER
+from pcii.store.verification import verify
 from simgen.app import commands as cli
 from simgen.dataset import dataset_collection
 from simgen.dataset.dataset_collection import DatasetJob, generate_collection

@@ -12,10 +12,10 @@ from digests import digest
 from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
-from pcii.io.verification import verify
 from pcii.store import software
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import MANIFEST, MARKER, RADIANCE, TRUTH
+from pcii.store.verification import verify
 from simgen.cameras.rig import rig_of
 from simgen.dataset import rendered_views
 from simgen.dataset.generation import generate

@@ -11,9 +11,9 @@ import pytest
 from digests import digest
 from tiny import with_radiance
 
-from pcii.io.collection import open_collection
-from pcii.io.dataset_layout import MANIFEST, MARKER
-from pcii.io.verification import verify
+from pcii.store.collection import open_collection
+from pcii.store.dataset_layout import MANIFEST, MARKER
+from pcii.store.verification import verify
 
 pytestmark = [pytest.mark.renders, pytest.mark.slow]
 KILLS = 20

@@ -7,7 +7,7 @@ import pytest
 import zarr
 from tiny import TINY_RECIPE
 
-from pcii.io.dataset_layout import TRUTH
+from pcii.store.dataset_layout import TRUTH
 from simgen.dataset.generation import generate
 from simgen.dataset.prepared import prepare
 from simgen.spec.recipe import Analysis, Recipe

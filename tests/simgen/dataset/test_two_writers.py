@@ -11,8 +11,8 @@ from digests import digest
 from tiny import GRID_2_X_2, with_radiance
 from writers import Writer
 
-from pcii.io.collection import open_collection
-from pcii.io.verification import verify
+from pcii.store.collection import open_collection
+from pcii.store.verification import verify
 
 pytestmark = pytest.mark.renders
 TIMES = [1, pytest.param(20, marks=pytest.mark.slow)]

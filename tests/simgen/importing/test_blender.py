@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.importing.scene_import import import_scene
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import build

@@ -12,7 +12,7 @@ from PIL import Image
 
 from pcii.base.errors import InputError
 from pcii.base.srgb import linear_to_srgb, srgb_to_linear
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.assets.asset_files import read_assets
 from simgen.assets.triangles import triangles_of
 from simgen.importing.scene_import import import_scene

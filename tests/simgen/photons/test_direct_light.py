@@ -12,7 +12,7 @@ from scipy import stats
 
 import simgen
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.assets.triangles import globe
 from simgen.cameras.rig import Rig, as_rig
 from simgen.dataset.prepared import capture_of

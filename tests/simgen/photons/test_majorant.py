@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.photons.disparity_layers import Samples, layers_for, tile_px_for
 from simgen.photons.exploration import MAX_RAYS
 from simgen.photons.majorant import Majorant, fit

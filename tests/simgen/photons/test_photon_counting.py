@@ -12,10 +12,10 @@ from scipy import stats
 
 from pcii.base.errors import InputError
 from pcii.base.progress import silent
-from pcii.core.bayer import colour_index
-from pcii.core.photon_counts import PhotonCounts
-from pcii.io.dataset import Dataset, open_dataset
-from pcii.io.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.dataset_layout import COUNTS, MANIFEST, PHOTON_TRUTH, nested_name
+from pcii.types.bayer import colour_index
+from pcii.types.photon_counts import PhotonCounts
 from simgen.dataset.prepared import capture_of, least_samples
 from simgen.photons import counting_plan as module
 from simgen.photons import photon_counting

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lit_scenes import two_balls
 
-from pcii.core.camera_grid import CameraGrid
-from pcii.core.photon_limit import sense
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.photon_limit import sense
 from simgen.photons.counting_plan import MAX_NOISE_SHARE, PROBE_SAMPLES, Probe, probe
 from simgen.renderer.mitsuba_scene import RenderScene
 from simgen.renderer.radiance import render_view

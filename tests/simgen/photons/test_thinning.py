@@ -10,8 +10,8 @@ from lit_scenes import DEPTH, EVENLY, LAMP, ball, lit, two_balls
 from scipy import stats
 
 from pcii.base.errors import InputError
-from pcii.core.bayer import colour_index, mosaic
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.bayer import colour_index, mosaic
+from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import as_rig
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import MAX_NOISE_SHARE, Capture, plan

@@ -9,7 +9,7 @@ from PIL import Image
 
 import simgen
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.renderer import backend
 
 SIDE, TILES, REPEATS, SAMPLES, DEPTH = 64, 8, 6, 64, 5

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from lit_scenes import two_balls
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.cameras.rig import as_rig
 from simgen.renderer.radiance import render_view, windows_of_objects
 

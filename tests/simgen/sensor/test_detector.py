@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.core.bayer import colour_index, mosaic
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.bayer import colour_index, mosaic
+from pcii.types.camera_grid import CameraGrid
 from simgen.sensor.detector import detect, full_light_image, read_out
 from simgen.sensor.photon_table import NO_OBJECT, PhotonTable
 from simgen.spec.recipe import FullLight, Sensor

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pcii.core.bayer import colour_index
-from pcii.core.photon_limit import Light, photon_rates, scope_energies, sense
+from pcii.types.bayer import colour_index
+from pcii.types.photon_limit import Light, photon_rates, scope_energies, sense
 from simgen.sensor.detector import draw_counts, fixed_totals
 from simgen.spec.recipe import Photons
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pcii.base.progress import silent
-from pcii.core.bayer import colour_index
-from pcii.core.photon_limit import sense
+from pcii.types.bayer import colour_index
+from pcii.types.photon_limit import sense
 from simgen.dataset.prepared import capture_of
 from simgen.photons.candidates import Setup
 from simgen.photons.counting_plan import Plan, plan

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.sensor import detector
 from simgen.sensor.detector import counts_of, in_frames, read_out
 from simgen.sensor.photon_table import PhotonTable

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from pcii.base.errors import InputError
-from pcii.core.camera_grid import CameraGrid
+from pcii.types.camera_grid import CameraGrid
 from simgen.renderer import backend
 from simgen.renderer.mitsuba_scene import RenderScene, build
 from simgen.renderer.radiance import render_view

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 from plain_scenes import built, card, grid, sphere
 
-from pcii.core.geometry import project_px
-from pcii.core.images import Views
 from pcii.sections.reconstruction import reconstruct
+from pcii.types.geometry import project_px
+from pcii.types.images import Views
 from simgen.renderer.radiance import render_view
 from simgen.truth.first_hits import first_hits_at_centre
 

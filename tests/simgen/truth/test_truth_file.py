@@ -9,10 +9,10 @@ import zarr
 from tiny import TINY_RECIPE
 
 from pcii.base.errors import InputError
-from pcii.core.focal_planes import FocalPlanes
-from pcii.io.dataset import open_dataset
-from pcii.io.dataset_layout import TRUTH
 from pcii.metrics.true_masks import TrueFocus
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import TRUTH
+from pcii.types.focal_planes import FocalPlanes
 from simgen.base.strict_models import validate
 from simgen.dataset.generation import generate
 from simgen.spec.recipe import Recipe

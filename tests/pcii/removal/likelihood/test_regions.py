@@ -3,7 +3,6 @@ import pytest
 from property_settings import mostly_slow
 from twins import even_light, paper_grid, unit_grid
 
-from pcii.core.focal_planes import FocalPlanes
 from pcii.evidence.focus_likelihood import FocusEvidence, focus_evidence
 from pcii.evidence.half_agreement import Halves, Products, halves_of
 from pcii.removal.likelihood.likelihood_method import searched_planes
@@ -14,6 +13,7 @@ from pcii.removal.likelihood.regions import (
     regions_of,
     settled,
 )
+from pcii.types.focal_planes import FocalPlanes
 
 SHAPE = (30, 40)
 SURE_NATS = 10.0  # of chance once in e^10 = 20 000 times

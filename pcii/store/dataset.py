@@ -1,0 +1,300 @@
+"""Datasets: counts, truth and radiance of a dataset folder, checked when they are read."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm, listed, times
+from pcii.store.dataset_layout import (
+    COUNTS,
+    FRAME,
+    MANIFEST,
+    PHOTON_TRUTH,
+    RADIANCE,
+    REMEDY,
+    TRUTH,
+    nested_name,
+    radiance_name,
+    read_exr,
+    read_manifest,
+)
+from pcii.store.file_list import check_file, check_files, lists_part
+from pcii.store.zarr_groups import read_array
+from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS, Label
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.truth import OPTIONAL_MAPS, PhotonTruth, Truth
+
+FULL_LIGHT: Final = "full-light"
+"""Stands for the photon budget where the radiance is looked at."""
+Budget = float | Literal["full-light"] | None
+"""Photon budget, None for that of an exposure, or `FULL_LIGHT`."""
+
+
+def budget_of(text: str) -> float | Literal["full-light"]:
+    """A budget as people write it; raises `InputError` for what is neither a number nor `FULL_LIGHT`.
+
+    >>> budget_of("300"), budget_of("full-light")
+    (300.0, 'full-light')
+    """
+    if text == FULL_LIGHT:
+        return FULL_LIGHT
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"budget: expected a number of photons or {FULL_LIGHT!r}, got {text!r}") from None
+
+
+class StoredRadiance:
+    """Radiance (K, L, H, W, C), float32: [k, l] reads one view (H, W, C), `np.asarray` all of them.
+
+    `file_of` (k, l) returns the path of the file of a view, which it has checked.
+    """
+
+    def __init__(self, shape: tuple[int, int, int, int, int], file_of: Callable[[int, int], Path]) -> None:
+        self.shape = shape
+        self.dtype = np.dtype(np.float32)
+        self._file_of = file_of
+
+    def __getitem__(self, index: tuple[int, int], /) -> np.ndarray:
+        K, L = self.shape[:2]
+        is_pair = (
+            isinstance(index, tuple)
+            and len(index) == 2
+            and all(isinstance(n, int | np.integer) for n in index)
+        )
+        if not is_pair or not (0 <= index[0] < K and 0 <= index[1] < L):
+            raise InputError(
+                f"radiance: read one view of {K} x {L} by [k, l], or all by numpy.asarray; got {index!r}"
+            )
+        return read_exr(self._file_of(*index), self.shape[2:])
+
+    def __array__(self, dtype: np.dtype | None = None, copy: bool | None = None) -> np.ndarray:
+        """All views, read into memory; raises `ValueError` if NumPy asks for them without a copy."""
+        if copy is False:
+            raise ValueError("radiance: it is on disk, and only a copy can be in memory")
+        views = np.empty(self.shape, self.dtype if dtype is None else dtype)
+        for k, l in np.ndindex(*self.shape[:2]):
+            views[k, l] = self[k, l]
+        return views
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Dataset(ShortForm):
+    """A finished dataset folder, whose arrays are read, and their hashes checked, on first use."""
+
+    path: Path
+    manifest: Mapping[str, Any]
+    grid: CameraGrid
+    cfa: str | None
+    budget: Budget = None
+    """Nested photon budget of `counts`; None for the budget of the recipe; `FULL_LIGHT` for no counts."""
+
+    def _facts(self) -> dict[str, object]:
+        parts = {"counts": COUNTS, "truth": TRUTH, "radiance": RADIANCE}
+        budgets = listed([budget or "exposure" for budget in self.budgets])
+        return {
+            "name": self.name,
+            "shape": times(self.grid.shape_KLHW),
+            "cfa": self.cfa,
+            "budgets": budgets if self.budgets else None,
+            "z_mm": listed(self.analysis.get("z_mm") or ()),
+            "has": listed([name for name, part in parts.items() if self.has(part)]),
+        }
+
+    @property
+    def budgets(self) -> tuple[float | None, ...]:
+        """Photon budgets of the stored counts: nested ones, then that of all, None for an exposure.
+
+        They are those of the recipe; a dataset without one, as of images by others, may have a budget too.
+        Without counts there are none.
+        """
+        if not self.has(COUNTS):
+            return ()
+        photons = self.manifest.get("recipe", {}).get("photons", {})
+        largest = None if photons.get("scope") == "exposure" else photons.get("budget")
+        return (*sorted(photons.get("nested") or []), self.manifest.get("photon_budget") or largest)
+
+    @property
+    def photon_budget(self) -> float | None:
+        """Photon budget of `counts`; None without counts, for those of an exposure, and if it is unknown."""
+        if not self.has_counts or self.budget == FULL_LIGHT:
+            return None
+        return self.budgets[-1] if self.budget is None else self.budget
+
+    def at_budget(self, budget: Budget) -> "Dataset":
+        """The dataset with the photons of one of its `budgets`, or with its radiance alone ("full-light").
+
+        Raises `InputError` for another budget, and for full light of a dataset without radiance.
+        """
+        if budget == FULL_LIGHT:
+            if not self.has(RADIANCE):
+                raise InputError(f"{self.path}: has no radiance, and budget {FULL_LIGHT!r} is of that")
+            return replace(self, budget=FULL_LIGHT)
+        *nested, largest = self.budgets or (None,)
+        if budget == largest:
+            return replace(self, budget=None)
+        if budget is None or budget not in nested:
+            known = ", ".join(f"{n:g}" for n in (largest, *nested) if n is not None)
+            asked = "none" if budget is None else f"{budget:g}"
+            raise InputError(f"{self.path}: no photons of budget {asked} here; there are {known or 'none'}")
+        return replace(self, budget=budget)
+
+    @property
+    def name(self) -> str:
+        """Name of the dataset's folder."""
+        return self.path.resolve().name
+
+    @property
+    def analysis(self) -> Mapping[str, Any]:
+        """Depths (`z_mm`) and depth range (`z_range_mm`) that the recipe suggests; empty if none."""
+        return self.manifest.get("analysis") or {}
+
+    @property
+    def _counts_name(self) -> str | None:
+        return None if self.budget == FULL_LIGHT else nested_name(COUNTS, self.budget)
+
+    @property
+    def has_counts(self) -> bool:
+        """Whether the dataset has photon counts; without them it may have radiance."""
+        return self._counts_name is not None and self.has(self._counts_name)
+
+    @cached_property
+    def counts(self) -> PhotonCounts:
+        """The photon counts; raises `InputError` if the dataset has none."""
+        part = self._counts_name
+        if part is None:
+            raise InputError(f"budget: {FULL_LIGHT} is the radiance, and this needs photon counts")
+        if not self.has_counts:
+            raise InputError(
+                f"{self.path}: this dataset has no photon counts; import the images with --photons N, "
+                "or generate it with products.counts = true"
+            )
+        names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
+        if self.has(f"{part}/{FRAME}"):
+            names += (FRAME,)
+        arrays = self._arrays(part, COUNTS_LABELS, names)
+        manifest, frame = self.manifest, arrays.get(FRAME)
+        counted: dict[str, Any] = {"frames": manifest.get("frames", 1), "bits": manifest.get("bits")}
+        try:
+            if "dense" in arrays:
+                return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **counted)
+            k, l, i, j, n = (arrays[name] for name in "klijn")
+            return PhotonCounts.from_events(k, l, i, j, n, self.grid, cfa=self.cfa, frame=frame, **counted)
+        except InputError as fault:
+            raise InputError(f"{self.path / part}: {fault}") from None
+
+    @cached_property
+    def truth(self) -> Truth | None:
+        """Ground truth of the virtual centre camera, or None if the dataset has none."""
+        if not self.has_truth_array("z_mm"):
+            return None
+        optional = tuple(name for name in OPTIONAL_MAPS if self.has_truth_array(name))
+        arrays = self._arrays(TRUTH, TRUTH_LABELS, ("z_mm", "object_id", *optional))
+        names = {int(key): value for key, value in self.manifest.get("objects", {}).items()}
+        photons = self._photon_truth()
+        try:
+            return Truth(**arrays, names=names, photons=photons)
+        except InputError as fault:
+            raise InputError(f"{self.path / TRUTH}: {fault}") from None
+
+    def has_truth_array(self, name: str) -> bool:
+        """Whether the dataset has this array of `truth.zarr`; docs/dataset.md lists them."""
+        return self.has(f"{TRUTH}/{name}")
+
+    def truth_array(self, name: str) -> np.ndarray:
+        """An array of `truth.zarr` by name, such as `view_z_mm`; raises `InputError` if it is not there."""
+        if name not in TRUTH_LABELS or not self.has_truth_array(name):
+            raise InputError(f"{self.path}: there is no {name!r} in its {TRUTH}")
+        return self._arrays(TRUTH, TRUTH_LABELS, (name,))[name]
+
+    def _photon_truth(self) -> PhotonTruth | None:
+        part = None if self.budget == FULL_LIGHT else nested_name(PHOTON_TRUTH, self.budget)
+        if part is None or not self.has(part):
+            return None
+        origins = self._arrays(part, PHOTON_TRUTH_LABELS, ("object_id", "z_mm"))
+        events = self.counts.events
+        if origins["z_mm"].shape != (self.counts.total,) or origins["object_id"].shape != (
+            self.counts.total,
+        ):
+            raise InputError(f"{self.path / part}: does not belong to the counts beside it")
+        pixels = {name: getattr(events, name).repeat(events.n) for name in "klij"}
+        return PhotonTruth(**pixels, **origins)
+
+    @cached_property
+    def views(self) -> Views | None:
+        """Radiance of the views, read from disk one view at a time, or None if the dataset has none."""
+        if not self.has(RADIANCE):
+            return None
+        channels = self.manifest.get("radiance_channels")
+        if channels is None:
+            raise InputError(
+                f"{self.path / MANIFEST}: radiance_channels: missing, though it lists {RADIANCE}"
+            )
+        cfa = self.cfa if channels == 1 else None
+        shape, known = (*self.grid.shape_KLHW, channels), set[str]()
+
+        def file_of(k: int, l: int) -> Path:
+            name = radiance_name(k, l)
+            path = self.check(name, content=name not in known)
+            known.add(name)
+            return path
+
+        return Views(StoredRadiance(shape, file_of), self.grid, cfa)
+
+    @property
+    def counts_or_views(self) -> PhotonCounts | Views:
+        """The photon counts or, of a dataset without, the radiance; `InputError` if there is neither."""
+        views = None if self.has_counts else self.views
+        return self.counts if views is None else views
+
+    def has(self, part: str) -> bool:
+        """Whether the manifest lists the file `part`, or files of a folder of this name."""
+        return lists_part(self.manifest["files"], part)
+
+    def check(self, name: str, *, content: bool = True) -> Path:
+        """Path of a listed file after a check of its size (and hash, if `content`); raises `InputError`."""
+        entry = self.manifest["files"].get(name)
+        if entry is None:
+            raise InputError(f"{self.path}: the manifest lists no {name}")
+        check_file(self.path, name, entry, REMEDY, content=content)
+        return self.path / name
+
+    def _arrays(
+        self, part: str, labels: Mapping[str, Label], names: tuple[str, ...]
+    ) -> dict[str, np.ndarray]:
+        K, L, H, W = self.grid.shape_KLHW
+        sizes = {"camera_row": K, "camera_col": L, "row": H, "col": W, "axis": 3, "direction": 3}
+        files = self.manifest["files"]
+        return {
+            name: read_array(self.path, f"{part}/{name}", files, labels[name], sizes, REMEDY)
+            for name in names
+        }
+
+
+def open_dataset(path: str | Path) -> Dataset:
+    """Open a dataset folder, after a check that every listed file exists and has the listed size.
+
+    Contents are compared with their SHA-256 when they are read; files that the manifest does not list are
+    ignored. Raises `InputError` for a folder that is no finished dataset, a manifest that was changed since
+    it was written, or a file that is missing or truncated.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> from pcii.store.dataset_layout import write_manifest
+    >>> grid = dict(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=4, width=6)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_manifest(Path(folder), {"grid": grid, "cfa": "GRBG", "files": {}})
+    ...     dataset = open_dataset(folder)
+    >>> dataset.grid.view_count, dataset.cfa, dataset.truth
+    (2, 'GRBG', None)
+    """
+    root = Path(path)
+    manifest = read_manifest(root)
+    check_files(root, manifest["files"], REMEDY, content=False)
+    return Dataset(root, manifest, CameraGrid(**manifest["grid"]), manifest["cfa"])

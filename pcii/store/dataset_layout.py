@@ -1,0 +1,156 @@
+"""The dataset folder on disk: its files, their arrays and its manifest.
+
+    manifest.json            recipe as resolved, versions, timings, every file with size and SHA-256, and
+                             its own checksum (see `pcii.store.sealed_json`)
+    counts.zarr/             events k, l, i, j, n (event,) or dense counts (K, L, H, W)
+    counts.zarr/frame        (photon,) the frame of each count, on request
+    counts-300.zarr/         those of a smaller budget, if photons.nested asks for it
+    photon_truth.zarr/       object_id, z_mm (photon,) of each photon's first hit, in the events' order
+    truth.zarr/              maps (H, W) of the virtual centre, and of every view on request
+    radiance/view_kk_ll.exr  float32, on request; one channel Y for a mosaic, else R, G, B
+
+The manifest is written last and lists what belongs to the dataset: a dataset without a manifest is
+unfinished, a file whose hash differs is damaged, and what is not listed is not read.
+"""
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.safe_files import write_bytes_safely
+from pcii.store.folder_kind import FolderKind
+
+MANIFEST = "manifest.json"
+CARD = "README.md"
+"""What people read of a dataset or collection. No manifest lists it, since it may be written again with
+other terms of use."""
+MARKER = ".unfinished.json"
+"""Present in the folder of a dataset while it is being generated."""
+COUNTS = "counts.zarr"
+FRAME = "frame"
+"""Array of the counts that has the frame of each."""
+TRUTH = "truth.zarr"
+PHOTON_TRUTH = "photon_truth.zarr"
+RADIANCE = "radiance"
+WORTH_ZIP = 0.9
+"""Radiance is compressed if it then takes at most this share of its bytes."""
+REMEDY = "generate the dataset again"
+DATASET_FOLDER = FolderKind(
+    "dataset",
+    MANIFEST,
+    version=2,
+    absent=f"not a finished dataset (no {MANIFEST}); make one with `simgen generate`",
+    remedy=REMEDY,
+    marks=frozenset({MANIFEST, MARKER}),
+)
+
+
+def radiance_name(k: int, l: int) -> str:
+    """Path of the radiance of a view in the dataset.
+
+    >>> radiance_name(0, 12)
+    'radiance/view_00_12.exr'
+    """
+    return f"{RADIANCE}/view_{k:02d}_{l:02d}.exr"
+
+
+def nested_name(part: str, budget: float | None) -> str:
+    """Name of an array group for a nested photon budget; unchanged for None.
+
+    >>> nested_name("counts.zarr", 300.0)
+    'counts-300.zarr'
+    """
+    if budget is None:
+        return part
+    stem, suffix = part.rsplit(".", 1)
+    return f"{stem}-{budget:.12g}.{suffix}"
+
+
+def write_manifest(root: Path, manifest: Mapping[str, Any]) -> None:
+    """Write the manifest of a dataset, which makes the dataset a finished one."""
+    DATASET_FOLDER.write(root, manifest)
+
+
+def read_manifest(root: Path) -> dict[str, Any]:
+    """The manifest of a finished dataset, with all fields checked that this package uses.
+
+    Raises `InputError` if the dataset is unfinished, and as `read_written_manifest` does.
+    """
+    if (root / MARKER).is_file():
+        raise InputError(f"{root}: unfinished; the same `simgen generate` command goes on from here")
+    return read_written_manifest(root)
+
+
+def read_written_manifest(root: Path) -> dict[str, Any]:
+    """The manifest that was written last, with all fields checked that this package uses.
+
+    For a process that knows that the dataset is finished: another one may mark it as its own for the moment
+    until it finds so. Raises `InputError` if the manifest is missing, was changed since it was written, or
+    has an invalid field.
+    """
+    from pcii.store.manifest_schema import DatasetManifest, validate
+
+    manifest = DATASET_FOLDER.read(root)
+    validate(DatasetManifest, manifest, root / MANIFEST, REMEDY)
+    return manifest
+
+
+def write_exr_safely(path: Path, image: np.ndarray) -> None:
+    """Write an image (H, W, C), C = 1 or 3, as float32 EXR, atomically; with ZIP compression if that pays.
+
+    Every sixteenth row shows whether it does. Radiance of few samples is noise, of which ZIP saves 1 %, and
+    takes four times as long to write and half as long again to read.
+    """
+    import OpenEXR
+
+    some = np.asarray(image[::16], np.float32)
+    pays = len(_exr(some, OpenEXR.ZIP_COMPRESSION)) < WORTH_ZIP * some.nbytes
+    write_bytes_safely(path, _exr(image, OpenEXR.ZIP_COMPRESSION if pays else OpenEXR.NO_COMPRESSION))
+
+
+def _exr(image: np.ndarray, compression: object) -> bytes:
+    """Content of a float32 EXR file of an image (H, W, C)."""
+    import OpenEXR
+
+    names = ("Y",) if image.shape[2] == 1 else ("R", "G", "B")
+    planes = {name: np.ascontiguousarray(image[..., c], np.float32) for c, name in enumerate(names)}
+    content = io.BytesIO()  # the library takes no path whose name is not valid text
+    with OpenEXR.File({"compression": compression, "type": OpenEXR.scanlineimage}, planes) as file:
+        file.write(content)
+    return content.getvalue()
+
+
+def read_exr(path: Path, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """A float32 image (H, W, C) from an EXR file with the channels Y, or R, G, B.
+
+    Raises `InputError` if it cannot be read or its shape is not `shape`, if given; the shape is checked in
+    the header, before memory is allocated for the pixels.
+    """
+    import OpenEXR
+
+    try:
+        if shape is not None and _exr_shape(path) != tuple(shape):
+            raise InputError(f"{path}: expected an image {tuple(shape)}, got {_exr_shape(path)}")
+        with path.open("rb") as opened, OpenEXR.File(opened, separate_channels=True) as file:
+            channels = file.channels()
+            names = ("Y",) if "Y" in channels else ("R", "G", "B")
+            return np.stack([np.array(channels[name].pixels) for name in names], axis=-1)
+    except InputError:
+        raise
+    except (KeyError, RuntimeError, TypeError, ValueError) as fault:
+        raise InputError(f"{path}: cannot be read as an EXR image ({fault})") from None
+
+
+def _exr_shape(path: Path) -> tuple[int, int, int]:
+    """Shape (H, W, C) according to the header of an EXR file."""
+    import OpenEXR
+
+    with path.open("rb") as opened, OpenEXR.File(opened, header_only=True) as file:
+        header = file.header()
+        (left, top), (right, bottom) = (map(int, corner) for corner in header["dataWindow"])
+        is_mosaic = any(channel.name == "Y" for channel in header["channels"])
+    return bottom - top + 1, right - left + 1, 1 if is_mosaic else 3

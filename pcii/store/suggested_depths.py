@@ -1,0 +1,62 @@
+"""Depths to reconstruct: those given, or those that the recipe of a dataset suggests."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.store.dataset import Dataset
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.geometry import disparity_px
+
+
+def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
+    """Focal planes at `z_mm`, else at the depths of the recipe.
+
+    Raises `InputError` if there are none, or if no views overlap at one.
+    """
+    depths = z_mm or dataset.analysis.get("z_mm") or ()
+    if not len(depths):
+        raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
+    planes = FocalPlanes.at_depths(dataset.grid, depths)
+    _check_overlap(dataset.grid, planes.z_mm, "z_mm")
+    return planes
+
+
+def _check_overlap(grid: CameraGrid, depths_mm: np.ndarray, name: str) -> None:
+    """Raise `InputError` if no neighbouring views overlap at one of the depths, as where metres are given.
+
+    There every camera sees other points than the next, so that nothing can be in focus.
+    """
+    sides = ((grid.cols, grid.width), (grid.rows, grid.height))
+    if grid.view_count == 1:
+        return
+
+    def overlap(z_mm: np.ndarray) -> np.ndarray:
+        shifts = zip(disparity_px(grid, z_mm), sides, strict=True)
+        return np.any([np.abs(px) < side for px, (cameras, side) in shifts if cameras > 1], axis=0)
+
+    for z in depths_mm[~overlap(depths_mm)][:1]:
+        across, down = disparity_px(grid, z)
+        metres = f"; if metres are meant, it is {1000 * z:g}" if overlap(1000 * z) else ""
+        raise InputError(
+            f"{name}: {z:g} mm is so near that no views overlap, of {grid.height} x {grid.width} px each and "
+            f"{down:.0f} x {across:.0f} px apart, rows x columns; depths are in mm{metres}"
+        )
+
+
+def depth_range_of(
+    dataset: Dataset, z_mm: Sequence[float] | FocalPlanes | None = None
+) -> tuple[float, float]:
+    """Nearest and farthest depth in mm to search: the recipe's, else 4/5 to 5/4 of the planes' depths.
+
+    The planes are `z_mm`, or those that `planes_of` finds at these depths.
+    """
+    suggested = dataset.analysis.get("z_range_mm")
+    if suggested:
+        near, far = float(suggested[0]), float(suggested[1])
+        _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
+        return near, far
+    z = (z_mm if isinstance(z_mm, FocalPlanes) else planes_of(dataset, z_mm)).z_mm
+    return 0.8 * float(z.min()), 1.25 * float(z.max())

@@ -1,0 +1,227 @@
+"""Results of methods, and their scores: in-focus masks, depth maps, measures of accuracy."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm, listed, span, times
+from pcii.types.arrays import is_whole, read_only
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.section_stack import Sections
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Segmented(ShortForm):
+    """Which points of each of the `sections` are in focus: `in_focus` (Z, H, W) bool.
+
+    `steps` holds the named intermediate maps (Z, H, W) of the method, for display. A method that classifies
+    single photons says in `photon_in_focus` (Z, N) bool which of the N events of the counts
+    (`PhotonCounts.events`, in their order) come from points in focus in each plane; else that is None.
+    Raises `InputError` for an array of another shape or dtype.
+    """
+
+    in_focus: np.ndarray
+    method: str
+    sections: Sections
+    steps: Mapping[str, np.ndarray] = field(default_factory=dict)
+    photon_in_focus: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.sections, Sections):
+            raise InputError(f"sections: expected Sections, got {type(self.sections).__name__}")
+        shape, events = self.sections.counts.shape[:3], self.photon_in_focus
+        if not _is_bool(self.in_focus) or self.in_focus.shape != shape:
+            raise InputError(f"in_focus: expected bool {shape}, got {_described(self.in_focus)}")
+        object.__setattr__(self, "in_focus", read_only(self.in_focus))
+        if events is None:
+            return
+        if not _is_bool(events) or events.ndim != 2 or events.shape[0] != shape[0]:
+            raise InputError(f"photon_in_focus: expected bool ({shape[0]}, events), got {_described(events)}")
+        object.__setattr__(self, "photon_in_focus", read_only(events))
+
+    def _facts(self) -> dict[str, object]:
+        shares = listed([f"{share:.2%}" for share in self.in_focus.mean(axis=(1, 2))])
+        z_mm, shape = listed(self.z_mm.tolist()), times(self.in_focus.shape)
+        return {"method": self.method, "z_mm": z_mm, "shape": shape, "in_focus": shares}
+
+    @property
+    def z_mm(self) -> np.ndarray:
+        """Depths of the sections (Z,) float64."""
+        return self.sections.z_mm
+
+    @property
+    def cleaned(self) -> np.ndarray:
+        """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
+        return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+        """Draw each section after removal with the outline of its mask, and return the Matplotlib axes (N,).
+
+        Panels, exposure and `axes` are those of `Sections.plot`.
+        """
+        from pcii.figures.plots import plot_sections
+
+        own = self.sections
+        return plot_sections(axes, self.z_mm, own.in_colours, own.grid.shape_HW, self.in_focus, self.method)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthMap(ShortForm):
+    """Depth per pixel of the virtual centre camera: `z_mm` (H, W), NaN where the method gives none.
+
+    `confidence` (H, W), in [0, 1], is the probability that the depth is within 1 px of total disparity of the
+    true one, as the method states it: 0 where no depth is given. Raises `InputError` if the shapes differ, or
+    for what is no array of real numbers.
+    """
+
+    z_mm: np.ndarray
+    confidence: np.ndarray
+
+    def __post_init__(self) -> None:
+        for name, values in (("z_mm", self.z_mm), ("confidence", self.confidence)):
+            if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+                raise InputError(f"{name}: expected real numbers (H, W), got {_described(values)}")
+        if self.z_mm.ndim != 2 or self.confidence.shape != self.z_mm.shape:
+            raise InputError("z_mm, confidence: expected two maps (H, W) of the same shape")
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "confidence", read_only(self.confidence))
+
+    def _facts(self) -> dict[str, object]:
+        answered = self.z_mm[np.isfinite(self.z_mm)]
+        share = f"{answered.size / max(1, self.z_mm.size):.2%}"
+        return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
+
+    def plot(
+        self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None
+    ) -> np.ndarray:
+        """Draw depth in mm, greyer where less sure, with a colour bar; return the Matplotlib axes (1,).
+
+        The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
+        those of a new figure. Raises `InputError` if they are no Matplotlib axes.
+        """
+        from pcii.figures.plots import plot_depth
+
+        return plot_depth(axes, self.z_mm, self.confidence, z_range_mm)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DepthPosterior(ShortForm):
+    """What is known of the depth of blocks of `block_px` x `block_px` pixels of the virtual centre camera.
+
+    `probability` (Z, h, w) float32 is that of a surface at each of the `planes`, `no_surface` (h, w) that
+    there is none between the first and the last; their sum is 1. Planes are in order and evenly spaced in
+    total disparity. h x w are enough blocks for all pixels. Raises `InputError` for other shapes.
+    """
+
+    planes: FocalPlanes
+    probability: np.ndarray
+    no_surface: np.ndarray
+    block_px: int
+
+    def __post_init__(self) -> None:
+        h, w = (-(-size // self.block_px) for size in self.planes.grid.shape_HW)
+        if self.probability.shape != (len(self.planes), h, w) or self.no_surface.shape != (h, w):
+            raise InputError(
+                f"probability, no_surface: expected ({len(self.planes)}, {h}, {w}) and ({h}, {w}), got "
+                f"{self.probability.shape} and {self.no_surface.shape}"
+            )
+        object.__setattr__(self, "probability", read_only(self.probability))
+        object.__setattr__(self, "no_surface", read_only(self.no_surface))
+
+    def _facts(self) -> dict[str, object]:
+        return {"z_mm": listed(self.planes.z_mm.tolist()), "shape": times(self.probability.shape)}
+
+    def entropy_bits(self) -> np.ndarray:
+        """Entropy (h, w) of the distribution in bits, float64: 0 is a depth for sure, or surely none."""
+        outcomes = np.concatenate([self.probability, self.no_surface[None]]).astype(np.float64)
+        logarithm = np.log2(outcomes, out=np.zeros(outcomes.shape), where=outcomes > 0)
+        return np.maximum(-(outcomes * logarithm).sum(axis=0), 0)
+
+    def plot(self, axes: "Axes | None" = None, *, pixel: tuple[int, int] | None = None) -> np.ndarray:
+        """Draw how uncertain the depth is everywhere, or all that is known at one `pixel`, (row, column).
+
+        The former is the entropy in bits, the latter the probability of a surface at each depth. Returns the
+        Matplotlib axes (1,), by default of a new figure. Raises `InputError` for a pixel outside the view.
+        """
+        from pcii.figures.plots import plot_entropy, plot_probability
+
+        shape_HW = self.planes.grid.shape_HW
+        if pixel is None:
+            return plot_entropy(axes, self.entropy_bits(), len(self.planes), shape_HW, self.block_px)
+        is_inside = isinstance(pixel, tuple | list) and len(pixel) == 2 and all(map(is_whole, pixel))
+        if not is_inside or not all(0 <= n < size for n, size in zip(pixel, shape_HW, strict=True)):
+            raise InputError(f"pixel: expected (row, column) in a view of {times(shape_HW)}, got {pixel!r}")
+        i, j = pixel
+        a, b = i // self.block_px, j // self.block_px
+        probability, no_surface = self.probability[:, a, b], self.no_surface[a, b]
+        return plot_probability(axes, self.planes.z_mm, probability, no_surface, (i, j))
+
+    def most_probable(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The plane (h, w) int64 most probable with its neighbours, their probability, and a finer estimate.
+
+        The last, in px of total disparity, is the mean over the plane and two on either side.
+        """
+        near = self.probability.copy()
+        near[1:] += self.probability[:-1]
+        near[:-1] += self.probability[1:]
+        plane = near.argmax(axis=0)
+        confidence = np.minimum(np.take_along_axis(near, plane[None], axis=0)[0], 1.0)
+        at = plane + np.arange(-2, 3)[:, None, None]
+        inside = (at >= 0) & (at < len(self.planes))
+        at = np.clip(at, 0, len(self.planes) - 1)
+        weight = np.where(inside, np.take_along_axis(self.probability, at, axis=0), 0).astype(np.float64)
+        weight[2] += np.finfo(np.float32).tiny  # where all are 0 the plane itself is the mean
+        total_px = (weight * self.planes.total_disparity_px[at]).sum(axis=0) / weight.sum(axis=0)
+        return plane, confidence, total_px
+
+
+@dataclass(frozen=True, repr=False)
+class Score(ShortForm):
+    """Content of `score.json`: rows per plane, entropies per object, errors of depth, bounds, frames."""
+
+    planes: tuple[Mapping[str, Any], ...]
+    objects: tuple[Mapping[str, Any], ...]
+    depth: Mapping[str, Any]
+    dataset: str | None = None
+    bounds: Mapping[str, Any] = field(default_factory=dict)
+    readout: Mapping[str, Any] | None = None
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "dataset": self.dataset,
+            "methods": listed(list(dict.fromkeys(row["method"] for row in self.planes))),
+            "planes": len(self.planes),
+            "objects": len(self.objects),
+            "depth median_mm": self.depth.get("median_mm"),
+        }
+
+    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+        """Draw the IoU of masks, the shares of errors of depth, and how often depths are right by confidence.
+
+        Returns the Matplotlib axes (N,), one for each of these that is known, by default of a new figure.
+        Raises `InputError` for another number of `axes`.
+        """
+        from pcii.figures.score_panels import draw_score
+
+        return draw_score(axes, self.planes, self.bounds, self.depth)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The score as plain Python values, in the spelling of `score.json`."""
+        rows = {name: [dict(row) for row in getattr(self, name)] for name in ("planes", "objects")}
+        others = {"depth": dict(self.depth), "bounds": dict(self.bounds), "readout": self.readout}
+        return {"dataset": self.dataset, **rows, **others}
+
+
+def _is_bool(values: object) -> bool:
+    return isinstance(values, np.ndarray) and values.dtype == np.bool_
+
+
+def _described(values: object) -> str:
+    """What was given instead of an array that was expected."""
+    return f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else type(values).__name__

@@ -1,0 +1,184 @@
+"""Focal planes: the depths of sections, and by how much the views shift for each.
+
+Depths are validated and converted to disparities and shifts once, here; functions that make or read sections
+take the planes. Notation: (K, L) cameras, (H, W) pixels of a view, Z planes.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm, listed
+from pcii.types.arrays import check_z_mm, read_only
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.geometry import (
+    depth_of_total_disparity_mm,
+    disparity_px,
+    shifts_to_centre_px,
+    total_disparity_px,
+)
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.photon_events import PhotonEvents
+from pcii.types.truth import PhotonTruth
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FocalPlanes(ShortForm):
+    """Planes in which a camera grid is focused: `z_mm` (Z,) and `total_disparity_px` (Z,), both float64.
+
+    Make it with `at_depths`, `at_total_disparity` or `between`. The total disparity is the parallax over the
+    longer axis of the grid, without shear. Raises `InputError` for an empty list, for a depth that is not
+    finite or not above 0, and for one so near that views shift by 2^31 pixels.
+    """
+
+    grid: CameraGrid
+    z_mm: np.ndarray
+    total_disparity_px: np.ndarray
+    rounding: float = 0.5
+    """Whole shifts are floor(x + rounding): the nearest ones of sections, at 1/2."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "z_mm", read_only(self.z_mm))
+        object.__setattr__(self, "total_disparity_px", read_only(self.total_disparity_px))
+        across, down = np.abs(disparity_px(self.grid, self.z_mm))
+        with np.errstate(over="ignore"):
+            countable = np.maximum(across * self.grid.cols, down * self.grid.rows) < 2**31
+        if not countable.all():
+            near = self.z_mm[~countable][0]
+            raise InputError(f"z_mm: {near:g} mm is so near that views shift by more than 2^31 pixels")
+
+    @classmethod
+    def at_depths(cls, grid: CameraGrid, z_mm: object) -> "FocalPlanes":
+        """Planes at the planar depths `z_mm`, one number or a list of them.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=3, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=4
+        ... )
+        >>> FocalPlanes.at_depths(grid, [500, 1000]).whole_shifts_px[1].tolist()
+        [[-10, 0, 10], [-5, 0, 5]]
+        """
+        z = check_z_mm(z_mm)
+        return cls(grid, z, total_disparity_px(grid, z))
+
+    @classmethod
+    def at_total_disparity(cls, grid: CameraGrid, total_disparity_px: object) -> "FocalPlanes":
+        """Planes of these total disparities in px, (Z,) or one number, each above 0."""
+        total = np.atleast_1d(np.asarray(total_disparity_px, dtype=np.float64))
+        return cls(grid, check_z_mm(depth_of_total_disparity_mm(grid, total)), total)
+
+    @classmethod
+    def between(cls, grid: CameraGrid, z_near_mm: float, z_far_mm: float, step_px: float) -> "FocalPlanes":
+        """Planes from far to near whose total disparities differ by at most `step_px`, in equal steps.
+
+        Depth resolution is uniform in disparity, so planes uniform in depth would waste work far away.
+        """
+        near, far = total_disparity_px(grid, z_near_mm), total_disparity_px(grid, z_far_mm)
+        count = max(2, int(np.ceil((near - far) / step_px)) + 1)
+        return cls.at_depths(grid, depth_of_total_disparity_mm(grid, np.linspace(near, far, count)[::-1]))
+
+    def __len__(self) -> int:
+        return self.z_mm.size
+
+    def take(self, which: slice | np.ndarray | Sequence[int]) -> "FocalPlanes":
+        """The planes chosen by a slice, indices or a mask."""
+        return replace(self, z_mm=self.z_mm[which], total_disparity_px=self.total_disparity_px[which])
+
+    def followed_by(self, total_disparity_px: Sequence[float]) -> "FocalPlanes":
+        """These planes, followed by planes of the given total disparities in px."""
+        if not len(total_disparity_px):
+            return self
+        others = FocalPlanes.at_total_disparity(self.grid, total_disparity_px)
+        total = np.concatenate([self.total_disparity_px, others.total_disparity_px])
+        return replace(self, z_mm=np.concatenate([self.z_mm, others.z_mm]), total_disparity_px=total)
+
+    def _facts(self) -> dict[str, object]:
+        return {"z_mm": listed(self.z_mm.tolist())}
+
+    @cached_property
+    def exact_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
+        """Shifts of the rows (Z, K) and columns (Z, L) of cameras, float64, to the virtual centre.
+
+        A point of the plane that is at row i of camera row k is at row i + (k - (K-1)/2) d of the virtual
+        centre, d the disparity; not a whole number in general.
+        """
+        rows, cols = shifts_to_centre_px(self.grid, *disparity_px(self.grid, self.z_mm))
+        return read_only(rows), read_only(cols)
+
+    @cached_property
+    def whole_shifts_px(self) -> tuple[np.ndarray, np.ndarray]:
+        """The shifts of rows (Z, K) and columns (Z, L) to whole pixels, floor(x + `rounding`), int32."""
+        rows, cols = self.nearest_shifts_px(1)
+        return read_only(rows.astype(np.int32)), read_only(cols.astype(np.int32))
+
+    def nearest_shifts_px(self, step_px: int) -> tuple[np.ndarray, np.ndarray]:
+        """The shifts of rows (Z, K) and columns (Z, L) to multiples of `step_px`, int64.
+
+        They are the nearest for a `rounding` of 1/2: `floor(x + 1/2)` and not `round`, which rounds half to
+        even and makes half-pixel shifts alternate.
+        """
+        rows, cols = (
+            np.floor(exact / step_px + self.rounding).astype(np.int64) for exact in self.exact_shifts_px
+        )
+        return step_px * rows, step_px * cols
+
+    def voxel_indices(self, subpixel: int = 1, step_px: int = 1) -> tuple[np.ndarray, np.ndarray]:
+        """Voxel rows (Z, K, H) and columns (Z, L, W), int32, to which pixels of each camera belong.
+
+        With `subpixel` = 1 every camera moves by a multiple of `step_px` pixels; with M > 1 the centre of
+        pixel i goes to fine row floor((i + 1/2 + (k - (K-1)/2) d) M), 1/2 being the `rounding`. Pixels that
+        fall outside the section have an index below 0, or not below its size.
+        """
+        height, width = self.grid.height, self.grid.width
+        axes = zip(self.nearest_shifts_px(step_px), self.exact_shifts_px, (height, width), strict=True)
+        indices: list[np.ndarray] = []
+        for whole, exact, size in axes:
+            index = np.arange(size) + whole[..., None]
+            if subpixel > 1:
+                index = np.floor((np.arange(size) + self.rounding + exact[..., None]) * subpixel)
+            # Far outside the section indices may exceed 32 bits.
+            indices.append(np.clip(index, -1, size * subpixel).astype(np.int32))
+        return indices[0], indices[1]
+
+    def project(
+        self, photons: PhotonEvents | PhotonTruth, plane: int, subpixel: int = 1
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Voxel row and column (N,) int64 of photons in the section at a plane, and whether inside, bool."""
+        rows, cols = (index[0] for index in self.take([plane]).voxel_indices(subpixel))
+        row, col = rows[photons.k, photons.i].astype(np.int64), cols[photons.l, photons.j].astype(np.int64)
+        height, width = self.grid.height * subpixel, self.grid.width * subpixel
+        return row, col, (row >= 0) & (row < height) & (col >= 0) & (col < width)
+
+
+def planes_at(grid: CameraGrid, z_mm: object) -> FocalPlanes:
+    """Planes of `grid` at the depths `z_mm`; `FocalPlanes` are returned as they are.
+
+    Raises `InputError` for an invalid depth, or for planes of another grid.
+    """
+    if not isinstance(z_mm, FocalPlanes):
+        return FocalPlanes.at_depths(grid, z_mm)
+    if z_mm.grid != grid:
+        raise InputError("z_mm: these focal planes are of another camera grid")
+    return z_mm
+
+
+def check_data(data: object) -> None:
+    """Raise `InputError` unless sections can be made of `data`: `PhotonCounts` or `Views`."""
+    if not isinstance(data, PhotonCounts | Views):
+        expected = "PhotonCounts or Views (of a dataset its .counts or .views)"
+        raise InputError(f"data: expected {expected}, got {type(data).__name__}")
+
+
+def check_depth_counts(counts: object) -> None:
+    """Raise `InputError` unless `counts` are `PhotonCounts` of at least two views, which depth needs."""
+    if isinstance(counts, Views):
+        remedy = "draw them with pcii.limit_photons, or import with --photons N"
+        raise InputError(f"counts: needs photon counts, and these are images; {remedy}")
+    if not isinstance(counts, PhotonCounts):
+        expected = "PhotonCounts (of a dataset its .counts)"
+        raise InputError(f"counts: expected {expected}, got {type(counts).__name__}")
+    if counts.grid.view_count < 2:
+        raise InputError("counts: one view has no depth; at least 2 cameras are needed")

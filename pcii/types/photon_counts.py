@@ -1,0 +1,278 @@
+"""Photon counts of the elemental images, as sparse events or as a dense stack."""
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal, overload
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm, times
+from pcii.types.arrays import check_total, read_only, whole_counts
+from pcii.types.bayer import channel_count, check_cfa, colour_cells, colours_and_samples
+from pcii.types.camera_grid import CameraGrid, check_camera, chosen_cameras, grid_of, middle_camera
+from pcii.types.photon_events import (
+    PLAIN,
+    FrameEvents,
+    PhotonEvents,
+    Readout,
+    checked_pixels,
+    events_of,
+    sorted_events,
+    sorted_frames,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhotonCounts(ShortForm):
+    """Photon counts of every elemental image, as sparse events or as a dense stack, without ground truth.
+
+    Make it with `from_dense` or `from_events`. `cfa` is the Bayer pattern, None for monochrome; `readout` the
+    frames in which a single-photon camera counted, of whose counts these are the sums; `frame` (photons,), if
+    it is known, is the frame of each single count, in the order of the events.
+    """
+
+    grid: CameraGrid
+    cfa: str | None
+    _events: PhotonEvents | None = field(default=None, repr=False)
+    _dense: np.ndarray | None = field(default=None, repr=False)
+    readout: Readout = PLAIN
+    frame: np.ndarray | None = None
+
+    @classmethod
+    def from_dense(
+        cls,
+        counts_KLHW: np.ndarray,
+        grid: CameraGrid,
+        *,
+        cfa: str | None = None,
+        frames: int = 1,
+        bits: int | None = None,
+    ) -> "PhotonCounts":
+        """Counts from a copy of a dense stack (K, L, H, W) of whole numbers >= 0.
+
+        They are the sums of `frames`, each of which counts to 2^`bits` - 1, or without limit. Raises
+        `InputError` for another shape, and for negative, fractional or too large counts.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
+        ... )
+        >>> PhotonCounts.from_dense(np.ones((1, 2, 4, 6), dtype=np.uint16), grid, cfa="GRBG")
+        PhotonCounts(shape=1 x 2 x 4 x 6, cfa=GRBG, photons=48, storage=dense)
+        """
+        _check_sensor(grid, cfa)
+        counts = whole_counts("counts", counts_KLHW)
+        if counts.shape != grid.shape_KLHW:
+            raise InputError(f"counts: expected shape {grid.shape_KLHW}, got {counts.shape}")
+        check_total("counts", counts)
+        readout = Readout(frames, bits)
+        readout.check(counts)
+        own = counts.copy() if np.may_share_memory(counts, counts_KLHW) else counts
+        return cls(grid, cfa, _dense=read_only(own), readout=readout)
+
+    @classmethod
+    def from_events(
+        cls,
+        k: np.ndarray,
+        l: np.ndarray,
+        i: np.ndarray,
+        j: np.ndarray,
+        n: np.ndarray,
+        grid: CameraGrid,
+        *,
+        cfa: str | None = None,
+        frames: int = 1,
+        bits: int | None = None,
+        frame: np.ndarray | None = None,
+    ) -> "PhotonCounts":
+        """Counts from five equal-length lists: camera (k, l), pixel (i, j), photons n.
+
+        A pixel may appear more than once; its photons add up, over `frames` of `bits` as in `from_dense`.
+        `frame`, if known, is that of each single count, from 0: of the first `n`, then of the next. Raises
+        `InputError` for an index outside the grid, a negative, fractional or too large count, or lists of
+        different lengths.
+
+        >>> grid = CameraGrid(
+        ...     rows=1, cols=2, pitch_mm=(5.0, 5.0), focal_mm=50.0, pixel_mm=0.05, height=4, width=6
+        ... )
+        >>> counts = PhotonCounts.from_events([0, 0], [0, 1], [3, 3], [5, 4], [1, 2], grid)
+        >>> counts.total, counts.view(0, 1)[3].tolist()
+        (3, [0, 0, 0, 0, 2, 0])
+        """
+        _check_sensor(grid, cfa)
+        pixels = checked_pixels({"k": k, "l": l, "i": i, "j": j}, grid)
+        photons = whole_counts("n", np.atleast_1d(n)).astype(np.int64)
+        if len({column.shape for column in (*pixels, photons)}) != 1:
+            raise InputError("k, l, i, j, n: the five lists must have the same length")
+        check_total("n", photons)
+        readout = Readout(frames, bits)
+        events = sorted_events(pixels, photons, grid)
+        whole_counts("n", events.n)  # after those of one pixel are added up
+        readout.check(events.n)
+        if frame is not None:
+            frame = sorted_frames(pixels, photons, whole_counts("frame", frame), grid, readout)
+        return cls(grid, cfa, _events=events, readout=readout, frame=frame)
+
+    def _facts(self) -> dict[str, object]:
+        return {
+            "shape": times(self.grid.shape_KLHW),
+            "cfa": self.cfa,
+            "photons": self.total,
+            "frames": None if self.readout.is_plain else self.readout.frames,
+            "bits": self.readout.bits,
+            "storage": "events" if self.is_sparse else "dense",
+        }
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the counts are kept as events."""
+        return self._events is not None
+
+    @property
+    def dense(self) -> np.ndarray:
+        """The dense stack of counts (K, L, H, W); of events it is made at each call, int32 if they fit."""
+        if self._dense is not None:
+            return self._dense
+        events = self.events
+        dtype = np.int32 if events.n.max(initial=0) < 1 << 31 else np.int64  # signed: differences do not wrap
+        dense = np.zeros(self.grid.shape_KLHW, dtype)
+        dense[events.k, events.l, events.i, events.j] = events.n
+        return dense
+
+    @cached_property
+    def occupied_share(self) -> float:
+        """Share of the pixels that have photons."""
+        occupied = self.events.n.size if self._dense is None else int(np.count_nonzero(self._dense))
+        return occupied / math.prod(self.grid.shape_KLHW)
+
+    @cached_property
+    def events(self) -> PhotonEvents:
+        """The counts as events, one per pixel with photons, in (k, l, i, j) order."""
+        if self._events is not None:
+            return self._events
+        assert self._dense is not None
+        pixels = np.nonzero(self._dense)
+        return events_of(pixels, self._dense[pixels].astype(np.int64))
+
+    @cached_property
+    def frame_events(self) -> FrameEvents | None:
+        """Each single count with its frame, in the order of `events`; None if the frames were not kept."""
+        if self.frame is None and self.readout.frames > 1:
+            return None
+        e = self.events
+        frame = np.zeros(self.total, np.int32) if self.frame is None else self.frame
+        k, l, i, j = (read_only(index.repeat(e.n)) for index in (e.k, e.l, e.i, e.j))
+        return FrameEvents(k, l, i, j, read_only(frame))
+
+    @cached_property
+    def event_colours(self) -> np.ndarray:
+        """Colour of the pixel of each event, int64: 0, 1, 2 = R, G, B; 0 for monochrome."""
+        return read_only(colour_cells(self.cfa)[self.events.i % 2, self.events.j % 2])
+
+    @cached_property
+    def view_starts(self) -> np.ndarray:
+        """Index of the first event of each view k L + l, then the number of events; (K L + 1,) int64."""
+        view = self.events.k.astype(np.int64) * self.grid.cols + self.events.l
+        return read_only(np.searchsorted(view, np.arange(self.grid.view_count + 1)))
+
+    def view(self, k: int, l: int) -> np.ndarray:
+        """Dense counts (H, W) of camera (k, l); raises `InputError` for a camera outside the grid."""
+        check_camera(self.grid, (k, l))
+        if self._dense is not None:
+            return self._dense[k, l]
+        events = self.events
+        image = np.zeros(self.grid.shape_HW, dtype=np.int64)
+        number = k * self.grid.cols + l
+        of_view = slice(self.view_starts[number], self.view_starts[number + 1])
+        image[events.i[of_view], events.j[of_view]] = events.n[of_view]
+        return image
+
+    @overload
+    def __getitem__(self, cameras: tuple[int, int]) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, cameras: tuple[slice, int | slice] | tuple[int, slice]) -> "PhotonCounts": ...
+    def __getitem__(self, cameras: tuple[int | slice, int | slice]) -> "np.ndarray | PhotonCounts":
+        """Dense counts (H, W) of one camera, `counts[k, l]`, or `PhotonCounts` of some, `counts[1:4, ::2]`.
+
+        A number below 0 counts from the end; beside a slice a number chooses one row (column) of cameras. The
+        chosen cameras have their own virtual centre, which depth and truth of the whole grid share only if
+        they lie symmetrically in it. Raises `InputError` for cameras that are none or in another order, and
+        in a sheared grid for cameras that do not lie symmetrically.
+        """
+        rows, cols = chosen_cameras(self.grid, cameras)
+        if not any(isinstance(index, slice) for index in cameras):
+            return self.view(rows[0], cols[0])
+        grid = grid_of(self.grid, rows, cols)
+        if self._dense is not None:
+            dense = self._dense[rows.start : rows.stop : rows.step, cols.start : cols.stop : cols.step]
+            return PhotonCounts(grid, self.cfa, _dense=dense, readout=self.readout)
+        e = self.events
+        inside = np.isin(e.k, rows) & np.isin(e.l, cols)
+        k, l = (e.k[inside] - rows.start) // rows.step, (e.l[inside] - cols.start) // cols.step
+        events = events_of((k, l, e.i[inside], e.j[inside]), e.n[inside])
+        frame = None if self.frame is None else read_only(self.frame[inside.repeat(e.n)])
+        return PhotonCounts(grid, self.cfa, _events=events, readout=self.readout, frame=frame)
+
+    @cached_property
+    def total(self) -> int:
+        """Number of photons of all views."""
+        if self._dense is not None:
+            return int(self._dense.sum(dtype=np.int64))
+        return int(self.events.n.sum())
+
+    @property
+    def channel_count(self) -> int:
+        """Number of colours of sections of these counts: 3, or 1 for monochrome."""
+        return channel_count(self.cfa)
+
+    def plot(
+        self, axes: "Axes | None" = None, *, view: tuple[int, int] | Literal["mean"] | None = None
+    ) -> np.ndarray:
+        """Draw the photons of the camera `view`, (k, l), and return the Matplotlib axes (1,).
+
+        The default is the camera in the middle. "mean" is the mean of all views, in colours. `axes` are by
+        default those of a new figure. Raises `InputError` for a camera outside the grid.
+        """
+        from pcii.figures.plots import plot_view
+
+        if view == "mean":  # at its own exposure the sum looks like the mean
+            views = np.ndindex(self.grid.rows, self.grid.cols)
+            light = sum((self.view(k, l).astype(np.int64) for k, l in views), np.zeros((), np.int64))
+            title = f"mean of all views, photons: {self.total}"
+            return plot_view(axes, colours_and_samples(light[..., None], self.cfa), title)
+        k, l = check_camera(self.grid, middle_camera(self.grid) if view is None else view)
+        counts = self.view(k, l)
+        return plot_view(axes, counts, f"view ({k}, {l}), photons: {counts.sum()}")
+
+    def subsample(self, most: float, rng: np.random.Generator) -> "PhotonCounts":
+        """Counts of about `most` photons, each photon kept with the same probability.
+
+        The number of photons kept is binomial with mean `most`; Poisson counts stay Poisson counts. Counts of
+        no more than `most` photons are returned as they are. Raises `InputError` if `most` is not a number
+        of at least 0.
+        """
+        if not most >= 0:
+            raise InputError(f"most: expected a number of photons of at least 0, got {most!r}")
+        if self.total <= most:
+            return self
+        events, frame = self.events, None
+        if self.frame is None:
+            n = rng.binomial(events.n, most / self.total)
+        else:
+            is_sampled = rng.random(self.total) < most / self.total
+            event = np.arange(events.n.size).repeat(events.n)
+            n = np.bincount(event[is_sampled], minlength=events.n.size)
+            frame = read_only(self.frame[is_sampled])
+        lit = n > 0
+        events = events_of((events.k[lit], events.l[lit], events.i[lit], events.j[lit]), n[lit])
+        return PhotonCounts(self.grid, self.cfa, _events=events, readout=self.readout, frame=frame)
+
+
+def _check_sensor(grid: object, cfa: str | None) -> None:
+    if not isinstance(grid, CameraGrid):
+        raise InputError(f"grid: expected a CameraGrid, got {type(grid).__name__}")
+    check_cfa(cfa)

@@ -1,0 +1,117 @@
+"""Photon limiting of radiance (Muniraj et al. 2017, Eq. 1).
+
+The light of a scope is normalised to 1 and multiplied by a budget of photons: the expected photons of each
+pixel. A scope is a view, each colour of a view, or all views.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.srgb import LUMINANCE
+from pcii.types.arrays import is_whole
+from pcii.types.bayer import channel_count, colour_index, mosaic
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+
+MOST_PHOTONS = 1e12
+"""Largest budget of a view; sums stay exact."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """`photons` expected in each `scope`: a "view", a colour of a view ("channel") or all views ("scene")."""
+
+    photons: float
+    scope: str = "view"
+
+    @classmethod
+    def per_view(cls, photons: object) -> "Light":
+        """Light of so many photons in each view; `InputError` unless they are above 0 and at most 10^12."""
+        is_number = isinstance(photons, int | float | np.integer | np.floating)
+        if isinstance(photons, bool) or not is_number or not 0 < float(photons) <= MOST_PHOTONS:
+            raise InputError(
+                f"photons: expected a number above 0 and up to {MOST_PHOTONS:g}, got {photons!r}"
+            )
+        return cls(float(photons))
+
+
+def sense(radiance: np.ndarray, cfa: str | None) -> np.ndarray:
+    """What a sensor's pixels see of radiance (H, W, C): (H, W), same units and dtype.
+
+    A Bayer pixel keeps its own colour; a monochrome one the luminance of linear sRGB (float64 of whole
+    numbers), or the one channel that its camera has.
+    """
+    if radiance.shape[2] == 1:
+        return radiance[..., 0]
+    if cfa is not None:
+        return mosaic(radiance, cfa)
+    with np.errstate(over="ignore"):  # infinite energies are refused
+        luminance = radiance @ LUMINANCE
+        return luminance.astype(radiance.dtype) if radiance.dtype.kind == "f" else luminance
+
+
+def scope_energies(raw: np.ndarray, cfa: str | None, scope: str) -> np.ndarray:
+    """Energy of one view's mosaic, over which its scope is normalised: (C,) for channel, else (1,).
+
+    Sums are float64: float32 sums of a million pixels are wrong in the third digit.
+    """
+    if scope != "channel":
+        with np.errstate(over="ignore"):
+            return np.array([raw.sum(dtype=np.float64)])
+    colours = colour_index(raw.shape[0], raw.shape[1], cfa)
+    return np.bincount(colours.ravel(), raw.ravel(), minlength=channel_count(cfa))
+
+
+def photon_rates(raw: np.ndarray, cfa: str | None, light: Light, energies: np.ndarray) -> np.ndarray:
+    """Expected photons per pixel, (H, W) float64: the light shared out in proportion to `raw`.
+
+    `energies` are those of `scope_energies`, for scope "scene" summed over all views. A scope with
+    no light at all gets no photons. Raises `InputError` if radiance or its sum is not finite.
+    """
+    if not np.all(np.isfinite(energies)):
+        raise InputError("radiance: the view holds NaN or infinity, or more light than can be added up")
+    # The energy of the scope of each pixel, or of all.
+    own = energies[colour_index(raw.shape[0], raw.shape[1], cfa)] if light.scope == "channel" else energies[0]
+    with np.errstate(over="ignore"):
+        share = np.divide(light.photons, own, out=np.zeros_like(own), where=own > 0)
+    if np.isfinite(share).all():
+        return raw * share
+    # Of very faint light the pixel's part is taken first.
+    return light.photons * np.divide(raw, own, out=np.zeros(raw.shape), where=own > 0)
+
+
+def limit_photons(views: Views, photons: float, *, seed: int, cfa: str | None = None) -> PhotonCounts:
+    """Photon counts that cameras of such views would detect with `photons` expected in each view.
+
+    Counts are Poisson. `cfa` is the Bayer pattern of the sensor that full-colour views are seen by; without
+    one it is monochrome and sees their luminance. Mosaics keep their own. Each view has random numbers
+    of its own, which depend on `seed` and its number alone. Raises `InputError` for light below 0, for a
+    budget that is not above 0, and for a pattern other than that of the views.
+
+    >>> from pcii.types.camera_grid import CameraGrid
+    >>> grid = CameraGrid(rows=1, cols=2, pitch_mm=(5, 5), focal_mm=50, pixel_mm=0.05, height=40, width=60)
+    >>> views = Views(np.ones((1, 2, 40, 60, 3)), grid)
+    >>> limit_photons(views, 1000, seed=1, cfa="GRBG")
+    PhotonCounts(shape=1 x 2 x 40 x 60, cfa=GRBG, photons=2056, storage=events)
+    """
+    light = Light.per_view(photons)
+    if not is_whole(seed) or seed < 0:
+        raise InputError(f"seed: expected a whole number of at least 0, got {seed!r}")
+    has_one_channel = views.radiance.shape[4] == 1
+    if has_one_channel and cfa not in (None, views.cfa):
+        raise InputError(f"cfa: views of one channel have the pattern {views.cfa}, not {cfa}")
+    pattern, grid = views.cfa or cfa, views.grid
+    columns: list[list[np.ndarray]] = []
+    for number, (k, l) in enumerate(np.ndindex(grid.rows, grid.cols)):
+        raw = sense(views.view(k, l), pattern)
+        if raw.min() < 0:
+            raise InputError(f"radiance: view ({k}, {l}) holds light below 0")
+        rates = photon_rates(raw, pattern, light, scope_energies(raw, pattern, light.scope))
+        rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
+        counts = rng.poisson(rates)
+        i, j = np.nonzero(counts)
+        columns.append([np.full(i.size, k), np.full(i.size, l), i, j, counts[i, j]])
+    k, l, i, j, n = (np.concatenate(column) for column in zip(*columns, strict=True))
+    return PhotonCounts.from_events(k, l, i, j, n, grid, cfa=pattern)

@@ -1,0 +1,113 @@
+"""Ground truth of a dataset: depth, objects and surfaces, and the origin of each photon."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pcii.base.errors import InputError
+from pcii.base.short_form import ShortForm, listed, span, times
+from pcii.types.arrays import read_only
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+OPTIONAL_MAPS = ("normal", "coverage", "visible_views")
+"""Maps that a dataset may lack."""
+
+
+@dataclass(frozen=True, repr=False)
+class PhotonTruth:
+    """Origin of each detected photon: six arrays (N,).
+
+    Camera (k, l), pixel (i, j), and the `object_id` and planar `z_mm` of the first surface on its path.
+    """
+
+    k: np.ndarray
+    l: np.ndarray
+    i: np.ndarray
+    j: np.ndarray
+    object_id: np.ndarray
+    z_mm: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Truth(ShortForm):
+    """Surfaces in the image of the virtual centre camera, from first hits of rays through pixel centres.
+
+    `z_mm` (H, W) is planar depth, +inf where nothing was hit; `object_id` (H, W) is 0 for the
+    backdrop and for nothing, else a key of `names`. `photons` is known for simulated photons only.
+
+    The other maps are None where the dataset lacks them. `normal` (H, W, 3) float32: unit normal of the
+    surface in world axes, towards the camera; 0 where nothing is hit. `coverage` (H, W) float32: the share
+    of the pixel's square that belongs to the object (or to none) that its centre hits. `visible_views`
+    (H, W) uint16: how many cameras of the grid see the point; 0 where nothing is hit.
+    """
+
+    z_mm: np.ndarray
+    object_id: np.ndarray
+    names: Mapping[int, str]
+    photons: PhotonTruth | None = None
+    normal: np.ndarray | None = None
+    coverage: np.ndarray | None = None
+    visible_views: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.z_mm.ndim != 2 or self.object_id.shape != self.z_mm.shape:
+            raise InputError("z_mm, object_id: expected two maps (H, W) of the same shape")
+        if not (self.z_mm > 0).all():
+            raise InputError("z_mm: true depths are above 0 mm and never NaN; a miss is +inf")
+        unknown = set(np.unique(self.object_id).tolist()) - {0, *self.names}
+        if unknown:
+            raise InputError(f"object_id: id {min(unknown)} has no name")
+        shape = self.z_mm.shape
+        _check_map("normal", self.normal, (*shape, 3), np.float32, -1, 1)
+        _check_map("coverage", self.coverage, shape, np.float32, 0, 1)
+        _check_map("visible_views", self.visible_views, shape, np.uint16, 0, np.inf)
+        for name in ("z_mm", "object_id", *OPTIONAL_MAPS):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, read_only(getattr(self, name)))
+
+    def _facts(self) -> dict[str, object]:
+        hit = self.z_mm[np.isfinite(self.z_mm)]
+        photons = None if self.photons is None else self.photons.z_mm.size
+        objects = listed(list(self.names.values()))
+        return {"shape": times(self.z_mm.shape), "z_mm": span(hit), "photons": photons, "objects": objects}
+
+    @property
+    def has_objects(self) -> bool:
+        """Whether a pixel shows an object."""
+        return bool((self.object_id > 0).any())
+
+    @property
+    def object_z_mm(self) -> np.ndarray:
+        """Depth of the objects (H, W) in mm, +inf elsewhere; of everything, if no object is known."""
+        return np.where(self.object_id > 0, self.z_mm, np.inf) if self.has_objects else self.z_mm
+
+    def plot(
+        self,
+        axes: "Axes | Sequence[Axes] | np.ndarray | None" = None,
+        *,
+        z_range_mm: tuple[float, float] | None = None,
+    ) -> np.ndarray:
+        """Draw `object_z_mm`, and the objects with names beside them; return the Matplotlib axes (2,).
+
+        The scale of depth spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` has
+        two, by default of a new figure. Raises `InputError` for another number.
+        """
+        from pcii.figures.plots import plot_truth
+
+        return plot_truth(axes, self.object_z_mm, self.object_id, self.names, z_range_mm)
+
+
+def _check_map(
+    name: str, values: np.ndarray | None, shape: tuple[int, ...], dtype: type, least: float, most: float
+) -> None:
+    """Check an optional map, whose values may exceed their range by rounding, 1e-6."""
+    if values is None:
+        return
+    if values.shape != shape or values.dtype != dtype:
+        raise InputError(f"{name}: expected {np.dtype(dtype)} {shape}, got {values.dtype} {values.shape}")
+    if not ((values >= least - 1e-6) & (values <= most + 1e-6)).all():
+        raise InputError(f"{name}: expected values from {least} to {most}")

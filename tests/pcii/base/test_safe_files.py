@@ -1,0 +1,141 @@
+"""Writing that survives a kill, and locks."""
+
+import json
+import os
+import threading
+
+import pytest
+from stored_datasets import DENSE, make_dataset
+
+from pcii.base.safe_files import (
+    locked,
+    new_folder_safely,
+    replace_folder,
+    sweep_temporaries,
+    write_bytes_safely,
+    write_json_safely,
+)
+from pcii.store.dataset import open_dataset
+from pcii.store.dataset_layout import COUNTS, RADIANCE
+
+
+def disk_is_full(handle: int) -> None:
+    raise OSError("disk is full")
+
+
+def test_a_file_is_whole_under_its_name_and_leaves_no_temporary(tmp_path):
+    path = tmp_path / "new" / "folder" / "a.bin"
+    for content in (b"", b"first", b"second, longer"):
+        write_bytes_safely(path, content)
+        assert path.read_bytes() == content
+        assert [p.name for p in path.parent.iterdir()] == ["a.bin"]
+    assert path.stat().st_mode & 0o777 == 0o644
+
+
+def test_a_failed_write_leaves_the_old_content_and_no_temporary(tmp_path, monkeypatch):
+    path = tmp_path / "a.bin"
+    write_bytes_safely(path, b"old")
+    monkeypatch.setattr(os, "fsync", disk_is_full)
+    with pytest.raises(OSError, match=r"disk is full"):
+        write_bytes_safely(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.bin"]
+
+
+@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
+def test_json_refuses_what_json_cannot_say_and_keeps_the_old_file(tmp_path, bad):
+    path = tmp_path / "a.json"
+    write_json_safely(path, {"z_mm": 540})
+    with pytest.raises(ValueError, match=r"JSON compliant"):
+        write_json_safely(path, {"z_mm": bad})
+    assert json.loads(path.read_text()) == {"z_mm": 540}
+
+
+def test_a_killed_runs_scraps_are_swept_and_the_rest_is_kept(tmp_path):
+    root = make_dataset(tmp_path / "d")
+    (root / ".manifest.json.x1.tmp").write_bytes(b"half")
+    (root / f".{COUNTS}.x2.tmp").mkdir()
+    (root / f".{COUNTS}.x2.tmp" / "chunk").write_bytes(b"half")
+    (root / RADIANCE / ".view_00_00.exr.7.tmp").write_bytes(b"half")
+    sweep_temporaries(root)
+    assert [p.name for p in root.rglob("*.tmp")] == []
+    assert open_dataset(root).counts.total == DENSE.sum()
+
+
+def test_a_folder_takes_the_place_of_another_as_a_whole(tmp_path):
+    place = tmp_path / "group"
+    for content in ("first", "second"):
+        with new_folder_safely(place) as folder:
+            (folder / "inner").mkdir()
+            (folder / "inner" / content).write_text(content)
+            assert not (place / "inner" / content).exists()
+        assert [p.name for p in (place / "inner").iterdir()] == [content]
+        assert [p.name for p in tmp_path.iterdir()] == ["group"]
+
+
+def test_what_a_link_leads_to_is_replaced(tmp_path):
+    (tmp_path / "disk").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "disk")
+    with new_folder_safely(link) as new:
+        (new / "file").write_text("whole")
+    assert link.is_symlink()
+    assert (tmp_path / "disk" / "file").read_text() == "whole"
+
+
+def test_a_folder_that_cannot_be_replaced_stays(tmp_path):
+    place = tmp_path / "group"
+    place.mkdir()
+    (place / "old").touch()
+    with pytest.raises(FileNotFoundError):
+        replace_folder(missing(tmp_path / "new"), place)
+    assert [p.name for p in place.iterdir()] == ["old"]
+    assert [p.name for p in tmp_path.iterdir()] == ["group"]
+
+
+def missing(folder):
+    """A folder that is gone by the time that it is renamed."""
+
+    class Vanishing(type(folder)):
+        def rglob(self, pattern):
+            self.rmdir()
+            return []
+
+    folder.mkdir()
+    return Vanishing(folder)
+
+
+# Locks
+
+
+def test_one_writer_at_a_time(tmp_path):
+    second = locked(tmp_path / "lock", wait=False)
+    with locked(tmp_path / "lock", wait=False), pytest.raises(BlockingIOError):
+        second.__enter__()
+
+
+def test_a_process_that_waited_for_a_lock_that_was_deleted_holds_a_new_one(tmp_path):
+    path, order = tmp_path / "lock", []
+
+    def waits():
+        with locked(path, wait=True) as file:
+            order.append("second")
+            order.append(path.exists() and os.path.samestat(os.fstat(file.fileno()), path.stat()))
+
+    with locked(path, wait=True):
+        thread = threading.Thread(target=waits)
+        thread.start()
+        thread.join(0.2)
+        order.append("first")
+        path.unlink()
+    thread.join(5)
+    assert order == ["first", "second", True]
+
+
+def test_a_lock_is_got_in_a_folder_that_is_not_there_or_was_deleted(tmp_path):
+    path = tmp_path / "new" / "lock"
+    for _ in range(2):
+        with locked(path, wait=False) as file:
+            assert os.path.samestat(os.fstat(file.fileno()), path.stat())
+            path.unlink()
+            path.parent.rmdir()

@@ -1,0 +1,133 @@
+"""Collections as they are opened: filtered, split, and nothing trusted that was changed."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pcii.base.errors import InputError
+from pcii.store.collection import Collection, open_collection
+from pcii.store.collection_layout import COLLECTION_FOLDER, INDEX, index_row, split_of, write_index
+from pcii.store.dataset_layout import MANIFEST, read_manifest, write_manifest
+from pcii.store.verification import verify
+
+GRID = {"rows": 1, "cols": 2, "pitch_mm": (5, 5), "focal_mm": 50, "pixel_mm": 0.05, "height": 4, "width": 6}
+FIELDS = ["scene_number", "photons.budget", "seed"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Twenty scenes with two seeds each, without arrays."""
+    root = tmp_path / "scenes"
+    root.mkdir()
+    rows = []
+    for number in range(20):
+        for seed in (1, 2):
+            name, values = (
+                f"scene_{number}_seed_{seed}",
+                {"scene_number": number, "photons.budget": 100, "seed": seed},
+            )
+            (root / name).mkdir()
+            recipe = {"scene": "drawn", "scene_number": number, "seed": seed, "photons": {"budget": 100}}
+            manifest = {"grid": GRID, "cfa": None, "files": {}, "recipe": recipe, "identity": name}
+            write_manifest(root / name, manifest)
+            rows.append(index_row(name, values, read_manifest(root / name), root / name / MANIFEST))
+    COLLECTION_FOLDER.write(root, {"fields": FIELDS})
+    write_index(root, rows)
+    return root
+
+
+@pytest.fixture
+def collection(folder: Path) -> Collection:
+    return open_collection(folder)
+
+
+def test_datasets_are_opened_in_the_order_of_the_index(collection: Collection) -> None:
+    assert len(collection) == 40
+    assert collection[3].path.name == "scene_1_seed_2"
+    assert collection[-1].path.name == "scene_19_seed_2"
+    assert [dataset.path.name for dataset in collection[:2]] == ["scene_0_seed_1", "scene_0_seed_2"]
+    assert "40" in repr(collection)
+
+
+def test_datasets_are_found_by_any_value(collection: Collection) -> None:
+    assert len(collection.where(seed=2)) == 20
+    assert [row["path"] for row in collection.where(scene_number=7, seed=1).rows] == ["scene_7_seed_1"]
+    assert len(collection.where(budget=100)) == 40  # the last part of photons.budget
+    assert len(collection.where(lambda row: row["scene_number"] < 3)) == 6
+    with pytest.raises(InputError, match="no column 'sead'; there are path, scene"):
+        collection.where(sead=2)
+    with pytest.raises(
+        InputError, match=r"no dataset has split = 'tset'; there are \[train, validation, test\]"
+    ):
+        collection.where(split="tset")
+    assert len(collection.where(split="test", scene_number=0)) == 0
+
+
+def test_all_datasets_of_a_scene_are_in_one_part(collection: Collection) -> None:
+    parts = {name: collection.where(split=name) for name in ("train", "validation", "test")}
+    assert [len(part) for part in parts.values()] == [32, 4, 4]
+    scenes = [{row["scene_number"] for row in part.rows} for part in parts.values()]
+    assert set.union(*scenes) == set(range(20))
+    assert sum(map(len, scenes)) == 20
+    assert {row["scene_number"] for row in parts["test"].rows} == {9, 19}
+    shares = np.bincount([["train", "validation", "test"].index(split_of(n)) for n in range(1000)])
+    assert list(shares) == [800, 100, 100]
+
+
+def test_the_table_has_a_column_for_each_field(collection: Collection) -> None:
+    table = collection.table()
+    assert set(table) == {"path", "scene", "scene_number", "seed", "split", "photons", "photons.budget"}
+    assert table["seed"] == 20 * [1, 2]
+    assert table["photons.budget"] == 40 * [100]
+
+
+def test_a_whole_collection_passes(folder: Path) -> None:
+    assert verify(folder) == 2 + 40
+
+
+def forge_a_path(folder: Path) -> None:
+    rows = [json.loads(line) for line in (folder / INDEX).read_text().splitlines()[:-1]]
+    rows[0]["path"] = "../elsewhere"
+    write_index(folder, rows)
+
+
+def forge_the_fields(folder: Path) -> None:
+    COLLECTION_FOLDER.write(folder, {"fields": 3})
+
+
+def exchange_manifests(folder: Path) -> None:
+    shutil.copy(folder / "scene_5_seed_1" / MANIFEST, folder / "scene_4_seed_1" / MANIFEST)
+
+
+def lose_a_dataset(folder: Path) -> None:
+    shutil.rmtree(folder / "scene_4_seed_1")
+
+
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (forge_a_path, "not of a dataset in this folder"),
+        (forge_the_fields, "fields: "),
+        (exchange_manifests, "is not the one that"),
+        (lose_a_dataset, "missing or unfinished"),
+    ],
+)
+def test_what_no_checksum_of_a_file_tells_is_found(
+    folder: Path, harm: Callable[[Path], None], words: str
+) -> None:
+    """Other damage is in test_verification.py."""
+    harm(folder)
+    with pytest.raises(InputError, match=words):
+        verify(folder)
+
+
+def test_a_dataset_that_the_index_does_not_know_is_not_opened(folder: Path) -> None:
+    exchange_manifests(folder)
+    collection = open_collection(folder)
+    assert collection.where(scene_number=5, seed=1)[0].path.name == "scene_5_seed_1"
+    with pytest.raises(InputError, match=r"is not the one that index\.jsonl lists"):
+        collection.where(scene_number=4, seed=1)[0]

@@ -1,0 +1,117 @@
+from typing import Any
+
+import numpy as np
+import pytest
+from twins import unit_grid
+
+from pcii.base.errors import InputError
+from pcii.removal.methods import segment
+from pcii.sections.reconstruction import reconstruct
+from pcii.types.camera_grid import CameraGrid
+from pcii.types.estimates import DepthMap, Segmented
+from pcii.types.focal_planes import FocalPlanes
+from pcii.types.images import Views
+from pcii.types.photon_counts import PhotonCounts
+from pcii.types.section_stack import Sections
+from pcii.types.truth import Truth
+
+GOOD: dict[str, Any] = {
+    "rows": 2,
+    "cols": 3,
+    "pitch_mm": (5.0, 5.0),
+    "focal_mm": 50.0,
+    "pixel_mm": 0.03,
+    "height": 4,
+    "width": 6,
+}
+NAN, INF = float("nan"), float("inf")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        *(("rows", value, "at least 1") for value in (0, 2.0, True, None)),
+        *(("focal_mm", value, "above 0 mm") for value in (0, NAN, INF, "5", True)),
+        *(("pitch_mm", value, "above 0 mm") for value in (5.0, (5.0,), (5.0, 0.0), (5.0, NAN), (True, 5.0))),
+        *(("shear_px", value, "numbers") for value in (1.0, None, (1.0, NAN), ("1", 1.0))),
+    ],
+)
+def test_a_camera_grid_that_cannot_be_is_refused_by_name(name, value, words):
+    with pytest.raises(InputError, match=f"^{name}: .*{words}"):
+        CameraGrid(**{**GOOD, name: value})
+
+
+@pytest.mark.parametrize("bad", [0, [540, -1], NAN, INF, [], [[540.0]], "near", [[540], [620, 700]]])
+def test_depths_that_cannot_be_are_refused(bad):
+    with pytest.raises(InputError, match=r"^z_mm: "):
+        FocalPlanes.at_depths(CameraGrid(**GOOD), bad)
+
+
+FILM = unit_grid(1, 1, 2, 2)
+ONES, IDS = np.ones((2, 2)), np.zeros((2, 2), dtype=int)
+STACK, MASKS = np.zeros((1, 2, 2, 1)), np.zeros((1, 2, 2), dtype=bool)
+
+
+def sections() -> Sections:
+    return Sections(FocalPlanes.at_depths(FILM, 1.0), STACK, STACK)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Views(np.zeros((1, 1, 2, 3, 3)), FILM), "radiance: expected shape"),
+        (lambda: Views(np.zeros((1, 1, 2, 2, 3)), FILM, cfa="GRBG"), "radiance: a Bayer mosaic has one"),
+        (lambda: Views(np.zeros((1, 1, 2, 2, 1), dtype=complex), FILM), "radiance: expected real numbers"),
+        (lambda: Views(np.ones((1, 1, 2, 2, 1), ">u2"), FILM), "radiance: .*sRGB"),
+        (lambda: Sections(FocalPlanes.at_depths(FILM, [1.0, 2.0]), STACK, STACK), "counts: "),
+        (lambda: Sections(FocalPlanes.at_depths(FILM, 1.0), STACK, STACK[..., 0]), "coverage: "),
+        (lambda: Segmented(MASKS * 1.0, "none", sections()), "in_focus: expected bool"),
+        (
+            lambda: Segmented(MASKS, "none", sections(), photon_in_focus=np.zeros((2, 5), dtype=bool)),
+            r"photon_in_focus: expected bool \(1, events\)",
+        ),
+        (lambda: DepthMap(ONES, ONES[:1]), "z_mm, confidence: "),
+        (lambda: Truth(ONES * NAN, IDS, {}), "z_mm: true depths are above 0 mm and never NaN"),
+        (lambda: Truth(ONES, IDS + 2, {1: "ball"}), "object_id: id 2 has no name"),
+        (lambda: Truth(ONES, IDS, {}, coverage=ONES), r"coverage: expected float32 \(2, 2\)"),
+        (
+            lambda: Truth(ONES, IDS, {}, coverage=np.full((2, 2), 1.1, np.float32)),
+            "coverage: expected values",
+        ),
+        (lambda: PhotonCounts.from_dense(IDS, {"rows": 1}), "grid: expected a CameraGrid, got dict"),  # type: ignore[arg-type]
+        (lambda: reconstruct(IDS, [1.0]), r"data: expected PhotonCounts or Views .*, got ndarray"),  # type: ignore[arg-type]
+        (lambda: segment(IDS, [1.0]), r"counts: expected PhotonCounts .*, got ndarray"),  # type: ignore[arg-type]
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(make, words):
+    with pytest.raises(InputError, match=f"^{words}"):
+        make()
+
+
+def test_no_array_of_a_result_can_be_written_to():
+    grid = unit_grid(1, 2, 2, 2)
+    sections = reconstruct(PhotonCounts.from_dense(np.ones(grid.shape_KLHW, dtype=int), grid), 1.0)
+    focus = Segmented(np.ones((1, 2, 2), dtype=bool), "none", sections)
+    depth = DepthMap(np.ones((2, 2)), np.ones((2, 2)))
+    truth = Truth(np.ones((2, 2)), np.zeros((2, 2), dtype=int), {})
+    views = Views(np.ones((*grid.shape_KLHW, 1)), grid)
+    arrays = (sections.counts, sections.coverage, sections.estimate, sections.z_mm, focus.in_focus)
+    more = (depth.z_mm, depth.confidence, truth.z_mm, truth.object_id, views.radiance)
+    assert not any(np.asarray(a).flags.writeable for a in (*arrays, *more))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_view_with_nan_or_infinity_is_refused_by_its_place(bad):
+    radiance = np.zeros((2, 2, 3, 3, 1))
+    radiance[1, 0, 2, 2] = bad
+    views = Views(radiance, unit_grid(2, 2, 3, 3))
+    np.testing.assert_array_equal(views.view(0, 1), np.zeros((3, 3, 1)))
+    with pytest.raises(InputError, match=r"view \(1, 0\) holds NaN or infinity"):
+        reconstruct(views, 1.0)
+
+
+def test_removal_keeps_what_is_in_focus():
+    grid = unit_grid(1, 1, 1, 2)
+    stack = Sections(FocalPlanes.at_depths(grid, 1.0), np.array([[[[6], [8]]]]), np.full((1, 1, 2, 1), 2))
+    focus = Segmented(np.array([[[True, False]]]), "none", stack)
+    np.testing.assert_array_equal(focus.cleaned, [[[[3.0], [0.0]]]])
