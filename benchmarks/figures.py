@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks.results import Measured, Parameter, Row, Study, Value, label
 from pcii.figures.charts import few_ticks, quiet_grid
-from pcii.figures.palette import COLOURS, MARKERS
+from pcii.figures.panels import COLOURS, MARKERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

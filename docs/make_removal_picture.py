@@ -29,7 +29,7 @@ def main(dataset: Path) -> None:
     truth = TrueFocus(focus.sections.planes, data.truth).by_object
     steps = focus.steps
     estimate = focus.sections.estimate
-    white = white_level(estimate[0], (slice(None), slice(None)))
+    white = white_level(estimate[0])
     spread = np.quantile(steps["variance"], 0.999)
     bits = steps["entropy"][steps["entropy"] > 0]
     shown = [

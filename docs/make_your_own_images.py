@@ -65,7 +65,7 @@ def sections(images: pcii.Views | pcii.PhotonCounts, z_mm: tuple[float, ...], po
     for z, image in zip(z_mm, pcii.reconstruct(images, z_mm).estimate, strict=True):
         H, W = (size // pool_px * pool_px for size in image.shape[:2])
         cells = image[:H, :W].reshape(H // pool_px, pool_px, W // pool_px, pool_px, 3).mean(axis=(1, 3))
-        yield z, to_srgb8(cells, white_level(cells, (slice(None), slice(None))))
+        yield z, to_srgb8(cells, white_level(cells))
 
 
 def main(folder: Path) -> None:

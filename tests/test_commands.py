@@ -129,10 +129,6 @@ def test_run_takes_the_methods_it_is_told(
         pcii_cli.app, ["run", data, "--method", "sharp", "-o", str(out)], capsys
     )
     assert "z_mm" in refusal(pcii_cli.app, ["run", data, "--z-mm", "-1", "-o", str(out)], capsys)
-    smoothing = ["--smoothing-px", "-1"]
-    assert "smoothing_px: expected" in refusal(
-        pcii_cli.app, ["run", data, *smoothing, "-o", str(out)], capsys
-    )
     assert not out.exists()
     assert command_line.run(pcii_cli.app, ["run", data, *asked, "-o", str(out)]) == 0
     rows = json.loads((out / "score.json").read_text())["planes"]

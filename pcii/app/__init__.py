@@ -8,15 +8,14 @@ long_steps       The long steps of an analysis; what an earlier run did is kept 
                  from has changed.
 pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2
                  and 3.
-report           report.html: a slider through the depths, and the paper's figures and table for one
-                 dataset with its truth.
-report_figures   Pictures of a report: the panels of the paper's Figures 6 and 7, and the depth map with its
-                 error.
-report_origin    How a report was made: commands, dates, machine, recipe, versions, hashes, and what was
-                 skipped.
+report           report.html: a slider through the depths, pictures of each plane, depth, scores, and how it
+                 was made.
+report_pictures  Pictures of a report: a view, and for each plane its section, masks and truth; depth, error,
+                 confidence.
 report_slider    Sections through the whole depth range, for the slider of a report, and what is read out at a
                  pixel.
-report_tables    Numbers of a report as text: key facts, Table 1, scores of the masks and of the depth map.
+report_tables    Numbers of a report as text: key facts, entropies of the objects, scores of the masks and
+                 of the depth map.
 results          The folder of results that commands write and later commands read.
 single_run       Analysis of one dataset with all its results written: sections, masks, depth, scores and
                  report.

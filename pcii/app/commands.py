@@ -54,7 +54,6 @@ def run(
     method: tuple[str, ...] = (),
     depth_method: str = DEFAULT_METHOD,
     budget: Budget = None,
-    smoothing_px: float | None = None,
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
@@ -80,16 +79,11 @@ def run(
         A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     depth_method
         A method of depth, as in `pcii depth`.
-    smoothing_px
-        Standard deviation of the Gaussian with which the report shows photons of sections, in pixels; 0 for
-        none. Default: the wider the fewer photons there are. Nothing else is smoothed.
     """
     from pcii.app.single_run import run as run_all
 
     with Stages() as report:
-        outcome = run_all(
-            opened(dataset, budget), out, z_mm, report, method or None, depth_method, smoothing_px
-        )
+        outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None, depth_method)
     if outcome.kept:
         say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
     for row in outcome.score.planes:

@@ -1,85 +1,90 @@
-"""report.html: a slider through the depths, and the paper's figures and table for one dataset with its truth.
+"""report.html: a slider through the depths, pictures of each plane, depth, scores, and how it was made.
 
 A single file that fetches nothing, which can be mailed, archived and printed. Its pictures and text need no
 script; the slider and the read-out are by the one in `pcii/evaluation/templates/report.js`.
 """
 
+import json
+import shlex
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
+from pcii.app.command_options import budget_words
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Crop, Shown, depth_panels, figure6, figure7
-from pcii.app.report_origin import origin
+from pcii.app.report_pictures import Pictures, Row, depth_panels, input_panels, plane_panels
 from pcii.app.report_slider import slider
-from pcii.app.report_tables import depth_table, key_facts, score_table, table1
+from pcii.app.report_tables import depth_table, entropy_table, key_facts, score_table
 from pcii.base.progress import Report, silent
 from pcii.base.safe_files import write_bytes_safely
+from pcii.depth.methods import DEFAULT_METHOD
+from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.pages import page
-
-PAPER_SCENE, PAPER_PLANES_MM = "two_objects", [540.0, 620.0]
-PAPER_TABLE_1 = (("object 1", "1.04", "1.35"), ("object 2", "1.44", "1.05"))
+from pcii.evaluation.provenance import machine, software_of
 
 COARSE_PX = 320
 """Smaller pictures are enlarged with sharp pixels."""
 
 
-def write_report(
-    path: Path, outcome: Outcome, report: Report = silent, smoothing_px: float | None = None
-) -> None:
-    """Write the report of one run as a self-contained HTML file.
-
-    Photons of sections are shown smoothed by a Gaussian with a standard deviation of `smoothing_px`: by
-    default what so many photons need, 0 for none.
-    """
-    content = _content(outcome, smoothing_px, report)
-    write_bytes_safely(path, page("report.html.j2", content, script="report.js"))
-
-
-def _content(outcome: Outcome, asked_px: float | None, report: Report) -> dict[str, Any]:
-    dataset, shown = outcome.dataset, Shown.of(outcome, asked_px)
-    manifest, truth, crop = dataset.manifest, dataset.truth, shown.crop
-    return {
-        "title": manifest.get("title") or dataset.name,
+def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
+    """Write the report of one run as a self-contained HTML file."""
+    dataset, pictures = outcome.dataset, Pictures.of(outcome)
+    truth, crop = dataset.truth, pictures.crop
+    content = {
+        "title": dataset.manifest.get("title") or dataset.name,
         "grid": dataset.grid,
         "cfa": dataset.cfa,
         "photons": dataset.counts.total if dataset.has_counts else None,
-        "has_radiance": dataset.views is not None,
         "has_truth": truth is not None,
-        "has_objects": truth is not None and truth.has_objects,
-        "is_paper": _is_paper(outcome),
-        "paper_table1": PAPER_TABLE_1,
         "facts": key_facts(outcome),
-        "crop": {
-            "words": _crop_in_words(crop, dataset.grid.height, dataset.grid.width),
-            "width": crop.width_px,
-            "height": crop.height_px,
-            "is_coarse": max(crop.width_px, crop.height_px) < COARSE_PX,
-        },
-        "smoothing_px": shown.smoothing_px,
-        "slider": slider(shown, report),
-        "figure6": figure6(shown),
-        "figure7": figure7(shown),
-        "depth": depth_panels(shown),
-        "has_depths": bool(np.isfinite(outcome.depth.z_mm).any()),
-        "depth_range": [f"{z:g}" for z in outcome.z_range_mm],
-        "error_limit": f"{shown.error_mm[1]:g}" if truth is not None else None,
+        "crop": crop,
+        "is_coarse": max(crop.width_px, crop.height_px) < COARSE_PX,
+        "smoothing_px": pictures.smoothing_px,
+        "slider": slider(pictures, report),
+        "input": input_panels(pictures),
+        "planes": plane_panels(pictures),
+        "depth": depth_panels(pictures),
         "depth_table": depth_table(outcome),
-        "table1": table1(outcome),
+        "entropies": entropy_table(outcome),
         "scores": score_table(outcome),
-        "origin": origin(outcome, asked_px),
+        "origin": origin(outcome),
+        "recipe": json.dumps(dataset.manifest.get("recipe"), indent=1, ensure_ascii=False).splitlines(),
     }
+    write_bytes_safely(path, page("report.html.j2", content, script="report.js"))
 
 
-def _is_paper(outcome: Outcome) -> bool:
-    """Whether figures and tables are those of the paper, and may have their numbers."""
-    recipe = outcome.dataset.manifest.get("recipe") or {}
-    return recipe.get("scene") == PAPER_SCENE and outcome.sections.z_mm.tolist() == PAPER_PLANES_MM
+def origin(outcome: Outcome) -> list[Row]:
+    """How the report and its dataset were made: names and values, folders by their names alone."""
+    manifest = outcome.dataset.manifest
+    methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))
+    versions = {name: text for method in methods for name, text in software_of(method).items()}
+    seconds = ", ".join(f"{name} {value:.2f} s" for name, value in outcome.timings_s.items())
+    rows = [
+        ("command", _command(outcome)),
+        ("date", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC"),
+        ("machine", machine()),
+        ("time", seconds),
+        ("software", _versions(versions)),
+        ("dataset", outcome.dataset.name),
+    ]
+    rows += [(key, str(manifest[key])) for key in ("origin", "licence", "citation") if manifest.get(key)]
+    if manifest.get("versions"):
+        rows.append(("dataset made by", _versions(manifest["versions"])))
+    if manifest.get("identity"):
+        rows.append(("identity", manifest["identity"]))
+    return rows
 
 
-def _crop_in_words(crop: Crop, height: int, width: int) -> str:
-    whole = (crop.height_px, crop.width_px) == (height, width)
-    rows, cols = (f"{side.start} to {side.stop - 1}" for side in (crop.rows, crop.cols))
-    part = "the whole frame" if whole else f"rows {rows}, columns {cols} of the frame"
-    return part if crop.step_px == 1 else f"{part}, {crop.step_px} × {crop.step_px} pixels as one"
+def _versions(versions: dict[str, str]) -> str:
+    return ", ".join(f"{name} {number}" for name, number in versions.items())
+
+
+def _command(outcome: Outcome) -> str:
+    """The command that makes the same report, with all that it may leave out."""
+    words = ["pcii", "run", outcome.dataset.name, "-o", "RESULTS"]
+    for z in outcome.sections.z_mm:
+        words += ["--z-mm", f"{z:.17g}" if float(f"{z:g}") != z else f"{z:g}"]
+    for focus in outcome.focus:
+        words += ["--method", focus.method]
+    if outcome.depth_method != DEFAULT_METHOD:
+        words += ["--depth-method", outcome.depth_method]
+    return shlex.join([*words, *budget_words(outcome.dataset)])

@@ -1,30 +1,27 @@
-"""Numbers of a report as text: key facts, Table 1, scores of the masks and of the depth map.
+"""Numbers of a report as text: key facts, entropies of the objects, scores of the masks and of the depth map.
 
 A column or row of which nothing is known is left out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from pcii.app.pipeline import Outcome
-from pcii.evaluation.entropy_intervals import entropy_half_widths
-from pcii.evaluation.summary import object_planes
-from pcii.evaluation.tables import METHOD, Column, Table, tabulated
-from pcii.sections.photon_statistics import saturation_loss
+from pcii.evaluation.tables import Table
 
-Row = Mapping[str, Any]
-NUMBERS = (
-    ("IoU", "iou"),
-    ("oracle", "iou_oracle"),
-    ("precision", "precision"),
-    ("recall", "recall"),
-    ("F1", "f1"),
-    ("boundary F", "boundary_f"),
-    ("photon precision", "photon_precision"),
-    ("photon recall", "photon_recall"),
-    ("entropy before", "entropy_before"),
-    ("entropy after", "entropy_after"),
-)
+NUMBERS = {
+    "iou": "IoU",
+    "iou_oracle": "oracle",
+    "precision": "precision",
+    "recall": "recall",
+    "f1": "F1",
+    "boundary_f": "boundary F",
+    "photon_precision": "photon precision",
+    "photon_recall": "photon recall",
+    "entropy_before": "entropy before",
+    "entropy_after": "entropy after",
+    "claimed_share": "claimed share",
+}
 """Columns of the scores after those that say what is scored."""
 
 
@@ -33,71 +30,33 @@ def key_facts(outcome: Outcome) -> list[tuple[str, str]]:
     dataset, score = outcome.dataset, outcome.score
     facts: list[tuple[str, str]] = []
     if dataset.has_counts:
-        counts, readout = dataset.counts, dataset.counts.readout
-        facts.append(("photons per view", f"{counts.total / dataset.grid.view_count:,.0f}"))
-        if not readout.is_plain:
-            bits = "" if readout.bits is None else f" of {readout.bits} bit{'s' * (readout.bits > 1)}"
-            facts.append(("frames", f"{readout.frames:,}{bits}"))
-        if readout.bits is not None:
-            facts.append(("photons lost to saturation", f"{100 * saturation_loss(counts):.2g} %"))
+        facts.append(("photons per view", f"{dataset.counts.total / dataset.grid.view_count:,.0f}"))
     for focus in outcome.focus:
-        ious = [
-            row["iou"] for row in _rows_of(score.planes, focus.method, "object") if row["object"] is not None
-        ]
+        rows = [row for row in score.planes if row["method"] == focus.method and row["truth"] == "object"]
+        ious = [row["iou"] for row in rows if row["object"] is not None]
         if ious and None not in ious:
-            name = "IoU" if len(ious) == 1 else "mean IoU"
-            facts.append((f"{name} of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
-    if score.depth["median_mm"] is not None:
-        facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
-        facts.append(("bias of depth", _bias(f"{score.depth['bias_mm']:+.2f} mm", score.depth["bias_mm"])))
-        facts.append(("depths off by more than 1 px", _percent(score.depth["bad_1px"])))
+            facts.append((f"mean IoU of {focus.method}", f"{sum(ious) / len(ious):.3f}"))
+    if score.depth["median_mm"] is None:
+        facts.append(("pixels with a depth", f"{(outcome.depth.confidence > 0).mean():.1%}"))
     else:
-        facts.append(("pixels with a depth", _percent(float((outcome.depth.confidence > 0).mean()))))
+        facts.append(("median error of depth", f"{score.depth['median_mm']:.2f} mm"))
+        facts.append(("depths off by more than 1 px", f"{score.depth['bad_1px']:.1%}"))
     return facts
 
 
-def _rows_of(planes: Sequence[Row], method: str, kind: str) -> list[Row]:
-    return [row for row in planes if row["method"] == method and row["truth"] == kind]
-
-
-def table1(outcome: Outcome) -> dict[str, Any] | None:
-    """Entropies of the objects with their intervals, and whether each is lowest at its plane."""
-    objects, truth = outcome.score.objects, outcome.dataset.truth
-    if truth is None or all(bits is None for row in objects for bits in row["entropy"].values()):
-        return None
-    halves = entropy_half_widths(outcome.dataset.counts, outcome.sections, truth)
-    seen = [
-        (row["name"], row["entropy"], half)
-        for row, half in zip(objects, halves or [{}] * len(objects), strict=True)
-        if None not in row["entropy"].values()
-    ]
-    columns: list[Column] = [("object", lambda entry: entry[0])]
-    lowest: dict[str, set[int]] = {}
-    depths = list(objects[0]["entropy"])
-    for z in depths:
-        columns.append((f"{z} mm", lambda entry, z=z: _with_half_width(entry[1][z], entry[2].get(z))))
-        least = {number for number, (_, bits, _) in enumerate(seen) if bits[z] == min(bits.values())}
-        lowest[f"{z} mm"] = least if len(depths) > 1 else set()
-    return {
-        "table": tabulated("Entropy of the objects", columns, seen, best=lowest),
-        "has_intervals": bool(halves),
-        "holds": table1_holds(objects, outcome.score.planes),
+def entropy_table(outcome: Outcome) -> Table:
+    """Entropies of the objects at each plane (the paper's Table 1); the lowest of a row stands out."""
+    objects = [row for row in outcome.score.objects if None not in row["entropy"].values()]
+    depths = tuple(objects[0]["entropy"]) if objects else ()
+    rows = tuple((row["name"], *(f"{bits:.3f}" for bits in row["entropy"].values())) for row in objects)
+    best = {
+        (number, 1 + place)
+        for number, row in enumerate(objects)
+        for place, bits in enumerate(row["entropy"].values())
+        if len(depths) > 1 and bits == min(row["entropy"].values())
     }
-
-
-def _with_half_width(bits: float, half: float | None) -> str:
-    return f"{bits:.3f}" if half is None else f"{bits:.3f} ± {half:.3f}"
-
-
-def table1_holds(objects: Sequence[Row], planes: Sequence[Row]) -> bool | None:
-    """Whether each object's entropy is lowest at its plane; None if none has two planes to compare."""
-    plane_of = object_planes(planes)
-    verdicts: list[bool] = []
-    for row in objects:
-        bits = {z: value for z, value in row["entropy"].items() if value is not None}
-        if row["name"] in plane_of and len(bits) > 1:
-            verdicts.append(min(bits, key=lambda z: bits[z]) == plane_of[row["name"]])
-    return all(verdicts) if verdicts else None
+    header = ("object", *(f"{z} mm" for z in depths))
+    return Table("Entropy of the objects, in bits", header, rows, best=frozenset(best))
 
 
 def score_table(outcome: Outcome) -> Table:
@@ -105,56 +64,49 @@ def score_table(outcome: Outcome) -> Table:
     planes = outcome.score.planes
     oracles = outcome.score.bounds["planes"] or [{"iou_oracle": None}] * len(planes)
     rows = [{**row, "iou_oracle": bound["iou_oracle"]} for row, bound in zip(planes, oracles, strict=True)]
-    columns: list[Column] = [("plane", lambda row: f"{row['z_mm']:g} mm"), METHOD]
-    if outcome.dataset.truth is None:
+    has_truth = outcome.dataset.truth is not None
+    if not has_truth:
         rows = [row for row in rows if row["truth"] == "object"]
-    else:
-        columns += [("truth", lambda row: row["truth"]), ("objects", _objects)]
-    words = len(columns)
-    columns += [
-        (title, lambda row, key=key: _number(row[key]))
-        for title, key in NUMBERS
-        if any(row[key] is not None for row in rows)
+    numbers = [key for key in NUMBERS if any(row[key] is not None for row in rows)]
+    header = (
+        "plane",
+        "method",
+        *(("truth", "objects") if has_truth else ()),
+        *(NUMBERS[key] for key in numbers),
+    )
+    cells = [
+        (
+            f"{row['z_mm']:g} mm",
+            row["method"],
+            *((row["truth"], _objects(row)) if has_truth else ()),
+            *("–" if row[key] is None else f"{row[key]:.3f}" for key in numbers),
+        )
+        for row in rows
     ]
-    columns.append(("claimed share", lambda row: _percent(row["claimed_share"], 2)))
-    return tabulated("Scores of the masks", columns, rows, words)
+    return Table("Scores of the masks", header, tuple(cells), words=4 if has_truth else 2)
 
 
-def _objects(row: Row) -> str:
+def _objects(row: Mapping[str, Any]) -> str:
     if row["truth"] == "pixel":
         return "all in focus"
     return row["object"] or "none at this plane"
 
 
-def _bias(value: str, error_mm: float) -> str:
-    return f"{value} (too {'far' if error_mm > 0 else 'near'})" if error_mm else value
-
-
 def depth_table(outcome: Outcome) -> Table:
     """Measures of the depth map that are known, over the objects' pixels or, without objects, over all."""
     depth, truth = outcome.score.depth, outcome.dataset.truth
-    where = (
-        "the objects' pixels" if truth is not None and truth.has_objects else "all pixels with a true depth"
-    )
     rows: list[tuple[str, str]] = []
     if depth["coverage"] is not None:
-        rows.append((f"share with an estimate, of {where}", _percent(depth["coverage"])))
-        if depth["median_mm"] is not None:
-            for name in ("median", "mean"):
-                key = {"median": "median", "mean": "mae"}[name]
+        has_objects = truth is not None and truth.has_objects
+        where = "the objects' pixels" if has_objects else "all pixels with a true depth"
+        rows.append((f"share with an estimate, of {where}", f"{depth['coverage']:.1%}"))
+        for name, key in (("median error", "median"), ("mean error", "mae"), ("median signed error", "bias")):
+            if depth[f"{key}_mm"] is not None:
                 value = f"{depth[f'{key}_mm']:.2f} mm, {depth[f'{key}_px']:.2f} px of total disparity"
-                rows.append((f"{name} error of those", value))
-            value = f"{depth['bias_mm']:+.2f} mm, {depth['bias_px']:+.2f} px of total disparity"
-            rows.append(("bias, the median of their signed errors", _bias(value, depth["bias_mm"])))
-        rows.append(("off by more than 1 px of total disparity, or no estimate", _percent(depth["bad_1px"])))
-        rows.append(("off by more than 3 px of total disparity, or no estimate", _percent(depth["bad_3px"])))
-    hci = depth["hci_objects"]
-    if hci["answered"]:
-        value = (
-            f"BadPix(0.07) {_percent(hci['badpix_007'])}, MSE × 100 {hci['mse_x100']:.2f}, "
-            f"Q25 {hci['q25_x100']:.2f}"
-        )
-        rows.append((f"HCI 4D light field benchmark, px between neighbouring views, {where}", value))
+                rows.append((f"{name} of those", value))
+        for limit in (1, 3):
+            name = f"off by more than {limit} px of total disparity, or no estimate"
+            rows.append((name, f"{depth[f'bad_{limit}px']:.1%}"))
     if depth["ece"] is not None:
         rows.append(("expected calibration error of the confidence", f"{depth['ece']:.3f}"))
     for row in outcome.score.bounds["objects"]:
@@ -162,11 +114,3 @@ def depth_table(outcome: Outcome) -> Table:
             bound = f"{row['depth_sigma_px']:.3f} px of total disparity"
             rows.append((f"Cramér-Rao bound on the standard deviation for {row['name']}", bound))
     return Table("Errors of the depth map", ("measure", "value"), tuple(rows), words=2)
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}"
-
-
-def _percent(share: float, digits: int = 1) -> str:
-    return f"{100 * share:.{digits}f} %"

@@ -7,7 +7,6 @@ from pcii.app.long_steps import KeptSteps
 from pcii.app.pipeline import Outcome, analyse
 from pcii.app.report import write_report
 from pcii.app.results import REPORT, Results
-from pcii.base.errors import InputError
 from pcii.base.progress import Report, silent
 from pcii.depth.methods import DEFAULT_METHOD
 from pcii.store.dataset import Dataset
@@ -20,20 +19,13 @@ def run(
     report: Report = silent,
     methods: Sequence[str] | None = None,
     depth_method: str = DEFAULT_METHOD,
-    smoothing_px: float | None = None,
 ) -> Outcome:
     """Analyse `dataset` and write all results into `out`, each of the long steps as soon as it is done.
 
-    Masks and depth maps that an earlier run left there, interrupted or not, are kept if they are valid. The
-    report shows photons smoothed by `smoothing_px`, as `write_report` says.
+    Masks and depth maps that an earlier run left there, interrupted or not, are kept if they are valid.
 
     Raises `InputError` if `out` is no folder for results of this dataset, and as `analyse` does.
     """
-    most_px = max(dataset.grid.height, dataset.grid.width)
-    if smoothing_px is not None and not 0 <= smoothing_px <= most_px:
-        raise InputError(
-            f"smoothing_px: expected pixels from 0 (none) to the film's {most_px}, got {smoothing_px:g}"
-        )
     results = Results(out, dataset)
     results.check()
     outcome = analyse(dataset, z_mm, report, methods, KeptSteps(results), depth_method)
@@ -41,5 +33,5 @@ def run(
         results.save_sections(outcome.sections)
         results.save_score(outcome.score)
         with results.replacing(REPORT) as page:
-            write_report(page, outcome, report, smoothing_px)
+            write_report(page, outcome, report)
     return outcome

@@ -60,7 +60,7 @@ def reconstruct(
             estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
             if sections.cfa is not None:
                 estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
-            picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))
+            picture = to_srgb8(estimate, white_level(estimate))
             with results.replacing(f"section_{z:g}mm.png") as path:
                 write_png(path, picture)
             say(f"{out / path.name}")
@@ -101,7 +101,7 @@ def depth(
         say(f"{results.save_depth(depth_map)}")
         with results.replacing("depth.png") as path:
             write_png(path, depth_image(depth_map.z_mm, *z_range, depth_map.confidence))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, greyer where less sure")
+    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, paler where less sure")
     _say_next_score(data, out)
 
 

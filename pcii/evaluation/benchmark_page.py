@@ -11,9 +11,9 @@ from typing import Any
 
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
+from pcii.evaluation.evaluation_pages import accuracy_plots
 from pcii.evaluation.pages import page
 from pcii.evaluation.paired_tests import mean_interval, positive_mean_interval
-from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.pooling import pooled_tables
 from pcii.evaluation.rows import Row, all_rows, by_light
 from pcii.evaluation.submission_checks import SUBMISSION

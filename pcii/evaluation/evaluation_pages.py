@@ -7,7 +7,6 @@ from typing import Any
 from pcii.base.plain_text import in_markdown
 from pcii.base.safe_files import sweep_temporaries, write_bytes_safely
 from pcii.evaluation.pages import page
-from pcii.evaluation.plots import accuracy_plots, calibration_plots
 from pcii.evaluation.pooling import pooled_tables
 from pcii.evaluation.tables import (
     Table,
@@ -17,8 +16,17 @@ from pcii.evaluation.tables import (
     tables_of,
     with_interval,
 )
+from pcii.figures.charts import accuracy_chart, calibration_chart
+from pcii.figures.panels import figure_uri
 from pcii.store.evaluation_layout import ROWS, seal_evaluation
 from pcii.store.hashes import hash_file
+
+MEASURES = {
+    "iou": ("object", "IoU, mean over planes"),
+    "bad_1px": ("depth", "share of errors of depth above 1 px"),
+    "median_px": ("depth", "median error of depth, px of total disparity"),
+}
+"""What accuracy is drawn by: the part of the results that has it, and the label of its axis."""
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any], others: Sequence[str] = ()) -> None:
@@ -133,6 +141,46 @@ def _plots(group: Mapping[str, Any], removal: Sequence[str], depth: Sequence[str
         ),
     ]
     return [(image, words) for image, words in plots if image]
+
+
+def accuracy_plots(group: Mapping[str, Any], methods: Sequence[str], measure: str = "iou") -> str:
+    """One of `MEASURES` against photons per view, and against seconds, as a PNG in a data URI.
+
+    Empty if none of `methods` has the measure, or neither photons nor seconds are known.
+    """
+    import pandas as pd
+
+    part, label = MEASURES[measure]
+    rows = []
+    for row in group["results"]:
+        mean = row.get(part, {}).get(measure)
+        if mean and row["method"] in methods:
+            low, high = mean["interval"] or (mean["mean"], mean["mean"])
+            seconds = None if row["seconds"] is None else row["seconds"]["mean"]
+            rows.append((row["method"], row["photons_per_view"], seconds, mean["mean"], low, high))
+    columns = ["method", "photons_per_view", "seconds", "mean", "low", "high"]
+    figure = accuracy_chart(
+        pd.DataFrame(rows, columns=columns), methods, label, is_share=measure != "median_px"
+    )
+    return "" if figure is None else figure_uri(figure)
+
+
+def calibration_plots(group: Mapping[str, Any], methods: Sequence[str]) -> str:
+    """Share of correct depths against their stated confidence, by light, as a PNG in a data URI.
+
+    Empty if no method of `methods` answers anything.
+    """
+    import pandas as pd
+
+    rows = [
+        {"method": row["method"], "light": light_name(row["budget"])}
+        | {name: one[name]["mean"] for name in ("confidence", "correct", "share")}
+        for row in group["results"]
+        if row["method"] in methods
+        for one in (row["depth"].get("reliability") or {}).values()
+        if one["confidence"] is not None
+    ]
+    return figure_uri(calibration_chart(pd.DataFrame(rows), methods)) if rows else ""
 
 
 def _made(evaluation: Mapping[str, Any], rows_sha256: str) -> Table:

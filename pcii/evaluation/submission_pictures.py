@@ -3,8 +3,8 @@
 import numpy as np
 
 from pcii.figures.exposure import block_px
-from pcii.figures.maps import depth_limits_mm
 from pcii.figures.pictures import depth_image
+from pcii.figures.plots import depth_limits_mm
 from pcii.metrics.true_masks import TrueFocus
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.estimates import DepthMap, Segmented

@@ -1,22 +1,16 @@
-"""Pictures of plain arrays: 8-bit images, and what Matplotlib draws for `.plot()` and notebooks.
+"""Every drawing: 8-bit pictures of arrays, and what Matplotlib draws for `.plot()`, pages and notebooks.
 
-Nothing here knows a type. The types of `core` know what of themselves is worth a picture, and hand over
-arrays with their captions; so this room comes before `core`, and all imports can be read in the source, which
-a table of functions registered by later rooms would hide.
+Nothing here knows a type. The types know what of themselves is worth a picture, and hand over arrays with
+their captions; so this room comes before `types`.
 
-Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it is given, or else into a new figure of
-`pyplot`, and returns them as an array (N,), one for each panel; it takes them as a list, one panel's alone
-too. Matplotlib is imported on the first picture.
+Every `.plot(axes=None, ...)` draws into the Matplotlib axes that it gets, or else into a new figure of
+`pyplot`, and returns them as an array (N,), one for each panel. It takes them as a list, one panel's alone
+too. Where no depth is answered a picture is grey, a colour that no map of values has. Matplotlib is imported
+on the first picture.
 
-charts        Charts: camera positions, probability over depth, bars of shares, reliability of confidence.
-exposure      What of an image is shown, and how bright: blocks, smoothed photons, means, a common
-              exposure.
-maps          Maps over pixels with a scale: depth, entropy.
-object_maps   Objects in colours, with their names beside the picture.
-palette       Colours and markers that the colour-blind can distinguish, and names as Matplotlib shows them.
-plots         What `.plot()` of each type draws, of plain arrays.
-panels        Axes to draw in, given or new, and pictures over the pixels of a view.
-pictures      Pictures of sections, masks and depth maps as 8-bit sRGB, and as PNG files.
-score_panels  Panels of a score: IoU of masks by plane and method, shares of depths, reliability of
-              confidence.
+charts     Charts of scores: bars of shares, reliability of confidence, accuracy against photons and seconds.
+exposure   How photons become an image: blocks, smoothing, means, one exposure for several images.
+panels     Axes to draw in, pictures and maps over the pixels of a view, colour bars, the style for print.
+pictures   Light, masks, depth and errors as 8-bit sRGB, and their files.
+plots      What `.plot()` of each type but the score draws.
 """

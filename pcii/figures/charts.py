@@ -1,4 +1,7 @@
-"""Charts: camera positions, probability over depth, bars of shares, reliability of confidence."""
+"""Charts of scores: accuracy against photons and seconds, reliability of confidence.
+
+They are drawn of data frames, a row for each mean or bin.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,19 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pcii.figures.palette import COLOURS, plot_label
-from pcii.figures.panels import GRID_COLOUR, write_in_middle
+from pcii.figures.panels import COLOURS, GRID_COLOUR, MARKERS, new_figure, plot_label
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
-LEAST_AREA, WHOLE_AREA = 4.0, 120.0
+MIN_AREA, WHOLE_AREA = 4.0, 120.0
 """Area in square points of the marker of a bin that holds next to nothing, and what all pixels add."""
-BAR = 0.8
-"""Share of the place of a group of bars that they take."""
 SHORT_DECADES = 2.5
 """Powers of ten of a logarithmic axis up to which there is room for ticks at 2 and 5 between them."""
+COLUMNS = 4
+"""Panels of a calibration chart side by side."""
 
 
 def quiet_grid(axes: "Axes") -> None:
@@ -39,101 +43,102 @@ def few_ticks(axis: "Axis") -> None:
     axis.set_minor_locator(NullLocator())
 
 
-def draw_cameras(axes: "Axes", x_mm: np.ndarray, y_mm: np.ndarray, title: str) -> None:
-    """Cameras at all of `x_mm` (L,), right, and `y_mm` (K,), down, in mm, with both baselines."""
-    x, y = np.meshgrid(x_mm, y_mm)
-    axes.scatter(x, y, s=max(4.0, 40.0 - 2 * max(x.shape)), color=COLOURS[0], label="cameras")
-    axes.scatter([0], [0], marker="+", s=90, color=COLOURS[1], label="virtual centre", zorder=3)
-    top, left = float(y_mm.min()), float(x_mm.min())
-    span = float(max(np.ptp(x_mm), np.ptp(y_mm))) or 1.0
-    gap = 0.08 * span
-    arrow = {"arrowstyle": "<->", "color": GRID_COLOUR}
-    if x_mm.size > 1:
-        axes.annotate("", (left, top - gap), (float(x_mm.max()), top - gap), arrowprops=arrow)
-        axes.text(0, top - 1.2 * gap, f"baseline {np.ptp(x_mm):.4g} mm", ha="center", va="bottom")
-    if y_mm.size > 1:
-        axes.annotate("", (left - gap, top), (left - gap, float(y_mm.max())), arrowprops=arrow)
-        baseline = f"baseline {np.ptp(y_mm):.4g} mm"
-        axes.text(left - 1.2 * gap, 0, baseline, rotation=90, ha="right", va="center")
-    axes.set_aspect("equal")
-    axes.set_xlim(-0.8 * span, 0.65 * span)
-    axes.set_ylim(0.65 * span, -0.8 * span)
-    axes.set_xlabel("X, right (mm)")
-    axes.set_ylabel("Y, down (mm)")
-    axes.set_title(title)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize="small")
-    quiet_grid(axes)
-
-
-def draw_depth_probability(axes: "Axes", z_mm: np.ndarray, probability: np.ndarray, title: str) -> None:
-    """Probability (Z,) of a surface at each depth in mm."""
-    axes.fill_between(z_mm, probability, color=COLOURS[0], alpha=0.3, linewidth=0)
-    marker = "o" if z_mm.size <= 40 else None
-    axes.plot(z_mm, probability, color=COLOURS[0], linewidth=1.4, marker=marker, markersize=3)
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel("depth z (mm)")
-    axes.set_ylabel("probability of a surface")
-    axes.set_title(title)
-    quiet_grid(axes)
-
-
-def draw_bars(
-    axes: "Axes",
-    groups: Sequence[str],
-    bars: Mapping[str, Sequence[float | None]],
-    limits: Sequence[float | None],
-    label: str,
-) -> None:
-    """Shares as horizontal bars: for each of `bars` one value in each group, None for none.
-
-    `limits` has what could be reached in each group at most, drawn as a line across it; None for none.
-    """
-    named: dict[str, Any] = {}
-    thickness = BAR / max(1, len(bars))
-    for number, (name, shares) in enumerate(bars.items()):
-        for group, share in enumerate(shares):
-            if share is not None:
-                place = group + (number + 0.5) * thickness - BAR / 2
-                colour = COLOURS[number % len(COLOURS[:-1])]
-                named[plot_label(name)] = axes.barh(place, share, 0.92 * thickness, color=colour)
-                axes.text(share + 0.01, place, f"{share:.2f}", va="center", fontsize="small")
-    for group, most in enumerate(limits):
-        if most is not None:
-            ends = [group - BAR / 2, group + BAR / 2]
-            (line,) = axes.plot([most, most], ends, color=GRID_COLOUR, linewidth=2)
-            named["best by true depth"] = line
-    axes.set_yticks(range(len(groups)), [plot_label(name) for name in groups])
-    axes.set_ylim(max(1, len(groups)) - 0.5, -0.5)
-    axes.set_xlim(0, 1.12)
-    axes.set_xticks(np.linspace(0, 1, 6))
-    axes.set_xlabel(label)
-    if len(named) > 1:
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2), "ncols": 1}
-        axes.legend(list(named.values()), list(named), frameon=False, fontsize="small", **place)
-    quiet_grid(axes)
-    if not groups:
-        write_in_middle(axes, "nothing is scored")
-
-
-def draw_reliability_diagram(
-    axes: "Axes",
-    stated: Sequence[float],
-    correct: Sequence[float],
-    shares: Sequence[float],
-    style: Mapping[str, Any],
-) -> None:
+def _draw_reliability(axes: "Axes", bins: "pd.DataFrame", style: Mapping[str, Any]) -> None:
     """Share of correct answers against stated confidence, bins with larger markers the more they hold.
 
-    Confidence that is right lies on the diagonal (Naeini, Cooper and Hauskrecht 2015).
+    Confidence that is right lies on the diagonal, too much of it below (Naeini, Cooper and Hauskrecht 2015).
     """
-    areas = [LEAST_AREA + WHOLE_AREA * share for share in shares]
+    stated, correct = bins["confidence"], bins["correct"]
+    areas = MIN_AREA + WHOLE_AREA * bins["share"]
     marks = {"color": style["color"], "marker": style["marker"], "alpha": 0.8, "linewidth": 0}
     axes.scatter(stated, correct, areas, clip_on=False, zorder=3, **marks)
     axes.plot(stated, correct, linewidth=1.0, color=style["color"], linestyle=style["linestyle"])
-
-
-def draw_diagonal(axes: "Axes") -> None:
-    """The line of confidence that is right, and a frame from 0 to 1."""
     axes.plot([0, 1], [0, 1], color=GRID_COLOUR, linewidth=0.8)
-    axes.set_xlim(-0.02, 1.02)
-    axes.set_ylim(-0.02, 1.02)
+    axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
+    axes.set(xlabel="stated confidence", ylabel="share within 1 px")
+    quiet_grid(axes)
+
+
+def accuracy_chart(
+    means: "pd.DataFrame", methods: Sequence[str], label: str, *, is_share: bool
+) -> "Figure | None":
+    """A measure of accuracy against photons per view, and against seconds; None if neither is known.
+
+    `means` has a row for each method and light: `method`, `photons_per_view`, `seconds`, `mean`, and the ends
+    of its interval, `low` and `high`. Each of `methods` has one colour and marker in all charts. What is no
+    share from 0 to 1 has a logarithmic axis. Full light is at no number of photons.
+    """
+    places = {"photons_per_view": "photons per view", "seconds": "seconds per dataset"}
+    known = [place for place in places if means[place].notna().any()]
+    if not known:
+        return None
+    figure = new_figure(0.3 + 5.1 * len(known), 4.2, "constrained")
+    panels = figure.subplots(1, len(known), sharey=True, squeeze=False)[0]
+    handles: dict[str, Any] = {}  # by name, since methods of full light alone are in one of the two
+    for axes, place in zip(panels, known, strict=True):
+        rows = means[means[place].notna()]
+        for number, method in enumerate(methods):
+            own = rows[rows["method"] == method]
+            if own.empty:
+                continue
+            bars = np.maximum(0, [own["mean"] - own["low"], own["high"] - own["mean"]])
+            style = _line_style(number) | {"markersize": 5, "linewidth": 1.4, "capsize": 2.5}
+            handles[plot_label(method)] = axes.errorbar(own[place], own["mean"], yerr=bars, **style)
+        axes.set_xlabel(places[place])
+        if is_share:
+            axes.set_ylim(-0.02, 1.02)
+        else:
+            axes.set_yscale("log")
+            few_ticks(axes.yaxis)
+        quiet_grid(axes)
+        if (rows[place] > 0).all():
+            axes.set_xscale("log")
+            few_ticks(axes.xaxis)
+    panels[0].set_ylabel(label)
+    _add_legend(figure, {name: handles[name] for name in sorted(handles)}, 4)
+    return figure
+
+
+def calibration_chart(bins: "pd.DataFrame", methods: Sequence[str]) -> "Figure":
+    """Share of correct depths against their stated confidence, a reliability diagram for each light.
+
+    `bins` has a row for each bin of confidence that has pixels: `method`, `light`, `confidence`, `correct`,
+    and its `share` of the pixels. Methods have the colours of `accuracy_chart`.
+    """
+    from matplotlib.lines import Line2D
+
+    lights = list(dict.fromkeys(bins["light"]))
+    columns = min(COLUMNS, len(lights))
+    lines = -(-len(lights) // columns)
+    figure = new_figure(0.7 + 2.45 * columns, 0.7 + 2.6 * lines, "constrained")
+    panels = figure.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
+    for light, axes in zip(lights, panels.flat, strict=False):
+        for method, own in bins[bins["light"] == light].groupby("method", sort=False):
+            _draw_reliability(axes, own, _line_style(methods.index(str(method))))
+        axes.set_title(light, fontsize=9)
+        axes.label_outer()
+    for axes in panels.flat[len(lights) :]:
+        axes.set_axis_off()
+    present = set(bins["method"])
+    handles = {
+        plot_label(method): Line2D([], [], markersize=5, **_line_style(number))
+        for number, method in enumerate(methods)
+        if method in present
+    }
+    _add_legend(figure, handles, columns)
+    return figure
+
+
+def _line_style(number: int) -> dict[str, Any]:
+    """Colour, marker and line of a method by its number."""
+    return {
+        "color": COLOURS[number % len(COLOURS)],
+        "marker": MARKERS[number % len(MARKERS)],
+        "linestyle": "-" if number < len(COLOURS) else "--",
+    }
+
+
+def _add_legend(figure: "Figure", handles: Mapping[str, Any], columns: int) -> None:
+    """Names below all panels."""
+    place = {"loc": "outside lower center", "ncols": columns}
+    figure.legend([*handles.values()], [*handles], frameon=False, fontsize=9, **place)

@@ -1,4 +1,4 @@
-"""What of an image is shown, and how bright: blocks, smoothed photons, means, a common exposure."""
+"""How photons become an image: blocks, smoothing, means, one exposure for several images."""
 
 from collections.abc import Iterable, Sequence
 
@@ -13,7 +13,7 @@ screen, so single photons are still seen."""
 SHOWN_PHOTONS = 80
 """Photons under the Gaussian with which few photons are smoothed: their noise is then 11 %. Far more would
 blur what is small, far fewer leave colours that are noise."""
-LEAST_SMOOTHING_PX = 0.5
+MIN_SMOOTHING_PX = 0.5
 """A narrower Gaussian is left out: a pixel would keep most of its weight."""
 DENSITY_PX = 8
 """Side of the squares in which photons are counted to find how dense they are."""
@@ -48,7 +48,7 @@ def smoothing_for(sections: Sequence[np.ndarray]) -> float:
     beside = float(np.quantile(lit, 0.5, weights=lit, method="inverted_cdf")) - 1  # the others of a photon
     density = max(beside, 1.0) / DENSITY_PX**2
     sigma = float(np.sqrt(SHOWN_PHOTONS / (4 * np.pi * density)))
-    return round(sigma, 1) if sigma >= LEAST_SMOOTHING_PX else 0.0
+    return round(sigma, 1) if sigma >= MIN_SMOOTHING_PX else 0.0
 
 
 def smoothed(sums: np.ndarray, samples: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
@@ -61,34 +61,28 @@ def smoothed(sums: np.ndarray, samples: np.ndarray, sigma: float) -> tuple[np.nd
     return first, second
 
 
-def filled_means(counts: np.ndarray, samples: np.ndarray) -> np.ndarray:
+def filled_means(sums: np.ndarray, samples: np.ndarray) -> np.ndarray:
     """Mean per sample (h, w, C) of blocks with these sums and numbers of samples.
 
     A block without a sample of a colour has the mean of the 3 x 3 blocks around, so that nothing has a tint;
     0 if those have none either.
     """
+    from scipy.ndimage import correlate
+
     empty = samples <= 0
     if empty.any():
-        around = (_sums_around(values) for values in (counts, samples))
-        counts, samples = (
-            np.where(empty, near, own) for own, near in zip((counts, samples), around, strict=True)
+        square = np.ones((3, 3, 1))
+        sums, samples = (
+            np.where(empty, correlate(values, square, mode="constant"), values) for values in (sums, samples)
         )
-    means = np.zeros(counts.shape)
+    means = np.zeros(sums.shape)
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.divide(counts, samples, out=means, where=samples > 0)
-
-
-def _sums_around(blocks: np.ndarray) -> np.ndarray:
-    """Sums over each block (h, w, C) and the eight around it."""
-    height, width = blocks.shape[:2]
-    padded = np.pad(blocks, ((1, 1), (1, 1), (0, 0)))
-    rows = sum(padded[a : a + height] for a in range(3))
-    return sum(rows[:, b : b + width] for b in range(3))  # type: ignore[index]
+        return np.divide(sums, samples, out=means, where=samples > 0)
 
 
 def encoded(blocks: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
     """8-bit pictures of block estimates with their samples, all at the same exposure."""
-    white = max(white_level(estimate, samples=samples) for estimate, samples in blocks)
+    white = max(white_level(estimate, samples) for estimate, samples in blocks)
     return [to_srgb8(estimate, white) for estimate, _ in blocks]
 
 
@@ -106,5 +100,5 @@ def exposed(images: Iterable[tuple[np.ndarray, np.ndarray]], step_px: int) -> li
 
 def photon_picture(counts: np.ndarray, step_px: int) -> np.ndarray:
     """8-bit picture of the photon counts (H, W) of one view: the photons in blocks, one or more are white."""
-    shown = image_block_sums(counts[..., None], step_px)
-    return to_srgb8(shown, max(1.0, white_level(shown)))
+    sums = image_block_sums(counts[..., None], step_px)
+    return to_srgb8(sums, max(1.0, white_level(sums)))

@@ -1,74 +1,94 @@
-"""Axes to draw in, given or new, and pictures over the pixels of a view."""
+"""Axes to draw in, pictures and maps over the pixels of a view, colour bars, and the style for print."""
 
+import io
+import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from pcii.base.errors import InputError
+from pcii.base.plain_text import visible
+from pcii.figures.pictures import DEPTH_COLOURS, map_image, uri_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.figure import Figure
 
-MOST_PANELS = 12
+    MaybeAxes: TypeAlias = Axes | Sequence[Axes] | np.ndarray | None
+
+Style = Literal["screen", "paper"]
+"""`paper` has a white background, and a bar of known length below each picture instead of axes in pixels."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+"""The palette of Okabe and Ito, which the colour-blind can distinguish."""
+MARKERS = "osD^vPX"
+GRID_COLOUR = "#8a94a6"
+"""Of lines behind what is drawn: seen on light and on dark pages."""
+MAX_PANELS = 12
 """Of more panels as many are drawn, evenly chosen: more cannot be read."""
 COLUMNS = 4
 PANEL_IN = 3.4
 """Longer side of a panel of a new figure in inches."""
-DOTS_PER_INCH = 110
 LABELS_IN = 0.9
 """Room for the labels of a panel in inches."""
-GRID_COLOUR = "#8a94a6"
-"""Of lines behind what is drawn: seen on light and on dark pages."""
+DOTS_PER_INCH = 110
+MAX_NAME_LENGTH = 40
+"""Characters of a name, about a third of a plot's width."""
+SCALE_BAR_SHARE = 0.3
+"""A scale bar is at most so long, as a share of the picture's width."""
+
+
+def plot_label(name: str) -> str:
+    """A name as text for Matplotlib: at most `MAX_NAME_LENGTH` characters, none read as mathematics.
+
+    >>> print(plot_label("_a$b"))
+    a\\$b
+    """
+    name = visible(name)
+    name = name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}…"
+    return name.lstrip("_").replace("$", r"\$")
 
 
 def several_axes(
-    axes: "Axes | Sequence[Axes] | np.ndarray | None",
+    axes: "MaybeAxes",
     count: int,
     shape: Sequence[float] = (3.0, 4.0),
-    widths: Sequence[float] | None = None,
+    style: Style = "screen",
 ) -> np.ndarray:
-    """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those given, or new ones.
+    """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those of `axes`, or new.
 
-    Of few panels, in one row, some may be so many times as wide: `widths` (N,). For one panel the axes may be
-    given without a list. Raises `InputError` if the number of axes is not `count`, or if something given is
-    no Matplotlib axes.
+    One panel's axes need no list. Raises `InputError` if the number of axes is not `count`, for anything that
+    is no Matplotlib axes, and for an unknown style.
     """
     from matplotlib import pyplot
     from matplotlib.axes import Axes
 
+    if style not in ("screen", "paper"):
+        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
     if axes is not None:
-        given = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
-        wrong = [one for one in given if not isinstance(one, Axes)]
-        if wrong:
-            raise InputError(f"axes: expected Matplotlib axes, got {type(wrong[0]).__name__}")
-        if len(given) != count:
-            raise InputError(f"axes: {count} panels are drawn, and {len(given)} axes were given")
-        return _array_of(given)
+        panels = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
+        if len(panels) != count or not all(isinstance(panel, Axes) for panel in panels):
+            raise InputError(f"axes: expected Matplotlib axes of {count} panels, got {axes!r:.80}")
+        return _array_of(panels)
     columns = min(count, COLUMNS)
     rows = -(-count // columns)
-    ratios = [1.0] * columns if widths is None else list(widths)
     height, width = (PANEL_IN * side / max(shape) for side in shape)
-    across = sum(ratios) * max(width, PANEL_IN / 2) + columns * LABELS_IN
-    size = across, rows * (max(height, PANEL_IN / 3) + LABELS_IN)
-    figure, grid = pyplot.subplots(
-        rows, columns, squeeze=False, figsize=size, layout="compressed", width_ratios=ratios
-    )
+    size = columns * (max(width, PANEL_IN / 2) + LABELS_IN), rows * (max(height, PANEL_IN / 3) + LABELS_IN)
+    with pyplot.style.context("default" if style == "paper" else {}):
+        figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
     for unused in grid.flat[count:]:
         figure.delaxes(unused)
     return _array_of(list(grid.flat[:count]))
 
 
 def _array_of(axes: "Sequence[Axes]") -> np.ndarray:
-    kept = np.empty(len(axes), dtype=object)
-    kept[:] = axes
-    return kept
+    panels = np.empty(len(axes), dtype=object)
+    panels[:] = axes
+    return panels
 
 
-def new_figure(
-    width_in: float, height_in: float, layout: Literal["compressed", "constrained"] | None
-) -> "Figure":
+def new_figure(width_in: float, height_in: float, layout: Literal["compressed", "constrained"]) -> "Figure":
     """An empty figure that needs no display and no global state."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -78,29 +98,90 @@ def new_figure(
     return figure
 
 
-def figure_of(axes: "Axes") -> "Figure | SubFigure":
-    """The figure that axes are in."""
-    figure = axes.get_figure()
-    assert figure is not None
-    return figure
+def figure_uri(figure: "Figure") -> str:
+    """A figure as a data URI of a PNG for HTML."""
+    stored = io.BytesIO()
+    figure.savefig(stored, format="png")
+    return uri_of("png", stored.getvalue())
 
 
 def show_picture(
-    axes: "Axes", image: np.ndarray, shape_HW: Sequence[int], title: str, block_px: float = 1.0
+    axes: "Axes",
+    image: np.ndarray,
+    shape_HW: Sequence[int],
+    title: str,
+    block_px: float = 1.0,
+    style: Style = "screen",
+    mm_per_px: float | None = None,
 ) -> None:
     """Draw an image (h, w, 3) of square blocks, `block_px` wide, over the pixels of a view.
 
-    `shape_HW` is that of a view; blocks that reach over it are cut off.
+    `shape_HW` is that of a view; blocks that reach over it are cut off. On paper the scale bar is in mm where
+    the size of a pixel is known, and else in px.
     """
     height, width = shape_HW
     bottom, right = (block_px * size - 0.5 for size in image.shape[:2])
     axes.imshow(image, extent=(-0.5, right, bottom, -0.5))
     axes.set_xlim(-0.5, width - 0.5)
     axes.set_ylim(height - 0.5, -0.5)
+    axes.set_title(title)
+    if style == "paper":
+        hide_frame(axes)
+        draw_scale_bar(axes, width, mm_per_px)
+        return
     axes.set_xlabel("column (px)")
     axes.set_ylabel("row (px)")
-    axes.set_title(title)
     axes.locator_params(integer=True, nbins=6)
+
+
+def show_map(
+    axes: "Axes",
+    values: np.ndarray,
+    shape_HW: Sequence[int],
+    title: str,
+    colours: str,
+    limits: tuple[float, float],
+    label: str,
+    confidence: np.ndarray | None = None,
+    block_px: float = 1.0,
+    style: Style = "screen",
+) -> None:
+    """Draw values (h, w) as `map_image` colours them, over the pixels of a view, with their colour bar."""
+    image = map_image(values, colours, limits, confidence)
+    show_picture(axes, image, shape_HW, title, block_px, style)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    bar = figure.colorbar(_scale(colours, limits), ax=axes, label=label)
+    if colours == DEPTH_COLOURS:  # near is on top
+        bar.ax.invert_yaxis()
+
+
+def colour_bar_uri(colours: str, limits: tuple[float, float], label: str) -> str:
+    """A colour bar with ticks, alone and lying, as a data URI for HTML."""
+    figure = new_figure(3.8, 0.62, "constrained")
+    figure.colorbar(_scale(colours, limits), cax=figure.subplots(), orientation="horizontal", label=label)
+    return figure_uri(figure)
+
+
+def _scale(colours: str, limits: tuple[float, float]) -> "ScalarMappable":
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    return ScalarMappable(Normalize(*limits), colours)
+
+
+def draw_scale_bar(axes: "Axes", width_px: float, mm_per_px: float | None) -> None:
+    """Draw a bar of a round length below a picture, in mm, or in px where the size of a pixel is unknown."""
+    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
+
+    px, unit = (1.0, "px") if mm_per_px is None else (1 / mm_per_px, "mm")
+    longest = SCALE_BAR_SHARE * width_px / px
+    decade = 10.0 ** math.floor(math.log10(longest))
+    length = decade * max(factor for factor in (1, 2, 5) if factor * decade <= longest)
+    place = {"loc": "upper left", "bbox_to_anchor": (0, -0.02), "bbox_transform": axes.transAxes}
+    looks = {"color": "black", "frameon": False, "pad": 0.0, "borderpad": 0.0, "sep": 3}
+    looks |= {"size_vertical": 0.01 * width_px, "fill_bar": True}
+    axes.add_artist(AnchoredSizeBar(axes.transData, length * px, f"{length:g} {unit}", **place, **looks))
 
 
 def hide_frame(axes: "Axes") -> None:

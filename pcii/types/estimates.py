@@ -15,6 +15,8 @@ from pcii.types.section_stack import Sections
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from pcii.figures.panels import Style
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Segmented(ShortForm):
@@ -60,15 +62,19 @@ class Segmented(ShortForm):
         """Section estimates (Z, H, W, C) float64, zero at points that are not in focus."""
         return np.where(self.in_focus[..., None], self.sections.estimate, 0.0)
 
-    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+    def plot(
+        self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, *, style: "Style" = "screen"
+    ) -> np.ndarray:
         """Draw each section after removal with the outline of its mask, and return the Matplotlib axes (N,).
 
-        Panels, exposure and `axes` are those of `Sections.plot`.
+        Panels, exposure, `axes` and `style` are those of `Sections.plot`.
         """
         from pcii.figures.plots import plot_sections
 
         own = self.sections
-        return plot_sections(axes, self.z_mm, own.in_colours, own.grid.shape_HW, self.in_focus, self.method)
+        px_at_1mm = own.grid.pixel_mm / own.grid.focal_mm
+        masks, shape_HW = self.in_focus, own.grid.shape_HW
+        return plot_sections(axes, self.z_mm, own.in_colours, shape_HW, px_at_1mm, style, masks, self.method)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,16 +104,21 @@ class DepthMap(ShortForm):
         return {"shape": times(self.z_mm.shape), "answered": share, "z_mm": span(answered)}
 
     def plot(
-        self, axes: "Axes | None" = None, *, z_range_mm: tuple[float, float] | None = None
+        self,
+        axes: "Axes | None" = None,
+        *,
+        z_range_mm: tuple[float, float] | None = None,
+        style: "Style" = "screen",
     ) -> np.ndarray:
-        """Draw depth in mm, greyer where less sure, with a colour bar; return the Matplotlib axes (1,).
+        """Draw depth in mm with a colour bar, and return the Matplotlib axes (1,).
 
-        The scale spans `z_range_mm`, (near, far), by default all but outlying depths. `axes` are by default
-        those of a new figure. Raises `InputError` if they are no Matplotlib axes.
+        Colours are paler where less sure, grey without an answer. The scale spans `z_range_mm`, (near, far),
+        by default all but outlying depths. `axes` are by default those of a new figure. `style="paper"` is
+        for print, with a scale bar in px. Raises `InputError` for what is no Matplotlib axes or style.
         """
         from pcii.figures.plots import plot_depth
 
-        return plot_depth(axes, self.z_mm, self.confidence, z_range_mm)
+        return plot_depth(axes, self.z_mm, self.confidence, z_range_mm, style=style)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,16 +211,6 @@ class Score(ShortForm):
             "objects": len(self.objects),
             "depth median_mm": self.depth.get("median_mm"),
         }
-
-    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
-        """Draw the IoU of masks, the shares of errors of depth, and how often depths are right by confidence.
-
-        Returns the Matplotlib axes (N,), one for each of these that is known, by default of a new figure.
-        Raises `InputError` for another number of `axes`.
-        """
-        from pcii.figures.score_panels import draw_score
-
-        return draw_score(axes, self.planes, self.bounds, self.depth)
 
     def to_dict(self) -> dict[str, Any]:
         """The score as plain Python values, in the spelling of `score.json`."""

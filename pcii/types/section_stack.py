@@ -18,6 +18,8 @@ from pcii.types.photon_events import PLAIN, Readout
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from pcii.figures.panels import Style
+
 Shifts = Literal["nearest", "even"]
 
 
@@ -100,16 +102,22 @@ class Sections(ShortForm):
         """Voxels in which all samples of all frames are full, (Z, H, W, C) bool: the estimate is infinite."""
         return np.isinf(self.estimate)
 
-    def plot(self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None) -> np.ndarray:
+    def plot(
+        self, axes: "Axes | Sequence[Axes] | np.ndarray | None" = None, *, style: "Style" = "screen"
+    ) -> np.ndarray:
         """Draw the sections in their colours, a panel each, and return the Matplotlib axes (N,).
 
         All have the same exposure: the 98th percentile of what is lit is white, each mean counting as often
         as it has samples. Of more than 12 sections 12 are drawn. `axes` has those of each panel, by default
-        of a new figure. Raises `InputError` for another number of them.
+        of a new figure. Raises `InputError` for another number of them, and for an unknown style.
+
+        For print, `style="paper"` has a white background and a scale bar in mm at the depth of the section
+        instead of axes in pixels: `sections.plot(style="paper")[0].figure.savefig("sections.pdf")`, or .svg.
         """
         from pcii.figures.plots import plot_sections
 
-        return plot_sections(axes, self.z_mm, self.in_colours, self.grid.shape_HW)
+        px_at_1mm = self.grid.pixel_mm / self.grid.focal_mm
+        return plot_sections(axes, self.z_mm, self.in_colours, self.grid.shape_HW, px_at_1mm, style)
 
     def in_colours(self, plane: int) -> tuple[np.ndarray, np.ndarray]:
         """Sums and numbers of samples of one plane, (H, W, C) each; those of mosaics in three colours."""

@@ -13,7 +13,6 @@ import numpy as np
 from pcii.base.errors import InputError
 from pcii.base.safe_files import write_bytes_safely
 from pcii.figures.exposure import block_px, exposed
-from pcii.figures.object_maps import named_width
 from pcii.figures.panels import hide_frame, new_figure
 from pcii.figures.pictures import to_srgb8, white_level
 from pcii.imaging.blocks import evenly_chosen
@@ -40,6 +39,8 @@ MARGIN = 0.03
 """Around the objects, as a share of the picture's longer side."""
 PANEL_IN = 4.8
 """Height of a panel."""
+NAMES_IN = 1.8
+"""Room for the names of objects beside their picture."""
 ASPECTS = 0.5, 1.6
 """Width over height of the room for a picture; others leave some of it empty."""
 MAX_TILES = 12
@@ -92,9 +93,8 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
     hits = first_hits_at_centre(render_scene, grid)
     objects = hits.object_id > 0
     aspect = float(np.clip(grid.width / grid.height, *ASPECTS))
-    named = named_width(aspect)
-    figure = new_figure(PANEL_IN * (aspect * (2 + named) + 0.2) + 0.5, PANEL_IN + 0.7, "compressed")
-    whole, depth, named_objects = figure.subplots(1, 3, width_ratios=(1, 1, named))
+    figure = new_figure(PANEL_IN * (3 * aspect + 0.2) + NAMES_IN, PANEL_IN + 0.7, "compressed")
+    whole, depth, objects_by_name = figure.subplots(1, 3)
     whole.imshow(to_srgb8(picture, white_level(picture[objects] if objects.any() else picture)))
     whole.set_title("virtual centre")
     hide_frame(whole)
@@ -103,7 +103,7 @@ def draw_preview(target: Prepared, samples_per_pixel: int) -> Preview:
         left, right, top, bottom = (edge - 0.5 for edge in (cols.start, cols.stop, rows.start, rows.stop))
         corners = [left, right, right, left, left], [top, top, bottom, bottom, top]
         whole.plot(*corners, color="0.6", linewidth=0.8)
-    _draw_truth(depth, named_objects, Truth(hits.z_mm, hits.object_id, render_scene.names))
+    _draw_truth(depth, objects_by_name, Truth(hits.z_mm, hits.object_id, render_scene.names))
     title = recipe.title or target.scene.title
     figure.suptitle(title, parse_math=False)
     figure.draw_without_rendering()
@@ -148,7 +148,7 @@ def draw_sheet(dataset: Dataset) -> "Figure":
     """The contact sheet of a dataset as a figure; the place of what it does not have stays empty."""
     grid, truth, views = dataset.grid, dataset.truth, dataset.views
     aspect = float(np.clip(grid.width / grid.height, *ASPECTS))
-    second = float(np.clip(aspect * grid.cols / grid.rows, aspect * named_width(aspect), 4.0))
+    second = float(np.clip(aspect * grid.cols / grid.rows, aspect + NAMES_IN / PANEL_IN, 4.0))
     widths = aspect + 0.2, second
     figure = new_figure(PANEL_IN * sum(widths), 2 * PANEL_IN + 1.5, "constrained")
     panels = figure.subplot_mosaic([["view", "photons"], ["depth", "objects"]], width_ratios=widths)

@@ -7,7 +7,7 @@
   const chosen = (name) => one(`input[name="${name}"]:checked`)?.value;
   const depths = all("#look .depth").map((span) => span.textContent);
   const slide = one("#plane"), compare = one("#compare");
-  let wanted = slide ? Number(slide.value) : 0;  // plane that was asked for, though the points may lack it
+  let wanted = slide ? Number(slide.value) : 0;  // the chosen plane, at which the points may be unknown
   let plane = wanted;
 
   /* Planes at which the chosen points are known; all of them without a choice. */
@@ -47,13 +47,12 @@
     read();
   };
 
-  /* Maps of numbers: code c > 0 of one or two bytes, the lower first, stands for origin + (c - 1) step. */
+  /* Maps of numbers: code c > 0 of two bytes, the lower first, stands for origin + (c - 1) step. */
   const maps = {};
   for (const { dataset } of all("#look .map")) {
-    const text = atob(dataset.values), size = Number(dataset.bytes);
+    const text = atob(dataset.values);
     maps[dataset.name] = (block) => {
-      const low = text.charCodeAt(size * block), high = size > 1 ? text.charCodeAt(size * block + 1) : 0;
-      const code = low + 256 * high;
+      const code = text.charCodeAt(2 * block) + 256 * text.charCodeAt(2 * block + 1);
       return code ? Number(dataset.origin) + (code - 1) * Number(dataset.step) : null;
     };
   }
@@ -80,7 +79,6 @@
       error: error === null ? "–" : (error < 0 ? "−" : "+") + length(Math.abs(error)),
       object: names[value("object") ?? 0],
       counts: here?.toFixed(0),
-      light: here?.toFixed(3),
     };
     for (const field of all(".readout dd")) field.textContent = texts[field.dataset.read] ?? "–";
     for (const cross of all(".frame i")) {

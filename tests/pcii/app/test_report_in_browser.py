@@ -8,7 +8,7 @@ from chromium import CHROMIUM, Page, browser_page
 from report_outcomes import COUNTS, FOUND, IDS, TRUTH, Written
 
 from pcii.app.pipeline import Outcome
-from pcii.app.report_figures import Shown
+from pcii.app.report_pictures import Pictures
 from pcii.sections.reconstruction import reconstruct
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")]
@@ -33,7 +33,7 @@ def read(browser: Page, name: str) -> str:
 
 
 def test_the_slider_moves_through_the_depths(browser: Page, full: Outcome) -> None:
-    photons = f"photon counts, smoothed by {Shown.of(full).smoothing_px:g} px"
+    photons = f"photon counts, smoothed by {Pictures.of(full).smoothing_px:g} px"
     assert browser.value(SHOWN) == [f"section at 500 mm, {photons}"]
     browser.click("#plane")  # the middle
     middle = browser.text("#depth-shown")

@@ -20,9 +20,8 @@ from pcii.app.report import write_report
 from pcii.base.plain_text import in_markdown, visible
 from pcii.evaluation import pages as pages_module
 from pcii.evaluation.comparison import evaluate
-from pcii.evaluation.evaluation_pages import write_evaluation
+from pcii.evaluation.evaluation_pages import accuracy_plots, write_evaluation
 from pcii.evaluation.pages import page
-from pcii.evaluation.plots import accuracy_plots
 from pcii.evaluation.rows import claim_rows
 from pcii.evaluation.summary import summarise
 from pcii.removal.methods import METHODS
