@@ -12,8 +12,7 @@ report           report.html: a slider through the depths, pictures of each plan
                  was made.
 report_pictures  Pictures of a report: a view, and for each plane its section, masks and truth; depth, error,
                  confidence.
-report_slider    Sections through the whole depth range, for the slider of a report, and what is read out at a
-                 pixel.
+report_slider    Sections through the whole depth range, for the slider of a report.
 report_tables    Numbers of a report as text: key facts, entropies of the objects, scores of the masks and
                  of the depth map.
 results          The folder of results that commands write and later commands read.

@@ -1,7 +1,7 @@
 """report.html: a slider through the depths, pictures of each plane, depth, scores, and how it was made.
 
 A single file that fetches nothing, which can be mailed, archived and printed. Its pictures and text need no
-script; the slider and the read-out are by the one in `pcii/evaluation/templates/report.js`.
+script; the slider is by the one in `pcii/evaluation/templates/report.js`.
 """
 
 import json
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pcii.app.command_options import budget_words
 from pcii.app.pipeline import Outcome
-from pcii.app.report_pictures import Pictures, Row, depth_panels, input_panels, plane_panels
+from pcii.app.report_pictures import Pictures, depth_panels, input_panels, plane_panels
 from pcii.app.report_slider import slider
 from pcii.app.report_tables import depth_table, entropy_table, key_facts, score_table
 from pcii.base.progress import Report, silent
@@ -52,7 +52,7 @@ def write_report(path: Path, outcome: Outcome, report: Report = silent) -> None:
     write_bytes_safely(path, page("report.html.j2", content, script="report.js"))
 
 
-def origin(outcome: Outcome) -> list[Row]:
+def origin(outcome: Outcome) -> list[tuple[str, str]]:
     """How the report and its dataset were made: names and values, folders by their names alone."""
     manifest = outcome.dataset.manifest
     methods = (*(focus.method for focus in outcome.focus), depth_name(outcome.depth_method))

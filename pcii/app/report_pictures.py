@@ -44,8 +44,8 @@ UNSATURATED_SHARE = 0.95
 
 Panel = dict[str, str]
 """An `image` as a data URI and its `caption`; of maps also the colour `bar`."""
-Row = tuple[str, str]
-"""A name and its value."""
+Estimate = tuple[np.ndarray, np.ndarray]
+"""Means of the blocks of a section and their numbers of samples, (h, w, C) each."""
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,8 @@ def smoothing_words(smoothing_px: float) -> str:
     return f", smoothed by {smoothing_px:g} px" if smoothing_px else ""
 
 
-def block_estimate(
-    sections: Sections, plane: int, crop: Crop, smoothing_px: float = 0.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate and samples (h, w, C) of the blocks of one section: the sums of its counts over its samples.
+def block_estimate(sections: Sections, plane: int, crop: Crop, smoothing_px: float = 0.0) -> Estimate:
+    """Estimate of the blocks of one section: the sums of its counts over its samples.
 
     Both are smoothed by a Gaussian with a standard deviation of `smoothing_px` pixels of the frame. At some
     depths no view has a sample of a colour at every second voxel, as in a Bayer mosaic. There the estimate is

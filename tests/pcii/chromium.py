@@ -77,38 +77,21 @@ class Page:
         """The text of the first element that a selector finds."""
         return self.value(f"document.querySelector({selector!r}).textContent")
 
-    def centre(self, selector: str, across: float = 0.5, down: float = 0.5) -> tuple[float, float]:
-        """A point in the first element that a selector finds, scrolled into the window."""
+    def click(self, selector: str) -> None:
+        """Click on the middle of the first element that a selector finds, scrolled into the window."""
         script = f"""(() => {{ const part = document.querySelector({selector!r});
             part.scrollIntoView({{block: "center", behavior: "instant"}});
             const box = part.getBoundingClientRect();
-            return [box.left + {across} * box.width, box.top + {down} * box.height]; }})()"""
+            return [box.left + box.width / 2, box.top + box.height / 2]; }})()"""
         x, y = self.value(script)
-        return x, y
-
-    def point(self, selector: str, across: float = 0.5, down: float = 0.5) -> None:
-        """Move the mouse to a point in an element."""
-        x, y = self.centre(selector, across, down)
-        self.call("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
-
-    def click(self, selector: str) -> None:
-        """Click on the middle of an element."""
-        x, y = self.centre(selector)
         for kind in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
-    def press(self, key: str, shift: bool = False) -> None:
-        """Press a key such as ArrowRight."""
-        codes = {"ArrowLeft": 37, "ArrowUp": 38, "ArrowRight": 39, "ArrowDown": 40, "Tab": 9, " ": 32}
+    def press_right(self) -> None:
+        """Press the right arrow key."""
+        key = {"key": "ArrowRight", "code": "ArrowRight", "windowsVirtualKeyCode": 39}
         for kind in ("keyDown", "keyUp"):
-            self.call(
-                "Input.dispatchKeyEvent",
-                type=kind,
-                key=key,
-                code=key,
-                windowsVirtualKeyCode=codes[key],
-                modifiers=8 * shift,
-            )
+            self.call("Input.dispatchKeyEvent", type=kind, **key)
 
 
 @contextlib.contextmanager

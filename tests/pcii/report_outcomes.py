@@ -1,6 +1,5 @@
 """Results of a small dataset, by hand, and what a report says of them."""
 
-import base64
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -8,7 +7,6 @@ import numpy as np
 
 from pcii.app.pipeline import Outcome
 from pcii.app.report import write_report
-from pcii.app.report_pictures import Crop
 from pcii.metrics.scoring import score
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset_writer import save_dataset
@@ -58,10 +56,3 @@ class Written(NamedTuple):
 def page_of(outcome: Outcome, folder: Path) -> str:
     write_report(folder / "report.html", outcome)
     return (folder / "report.html").read_text(encoding="utf-8")
-
-
-def decoded(coded: dict[str, Any], blocks: Crop) -> np.ndarray:
-    """Values of a map as the page's script reads them, NaN for none."""
-    codes = np.frombuffer(base64.b64decode(coded["values"]), "<u2").astype(float)
-    shape = (-(-blocks.height_px // blocks.step_px), -(-blocks.width_px // blocks.step_px))
-    return np.where(codes > 0, coded["origin"] + (codes - 1) * coded["step"], np.nan).reshape(shape)
