@@ -3,6 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
@@ -50,22 +51,28 @@ def plot_label(name: str) -> str:
     return name.lstrip("_").replace("$", r"\$")
 
 
+def style_context(style: Style) -> AbstractContextManager[None]:
+    """A context in which the style is drawn; raises `InputError` for an unknown one."""
+    from matplotlib.style import context
+
+    if style not in ("screen", "paper"):
+        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
+    return context("default" if style == "paper" else {})
+
+
 def several_axes(
     axes: "MaybeAxes",
     count: int,
     shape: Sequence[float] = (3.0, 4.0),
-    style: Style = "screen",
 ) -> np.ndarray:
     """The `count` axes (N,) of panels of the proportions `shape`, (height, width): those of `axes`, or new.
 
-    One panel's axes need no list. Raises `InputError` if the number of axes is not `count`, for anything that
-    is no Matplotlib axes, and for an unknown style.
+    One panel's axes need no list. Raises `InputError` if the number of axes is not `count`, and for anything
+    that is no Matplotlib axes.
     """
     from matplotlib import pyplot
     from matplotlib.axes import Axes
 
-    if style not in ("screen", "paper"):
-        raise InputError(f"style: expected 'screen' or 'paper', got {style!r}")
     if axes is not None:
         panels = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
         if len(panels) != count or not all(isinstance(panel, Axes) for panel in panels):
@@ -75,8 +82,7 @@ def several_axes(
     rows = -(-count // columns)
     height, width = (PANEL_IN * side / max(shape) for side in shape)
     size = columns * (max(width, PANEL_IN / 2) + LABELS_IN), rows * (max(height, PANEL_IN / 3) + LABELS_IN)
-    with pyplot.style.context("default" if style == "paper" else {}):
-        figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
+    figure, grid = pyplot.subplots(rows, columns, squeeze=False, figsize=size, layout="compressed")
     for unused in grid.flat[count:]:
         figure.delaxes(unused)
     return _array_of(list(grid.flat[:count]))

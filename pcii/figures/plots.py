@@ -21,6 +21,7 @@ from pcii.figures.panels import (
     several_axes,
     show_map,
     show_picture,
+    style_context,
     write_in_middle,
 )
 from pcii.figures.pictures import DEPTH_COLOURS, NO_ANSWER, SHARE_COLOURS
@@ -100,16 +101,16 @@ def plot_sections(
 
     planes, voxels = evenly_chosen(len(z_mm), MAX_PANELS), light_of(0)[0].shape
     step = block_px(voxels, PANEL_PX)
-    panels = several_axes(axes, len(planes), shape_HW, style=style)
     images = exposed(map(visible_light, planes), step)
-    for panel, plane, image in zip(panels, planes, images, strict=True):
-        title = f"section at {z_mm[plane]:.5g} mm"
-        if masks is not None:
-            title = f"{z_mm[plane]:.5g} mm: {masks[plane].mean():.1%} in focus\n{plot_label(method)}"
-        side = step * shape_HW[0] / voxels[0]
-        show_picture(panel, image, shape_HW, title, side, style, z_mm[plane] * px_at_1mm)
-        if masks is not None:
-            draw_outline(panel, masks[plane], shape_HW, COLOURS[4])
+    with style_context(style):
+        panels = several_axes(axes, len(planes), shape_HW)
+        for panel, plane, image in zip(panels, planes, images, strict=True):
+            title = f"section at {z_mm[plane]:.5g} mm"
+            if masks is not None:
+                title = f"{z_mm[plane]:.5g} mm: {masks[plane].mean():.1%} in focus\n{plot_label(method)}"
+                draw_outline(panel, masks[plane], shape_HW, COLOURS[4])
+            side = step * shape_HW[0] / voxels[0]
+            show_picture(panel, image, shape_HW, title, side, style, z_mm[plane] * px_at_1mm)
     return panels
 
 
@@ -132,14 +133,15 @@ def plot_depth(
     style: Style = "screen",
 ) -> np.ndarray:
     """Depth (H, W) in mm with a colour bar, near is bright: paler where less sure, grey without an answer."""
-    panels = several_axes(axes, 1, z_mm.shape, style=style)
     limits = z_range_mm or depth_limits_mm(z_mm)
-    if limits is None:
-        show_picture(panels[0], np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape), style)
-        write_in_middle(panels[0], "no depth is known")
-        return panels
-    label = "depth z (mm)"
-    show_map(panels[0], z_mm, z_mm.shape, title, DEPTH_COLOURS, limits, label, confidence, style=style)
+    with style_context(style):
+        panels = several_axes(axes, 1, z_mm.shape)
+        if limits is not None:
+            scale = DEPTH_COLOURS, limits, "depth z (mm)"
+            show_map(panels[0], z_mm, z_mm.shape, title, *scale, confidence, style=style)
+        else:
+            show_picture(panels[0], np.full((1, 1, 3), NO_ANSWER), z_mm.shape, title, max(z_mm.shape), style)
+            write_in_middle(panels[0], "no depth is known")
     return panels
 
 

@@ -14,6 +14,7 @@ from matplotlib import colormaps, style
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 from twins import unit_grid
 
@@ -207,6 +208,7 @@ def test_paper_style_has_scale_bars_in_mm_of_each_depth_and_is_written_as_pdf_an
         labels.append(bar.txt_label.get_text())
         assert axes.figure.get_facecolor() == (1, 1, 1, 1)
         assert axes.get_xlabel() == ""
+        assert {text.get_color() for text in axes.figure.findobj(Text)} == {"black"}
     assert labels == ["20 mm", "200 mm"] * 2 + ["20 px"]
     for suffix, start in (("pdf", b"%PDF"), ("svg", b"<?xml")):
         panels[0].figure.savefig(file := io.BytesIO(), format=suffix)
@@ -273,7 +275,7 @@ def test_charts_draw_means_with_intervals_and_bins_on_their_places() -> None:
     assert b == [[10, 0.25]]  # full light has no number of photons
     _, bars = (each for each in by_photons.collections if isinstance(each, LineCollection))
     assert bars.get_segments()[0].tolist() == [[10, 0.25], [10, 1]]
-    assert len(by_seconds.lines[0].get_xydata()) == 2
+    assert np.shape(by_seconds.lines[0].get_xydata()) == (2, 2)
     assert accuracy_chart(means.iloc[:0], ["a"], "IoU", is_share=True) is None
     bins = pd.DataFrame(
         {"method": ["a"], "light": ["x"], "confidence": [0.9], "correct": [0.8], "share": [1.0]}
