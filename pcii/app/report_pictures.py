@@ -3,7 +3,6 @@
 All show the same part of the frame, the `Crop`, so that a place in one is the same place in all others.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -155,29 +154,31 @@ def input_panels(pictures: Pictures) -> list[Panel]:
 
 
 def plane_panels(pictures: Pictures) -> list[tuple[str, list[Panel], list[Panel]]]:
-    """For each plane its depth, sections and truth, and each method's removal with its comparison."""
+    """For each plane its depth, sections with their truth, and each method's removal with its comparison."""
     outcome, crop, true = pictures.outcome, pictures.crop, pictures.true_masks
     words = smoothing_words(pictures.smoothing_px)
-    light = "photon counts (Eq. 3)" if outcome.dataset.has_counts else "full light (Eq. 2)"
-    images = _section_images(outcome.sections, crop, pictures.smoothing_px)
-    full_light: Sequence[np.ndarray] = []
-    if outcome.dataset.has_counts and outcome.full_light is not None:
-        full_light = _section_images(outcome.full_light, crop)
+    lights: dict[str, list[np.ndarray]] = {}
+    if outcome.dataset.has_counts:
+        photons = _section_images(outcome.sections, crop, pictures.smoothing_px)
+        lights[f"photon counts (Eq. 3){words}"] = photons
+    if outcome.full_light is not None:
+        lights["full light (Eq. 2)"] = _section_images(outcome.full_light, crop)
     planes: list[tuple[str, list[Panel], list[Panel]]] = []
     for plane, z in enumerate(outcome.sections.z_mm):
-        seen = [_photo(images[plane], f"section at {z:g} mm, {light}{words}")]
-        if full_light:
-            seen.append(_photo(full_light[plane], f"section at {z:g} mm, full light (Eq. 2)"))
+        sections = [
+            _photo(images[plane], f"section at {z:g} mm, {light}") for light, images in lights.items()
+        ]
         if true is not None:
-            seen.append(_drawing(mask_image(crop.middles(true[plane])), f"truth: objects at {z:g} mm"))
-        removed: list[Panel] = []
+            sections.append(_drawing(mask_image(crop.middles(true[plane])), f"truth: objects at {z:g} mm"))
+        masks: list[Panel] = []
+        first, *_ = lights.values()
         for focus in outcome.focus:
-            claimed = crop.middles(focus.in_focus[plane])
-            removed.append(_photo(images[plane] * claimed[..., None], f"{focus.method}, {z:g} mm{words}"))
+            claim = crop.middles(focus.in_focus[plane])
+            masks.append(_photo(first[plane] * claim[..., None], f"{focus.method}, {z:g} mm{words}"))
             if true is not None:
-                image = agreement_image(claimed, crop.middles(true[plane]))
-                removed.append(_drawing(image, f"{focus.method}, {z:g} mm, compared with the truth"))
-        planes.append((f"{z:g} mm", seen, removed))
+                image = agreement_image(claim, crop.middles(true[plane]))
+                masks.append(_drawing(image, f"{focus.method}, {z:g} mm, compared with the truth"))
+        planes.append((f"{z:g} mm", sections, masks))
     return planes
 
 

@@ -103,13 +103,13 @@ def _points(pictures: Pictures, own: dict[int, int]) -> list[dict[str, Any]]:
     if pictures.true_masks is not None:
         true = {here: crop.middles(pictures.true_masks[there]) for here, there in own.items()}
     for focus in pictures.outcome.focus:
-        claimed = {here: crop.middles(focus.in_focus[there]) for here, there in own.items()}
-        compared = {here: drawing_uri(agreement_image(claimed[here], mask)) for here, mask in true.items()}
-        points.append({"label": f"kept by {focus.method}", "masks": _drawn(claimed), "compared": compared})
+        claims = {here: crop.middles(focus.in_focus[there]) for here, there in own.items()}
+        compared = {here: drawing_uri(agreement_image(claims[here], mask)) for here, mask in true.items()}
+        points.append({"label": f"kept by {focus.method}", "masks": _mask_uris(claims), "compared": compared})
     if true:
-        points.append({"label": "in focus in truth", "masks": _drawn(true), "compared": {}})
+        points.append({"label": "in focus in truth", "masks": _mask_uris(true), "compared": {}})
     return points
 
 
-def _drawn(masks: dict[int, np.ndarray]) -> dict[int, str]:
+def _mask_uris(masks: dict[int, np.ndarray]) -> dict[int, str]:
     return {plane: drawing_uri(mask_image(mask)) for plane, mask in masks.items()}
