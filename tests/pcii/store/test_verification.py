@@ -9,7 +9,7 @@ import pytest
 from stored_datasets import flip_a_bit, make_dataset
 from tiny_datasets import OWN, write_dataset
 
-from pcii.app.results import Results
+from pcii.app.results import save_depth, writing
 from pcii.base.errors import InputError
 from pcii.evaluation.comparison import evaluate
 from pcii.store.collection_layout import COLLECTION_FOLDER, index_row, write_index
@@ -22,11 +22,9 @@ from pcii.types.estimates import DepthMap
 def make_results(root: Path) -> Path:
     """Results of a dataset that stands beside them."""
     dataset = open_dataset(make_dataset(root.with_name("dataset")))
-    with Results(root, dataset).writing() as results:
-        shape = (dataset.grid.height, dataset.grid.width)
-        results.save_depth(DepthMap(np.full(shape, 540.0), np.ones(shape)))
-        with results.replacing("report.html") as path:
-            path.write_text("<!doctype html>")
+    with writing(root, dataset) as folder:
+        save_depth(folder, DepthMap(np.full(dataset.grid.shape_HW, 540.0), np.ones(dataset.grid.shape_HW)))
+        (folder / "report.html").write_text("<!doctype html>")
     return root
 
 
