@@ -98,8 +98,8 @@ def evaluate(
 def verify(folder: Path, *, json: Json = False) -> None:
     """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
-    Names what is missing, truncated or changed, and what the manifest does not list; of results also what
-    other software made.
+    Names what is missing, truncated or changed, and what the manifest does not list, and says where other
+    software made results.
 
     Examples of use:
 
@@ -120,8 +120,8 @@ def verify(folder: Path, *, json: Json = False) -> None:
     if (folder / RESULTS).is_file() and not json:
         from pcii.app.results import other_software
 
-        for line in other_software(folder):
-            say(line)
+        if difference := other_software(folder):
+            say(f"other software made these results: {difference}")
 
 
 def main() -> int:

@@ -22,11 +22,10 @@ from pcii.exchange.import_requests import (
     read,
     values_of,
 )
-from pcii.store.dataset_writer import check_depth_range, held_dataset, save_dataset
-from pcii.types.arrays import check_z_mm
+from pcii.store.dataset_writer import held_dataset, save_dataset
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import Light, limit_photons
+from pcii.types.photon_limit import limit_photons
 
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
@@ -123,12 +122,7 @@ def import_dataset(
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
     """
-    depths = check_z_mm(z_mm).tolist() if z_mm else None
-    if z_range_mm is not None:
-        check_depth_range(z_range_mm)
-    if photons is not None:
-        Light.per_view(photons)
-    elif seed is not None:
+    if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
     options: dict[str, Any] = {"pattern": pattern, "grid": grid, "array": array, "counts": counts}
     options |= {"bitpack": bitpack, "width": width, "frames": frames}
@@ -153,7 +147,7 @@ def import_dataset(
             images,
             imported.truth,
             view_z_mm=imported.view_z_mm,
-            z_mm=depths or [float(f"{z:.3g}") for z in fit.z_mm] or None,
+            z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
             title=texts.title or source.resolve().name,

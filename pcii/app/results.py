@@ -1,7 +1,7 @@
 """The folder of results that commands write and later commands read.
 
-results.json             dataset, its identity and the light; the software that made each part; every file
-                         with size and SHA-256
+results.json             dataset, its identity and the light; versions of the software that made the results;
+                         every file with size and SHA-256
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
@@ -56,13 +56,11 @@ def run(
     z_range_mm: tuple[float, float],
     methods: Sequence[Method] = (),
     depth_method: Method = DEFAULT_METHOD,
-    smoothing_px: float | None = None,
     report: Report = silent,
 ) -> Outcome:
     """Analyse `dataset`, and write all results with a report into `out`, in the place of earlier ones.
 
-    The report shows photons smoothed by `smoothing_px`, as `write_report` says. Raises `InputError` as
-    `writing` and `analyse` do.
+    Raises `InputError` as `writing` and `analyse` do.
     """
     with writing(out, dataset, whole=True) as folder:
         outcome = analyse(dataset, planes, z_range_mm, methods, depth_method, report)
@@ -71,7 +69,7 @@ def run(
             save_segmented(folder, focus)
         save_depth(folder, outcome.depth)
         save_score(folder, outcome.score)
-        write_report(folder / REPORT, outcome, report, smoothing_px)
+        write_report(folder / REPORT, outcome, report)
     return outcome
 
 
@@ -86,33 +84,32 @@ def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Pat
     target = out.resolve()
     if target == dataset.path.resolve():
         raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-    _results_of(out, dataset)
     lock = target.with_name(f".{target.name}.lock")
     with _only_writer(lock, out), named_in_errors(out):
         for left in temporaries_of(target.parent, target.name):  # by a command that was killed
             shutil.rmtree(left, ignore_errors=True)
         before = _results_of(out, dataset)
-        if whole and before["files"] and (extra := strays(target, [RESULTS, *before["files"]])):
+        whole = whole or not before["files"]
+        if whole and (extra := strays(target, [RESULTS, *before["files"]])):
             raise InputError(f"{out}: holds {extra[0]}, which is no result; move it away")
         with temporary_folder(target) as folder:
             yield folder
             files = list_files(folder, sorted(entry.name for entry in folder.iterdir()))
-            parts = sorted({name.split("/")[0] for name in files})
-            software = {part: own_software() for part in parts if not part.endswith(".png")}
-            content = _origin(dataset) | {"software": software, "files": files}
-            if whole or not before["files"]:
+            content = _origin(dataset) | {"versions": own_software(), "files": files}
+            if whole:
                 write_results(folder, content)
                 replace_folder(folder, target)
                 return
             sweep_temporaries(target)
+            parts = sorted({name.split("/")[0] for name in files})
             for part in parts:
                 if (folder / part).is_dir():
                     replace_folder(folder / part, target / part)
                 else:
                     (folder / part).replace(target / part)
-            unchanged = {n: entry for n, entry in before["files"].items() if n.split("/")[0] not in parts}
-            content["software"] = dict(sorted((before["software"] | software).items()))
-            content["files"] = dict(sorted((unchanged | files).items()))
+            remaining = {n: entry for n, entry in before["files"].items() if n.split("/")[0] not in parts}
+            content["files"] = dict(sorted((remaining | files).items()))
+            content["versions"] = _all_versions(before["versions"], own_software())
             write_results(target, content)
 
 
@@ -140,13 +137,19 @@ def _results_of(out: Path, dataset: Dataset) -> dict[str, Any]:
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: this is a file; name a folder for the results")
     if not out.exists() or not any(out.iterdir()):
-        return {"software": {}, "files": {}}
+        return {"versions": {}, "files": {}}
     if not (out / RESULTS).is_file():
         raise InputError(f"{out}: holds something else; name a new or empty folder")
     results, origin = read_results(out), _origin(dataset)
     if (results["identity"], results["light"]) != (origin["identity"], origin["light"]):
         raise InputError(f"{out}: holds the results of another dataset or light; name a new or empty folder")
     return results
+
+
+def _all_versions(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
+    """Versions of software that made one part or another: of some packages several, with commas between."""
+    versions = {name: [*before.get(name, "").split(", "), now.get(name, "")] for name in {**before, **now}}
+    return {name: ", ".join(filter(None, dict.fromkeys(each))) for name, each in versions.items()}
 
 
 def save_sections(folder: Path, sections: Sections) -> None:
@@ -209,9 +212,6 @@ def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthM
     return segmented, depth
 
 
-def other_software(out: Path) -> list[str]:
-    """A line for each software, other than that of now, that made parts of the results in a folder."""
-    parts: dict[str, list[str]] = {}
-    for part, software in read_results(out)["software"].items():
-        parts.setdefault(differences(software, own_software()), []).append(part)
-    return [f"made by other software: {', '.join(parts[words])} ({words})" for words in parts if words]
+def other_software(out: Path) -> str:
+    """How the software that made the results in a folder differs from that of now; empty if it does not."""
+    return differences(read_results(out)["versions"], own_software())

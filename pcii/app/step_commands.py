@@ -17,7 +17,6 @@ from pcii.app.command_options import (
     method_of,
 )
 from pcii.base.command_output import answer, answer_json, say, say_next, say_next_page
-from pcii.base.errors import InputError
 from pcii.base.progress import Stages
 from pcii.depth.methods import DEFAULT_METHOD
 from pcii.store.dataset import Dataset
@@ -36,7 +35,6 @@ def run(
     method: tuple[str, ...] = (),
     depth_method: str = DEFAULT_METHOD,
     budget: Budget = None,
-    smoothing_px: float | None = None,
 ) -> None:
     """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
 
@@ -54,23 +52,17 @@ def run(
         A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
     depth_method
         A method of depth, as in `pcii depth`.
-    smoothing_px
-        Standard deviation of the Gaussian with which the report shows photons of sections, in pixels; 0 for
-        none. Default: the wider the fewer photons there are. Nothing else is smoothed.
     """
     from pcii.app.results import REPORT
     from pcii.app.results import run as write_all
     from pcii.store.suggested_depths import depth_range_of, planes_of
 
     data = dataset_at(dataset, budget)
-    max_px = max(data.grid.height, data.grid.width)
-    if smoothing_px is not None and not 0 <= smoothing_px <= max_px:
-        raise InputError(f"--smoothing-px: expected from 0 to the film's {max_px} px, got {smoothing_px:g}")
     planes = planes_of(data, z_mm)
     z_range_mm = z_range_mm or depth_range_of(data, planes)
     methods, estimator = [method_of(text) for text in method], method_of(depth_method)
     with Stages() as report:
-        outcome = write_all(data, out, planes, z_range_mm, methods, estimator, smoothing_px, report)
+        outcome = write_all(data, out, planes, z_range_mm, methods, estimator, report)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
@@ -233,8 +225,8 @@ def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
     data, light = open_dataset(dataset), read_results(out)["light"]
     data = data if light is None else data.at_budget(light)
     focus, depth_map = load_estimates(out, data)
-    for line in other_software(out):
-        say(line)
+    if difference := other_software(out):
+        say(f"{out}: other software made these results: {difference}")
     z_mm = data.analysis.get("z_mm")
     planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
     with writing(out, data) as folder:

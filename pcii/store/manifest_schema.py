@@ -174,7 +174,7 @@ class ResultsManifest(FileList):
     dataset: Text
     identity: str
     light: Photons | Literal["full-light"] | None
-    software: dict[FileName, dict[str, Text]]
+    versions: dict[str, Text]
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:

@@ -8,15 +8,15 @@ from pcii.base.safe_files import write_json_safely
 from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, parse_json, read_small
 
 RESULTS = "results.json"
-REMEDY = "make the results again"
+REMEDY = "delete the folder and make the results again"
 _HEAD = {"format": "photon-integral-imaging results", "format_version": 3}
 
 
 def read_results(folder: Path) -> dict[str, Any]:
-    """The list of a folder of results: `dataset`, `identity`, `light`, `software` and `files`.
+    """The list of a folder of results: `dataset`, `identity`, `light`, `versions` and `files`.
 
-    `software` has the versions of the software that made each part, `files` the size and SHA-256 of each
-    file. Raises `InputError` if the list is missing, damaged or of another release.
+    `versions` are those of the software that made the results, `files` the size and SHA-256 of each file.
+    Raises `InputError` if the list is missing, damaged or of another release.
     """
     from pcii.store.manifest_schema import ResultsManifest, validate
 

@@ -151,13 +151,16 @@ def test_masks_that_no_list_names_are_not_read(saved: Path, tmp_path: Path) -> N
         load_estimates(saved, dataset_of(tmp_path))
 
 
-def test_parts_that_other_software_made_are_named(saved: Path) -> None:
-    assert other_software(saved) == []
+def test_other_software_is_named_until_all_is_made_anew(saved: Path, tmp_path: Path) -> None:
+    assert other_software(saved) == ""
     content = json.loads((saved / RESULTS).read_text())
-    content["software"]["depth.zarr"]["numpy"] = "1.0"
+    now, content["versions"]["numpy"] = content["versions"]["numpy"], "1.0"
     (saved / RESULTS).write_text(json.dumps(content))
-    (line,) = other_software(saved)
-    assert line.startswith("made by other software: depth.zarr (numpy 1.0 is now ")
+    assert other_software(saved) == f"numpy 1.0 is now {now}"
+    save(saved, dataset_of(tmp_path), 0.9)
+    assert other_software(saved) == f"numpy 1.0, {now} is now {now}"
+    save(saved, dataset_of(tmp_path), 0.9, whole=True)
+    assert other_software(saved) == ""
 
 
 # Writes a depth map of 2, where one of 1 is, and dies at the n-th change that it makes to a folder.

@@ -150,7 +150,7 @@ def test_what_a_method_cannot_take_is_refused_before_any_work(
 def test_without_depths_of_planes_removal_is_left_out(tmp_path: Path) -> None:
     ranged = saved(tmp_path / "ranged", COUNTS, z_range_mm=(450, 800))
     assert chosen([ranged]) == [("ranged", None, name) for name in OF_COUNTS]
-    with pytest.raises(InputError, match="names no depths"):
+    with pytest.raises(InputError, match="suggests no depths"):
         chosen([ranged], "variance")
 
 

@@ -81,6 +81,8 @@ def test_every_damage_to_every_file_is_found(
     names = [path.relative_to(root) for path in sorted(root.rglob("*")) if path.is_file()]
     assert verify(root) == len(names) - (make is not make_collection)  # a manifest is not in its own list
     for name in names:
+        if name.name == "results.json":  # not sealed: what it lists is checked
+            continue
         broken = tmp_path / "broken"
         shutil.copytree(root, broken)
         damage(broken / name, rng)
