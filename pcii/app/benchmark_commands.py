@@ -9,6 +9,9 @@ from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
+from pcii.evaluation.benchmark_collection import open_benchmark
+from pcii.evaluation.benchmark_page import write_page
+from pcii.evaluation.submission_scores import run_method, score_submission
 from pcii.store.collection_layout import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
@@ -55,9 +58,6 @@ def run(
     budget
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import run_method
-
     with Stages() as report:
         options = {"half": half, "budgets": budget, "executor": executor, "report": report}
         _say_scores(out, run_method(method, open_benchmark(data), out, **options))
@@ -81,9 +81,6 @@ def score(
     folder
         Folder of the results.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import score_submission
-
     with Stages() as report:
         options = {"half": half, "executor": executor, "report": report}
         _say_scores(out, score_submission(folder, open_benchmark(data), out, **options))
@@ -104,8 +101,6 @@ def page(folder: Path, *, out: Out) -> None:
     out
         The page to write, in a folder that exists.
     """
-    from pcii.evaluation.benchmark_page import write_page
-
     count = write_page(folder, out)
     say(f"{out}: {count} submission{'' if count == 1 else 's'}")
     say_next_page(out)

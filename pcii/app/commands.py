@@ -8,11 +8,16 @@ from cyclopts import Parameter
 from pcii.app.benchmark_commands import benchmark
 from pcii.app.command_options import Depths, Json, Out, evaluated_method
 from pcii.app.import_commands import import_dataset
+from pcii.app.results import other_software
 from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
 from pcii.base.command_output import results_folder, say, say_next, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
+from pcii.evaluation import comparison
+from pcii.store.results_list import RESULTS
+from pcii.store.sample_dataset import copy_sample
+from pcii.store.verification import verify_and_tell
 
 app = command_line.command_app(
     "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."
@@ -36,8 +41,6 @@ def sample(*, out: Out) -> None:
     out
         Folder for the dataset: new or empty.
     """
-    from pcii.store.sample_dataset import copy_sample
-
     copy_sample(out)
     say(f"{out}")
     say_next("pcii", "run", out, "-o", results_folder(out))
@@ -78,11 +81,9 @@ def evaluate(
         Depth of a section in mm, or start:stop:step; repeat for more. Default: those that each dataset
         suggests.
     """
-    from pcii.evaluation.comparison import evaluate as compare
-
     methods = [evaluated_method(text) for text in method]
     with Stages() as report:
-        evaluation = compare(
+        evaluation = comparison.evaluate(
             datasets, out, methods=methods, budgets=budget, z_mm=z_mm, executor=executor, report=report
         )
     if evaluation["made"]["differing"]:
@@ -113,15 +114,9 @@ def verify(folder: Path, *, json: Json = False) -> None:
     json
         Print the number of files, or what is wrong, as JSON.
     """
-    from pcii.store.results_list import RESULTS
-    from pcii.store.verification import verify_and_tell
-
     verify_and_tell(folder, as_json=json)
-    if (folder / RESULTS).is_file() and not json:
-        from pcii.app.results import other_software
-
-        if difference := other_software(folder):
-            say(f"other software made these results: {difference}")
+    if (folder / RESULTS).is_file() and not json and (difference := other_software(folder)):
+        say(f"other software made these results: {difference}")
 
 
 def main() -> int:

@@ -1,6 +1,5 @@
 """The command `pcii import`: images made by others become a dataset."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,21 +30,6 @@ FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Texts:
-    """What the dataset says of itself."""
-
-    title: str | None = None
-    """Title of reports."""
-    licence: str | None = None
-    """Licence of the images."""
-    citation: str | None = None
-    """Whom to cite for the images."""
-
-
-TEXTS = Texts()
-
-
 def import_dataset(
     source: Path,
     *,
@@ -66,7 +50,9 @@ def import_dataset(
     seed: int | None = None,
     z_mm: Depths = (),
     z_range_mm: Pair = None,
-    texts: Annotated[Texts, FLAT] = TEXTS,
+    title: str | None = None,
+    licence: str | None = None,
+    citation: str | None = None,
 ) -> None:
     """Make a dataset of images that others made: pictures, arrays, lens arrays, photon counts.
 
@@ -121,6 +107,12 @@ def import_dataset(
         things are sharpest.
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
+    title
+        Title of reports. Default: the name of the source.
+    licence
+        Licence of the images.
+    citation
+        Whom to cite for the images.
     """
     if seed is not None and photons is None:
         raise InputError("--seed: is for --photons N, which draws photon counts")
@@ -150,9 +142,9 @@ def import_dataset(
             z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
-            title=texts.title or source.resolve().name,
-            licence=texts.licence,
-            citation=texts.citation,
+            title=title or source.resolve().name,
+            licence=licence,
+            citation=citation,
             origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW

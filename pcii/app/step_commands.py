@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from pcii.app import results
 from pcii.app.command_options import (
     Budget,
     DatasetFolder,
@@ -16,11 +17,20 @@ from pcii.app.command_options import (
     dataset_at,
     method_of,
 )
+from pcii.app.pipeline import full_light_sections
 from pcii.base.command_output import answer, answer_json, say, say_next, say_next_page
 from pcii.base.progress import Stages
-from pcii.depth.methods import DEFAULT_METHOD
-from pcii.store.dataset import Dataset
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
+from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
+from pcii.metrics import scoring
+from pcii.removal import methods as removal
+from pcii.sections import reconstruction
+from pcii.sections.demosaicing import demosaic
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.results_list import read_results
+from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import DepthMap
+from pcii.types.focal_planes import FocalPlanes
 
 LOW_DEPTH_SHARE = 0.05
 """A depth map that answers for a smaller share of the pixels is warned of."""
@@ -53,24 +63,20 @@ def run(
     depth_method
         A method of depth, as in `pcii depth`.
     """
-    from pcii.app.results import REPORT
-    from pcii.app.results import run as write_all
-    from pcii.store.suggested_depths import depth_range_of, planes_of
-
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
     z_range_mm = z_range_mm or depth_range_of(data, planes)
     methods, estimator = [method_of(text) for text in method], method_of(depth_method)
     with Stages() as report:
-        outcome = write_all(data, out, planes, z_range_mm, methods, estimator, report)
+        outcome = results.run(data, out, planes, z_range_mm, methods, estimator, report)
     for row in outcome.score.planes:
         if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
             say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
     if not outcome.focus:
         say("sections and depth only: removal needs photon counts; import the images with --photons N")
     _warn_of_few_depths(outcome.depth, data)
-    say(f"report: {out / REPORT}")
-    say_next_page(out / REPORT)
+    say(f"report: {out / results.REPORT}")
+    say_next_page(out / results.REPORT)
 
 
 def reconstruct(
@@ -96,24 +102,18 @@ def reconstruct(
     shifts
         `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
-    from pcii.app.results import SECTIONS, save_sections, writing
-    from pcii.figures.pictures import to_srgb8, white_level, write_png
-    from pcii.sections.demosaicing import demosaic
-    from pcii.sections.reconstruction import reconstruct as make
-    from pcii.store.suggested_depths import planes_of
-
     data = dataset_at(dataset, budget)
     planes = planes_of(data, z_mm)
-    with writing(out, data) as folder:
-        sections = make(data.counts_or_views, planes, subpixel=subpixel, shifts=shifts)
-        save_sections(folder, sections)
+    with results.writing(out, data) as folder:
+        sections = reconstruction.reconstruct(data.counts_or_views, planes, subpixel=subpixel, shifts=shifts)
+        results.save_sections(folder, sections)
         for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
             estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
             if sections.cfa is not None:
                 estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
             picture = to_srgb8(estimate, white_level(estimate, (slice(None), slice(None))))
             write_png(folder / f"section_{z:g}mm.png", picture)
-    say(f"{out / SECTIONS}, and for each depth a picture such as {out / f'section_{planes.z_mm[0]:g}mm.png'}")
+    say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
     saturated = int(np.count_nonzero(sections.saturated))
     if saturated:
         say(f"{saturated} of {sections.counts.size} voxels are saturated: their estimate is infinite")
@@ -143,16 +143,11 @@ def depth(
         posterior or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
         structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
-    from pcii.app.results import save_depth, writing
-    from pcii.depth.methods import estimate_depth
-    from pcii.figures.pictures import depth_image, write_png
-    from pcii.store.suggested_depths import depth_range_of
-
     data, estimator = dataset_at(dataset, budget), method_of(method)
     near, far = z_range_mm or depth_range_of(data)
-    with writing(out, data) as folder:
+    with results.writing(out, data) as folder:
         depth_map = estimate_depth(data.counts_or_views, (near, far), method=estimator)
-        save_depth(folder, depth_map)
+        results.save_depth(folder, depth_map)
         picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
         write_png(folder / "depth.png", picture)
     say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, greyer where less sure")
@@ -182,16 +177,11 @@ def segment(
         shape-from-focus (for comparison); or one that a package registers, module:function, or
         file.py:function.
     """
-    from pcii.app.results import save_segmented, writing
-    from pcii.figures.pictures import mask_image, write_png
-    from pcii.removal.methods import segment as remove
-    from pcii.store.suggested_depths import planes_of
-
-    data, removal = dataset_at(dataset, budget), method_of(method)
+    data, remove = dataset_at(dataset, budget), method_of(method)
     planes = planes_of(data, z_mm)
-    with writing(out, data) as folder:
-        focus = remove(data.counts, planes, method=removal)
-        save_segmented(folder, focus)
+    with results.writing(out, data) as folder:
+        focus = removal.segment(data.counts, planes, method=remove)
+        results.save_segmented(folder, focus)
         names = [f"in_focus_{focus.method}_{z:g}mm.png" for z in focus.z_mm]
         for name, mask in zip(names, focus.in_focus, strict=True):
             write_png(folder / name, mask_image(mask))
@@ -215,30 +205,23 @@ def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
     json
         Print the score too, as score.json has it.
     """
-    from pcii.app.pipeline import full_light_sections
-    from pcii.app.results import SCORE, load_estimates, other_software, save_score, writing
-    from pcii.metrics.scoring import score as compare
-    from pcii.store.dataset import open_dataset
-    from pcii.store.results_list import read_results
-    from pcii.types.focal_planes import FocalPlanes
-
     data, light = open_dataset(dataset), read_results(out)["light"]
     data = data if light is None else data.at_budget(light)
-    focus, depth_map = load_estimates(out, data)
-    if difference := other_software(out):
+    focus, depth_map = results.load_estimates(out, data)
+    if difference := results.other_software(out):
         say(f"{out}: other software made these results: {difference}")
     z_mm = data.analysis.get("z_mm")
     planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
-    with writing(out, data) as folder:
+    with results.writing(out, data) as folder:
         full_light = full_light_sections(data, planes) if data.truth and planes else None
-        result = compare(
+        result = scoring.score(
             focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
         )
-        save_score(folder, result)
+        results.save_score(folder, result)
     if json:
         answer_json(result.to_dict())
         return
-    say(f"{out / SCORE}")
+    say(f"{out / results.SCORE}")
     if data.truth is None:
         say("the dataset has no truth: what is compared with it is null")
     else:

@@ -8,7 +8,7 @@ from pcii.base.safe_files import write_json_safely
 from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, parse_json, read_small
 
 RESULTS = "results.json"
-REMEDY = "delete the folder and make the results again"
+REMEDY = "make the results again in a new folder"
 _HEAD = {"format": "photon-integral-imaging results", "format_version": 3}
 
 
