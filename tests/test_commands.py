@@ -3,12 +3,14 @@
 import itertools
 import json
 import re
+import shlex
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 import zarr
+from cyclopts import App
 from PIL import Image
 
 from pcii.app import commands as pcii_cli
@@ -64,32 +66,16 @@ def test_score_json_is_as_in_the_contract(results: Path) -> None:
     assert all(0 < row["depth_sigma_px"] < 0.1 for row in score["bounds"]["objects"])
 
 
-def test_table_1_holds_on_the_small_scene(results: Path) -> None:
-    objects = json.loads((results / "score.json").read_text())["objects"]
-    ball, bird = (row["entropy"] for row in objects)
+def test_table_1_holds_and_objects_are_found_on_the_small_scene(results: Path) -> None:
+    score = json.loads((results / "score.json").read_text())
+    ball, bird = (row["entropy"] for row in score["objects"])
     assert ball["540"] < ball["620"]
     assert bird["620"] < bird["540"]
-
-
-def test_objects_are_found_on_the_small_scene(results: Path) -> None:
     # 38 px wide objects and a blur of 3.8 px: found about 0.1 better than this, by either backend.
-    rows = json.loads((results / "score.json").read_text())["planes"]
     least = {"likelihood": 0.8, "three-step": 0.6}
-    for row in rows:
+    for row in score["planes"]:
         if row["truth"] == "object":
             assert row["iou"] > least[row["method"]], row
-
-
-def test_the_report_is_one_file_with_everything_in_it(results: Path) -> None:
-    page = (results / "report.html").read_text()
-    assert "Figure 6" in page
-    assert "Figure 7" in page
-    assert "Table 1" in page
-    assert len(re.findall("data:image/(?:png|webp);base64,", page)) >= 8 + 4 * 3 + 3 + 24
-    assert page.count("<script") == 1  # that of the slider; tests of pages compare it with its source
-    assert "None" not in re.sub("[A-Za-z0-9+/=]{60,}", "", page)  # pictures may spell anything
-    assert "://" not in page
-    assert str(results.parent) not in page
 
 
 def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path, tmp_path: Path) -> None:
@@ -110,16 +96,6 @@ def test_steps_one_by_one_give_the_same_score(small_dataset: Path, results: Path
     assert (tmp_path / "steps" / "section_580mm.png").is_file()
 
 
-def test_a_depth_map_alone_is_scored(small_dataset: Path, results: Path, tmp_path: Path) -> None:
-    out, data = str(tmp_path / "depth"), str(small_dataset)
-    assert command_line.run(pcii_cli.app, ["depth", data, "-o", out]) == 0
-    assert command_line.run(pcii_cli.app, ["score", data, out]) == 0
-    one, other = (json.loads((Path(d) / "score.json").read_text()) for d in (out, results))
-    assert one["planes"] == one["objects"] == []
-    assert one["depth"] == other["depth"]
-    assert one["bounds"]["objects"] == other["bounds"]["objects"]
-
-
 def test_run_takes_the_methods_it_is_told(
     small_dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,22 +110,6 @@ def test_run_takes_the_methods_it_is_told(
     rows = json.loads((out / "score.json").read_text())["planes"]
     assert list(dict.fromkeys(row["method"] for row in rows)) == ["brightness", "shape-from-focus"]
     assert "shape-from-focus" in (out / "report.html").read_text()
-
-
-def test_steps_are_left_out_and_results_named_so(
-    small_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    command = ["segment", str(small_dataset), "--z-mm", "540", "-o", str(tmp_path / "out")]
-    steps = [*command, "--method", "three-step", "--without", "entropy", "--without", "threshold"]
-    assert command_line.run(pcii_cli.app, [*steps, "--subpixel", "2"]) == 0
-    name = "three-step-subpixel-2-without-threshold-without-entropy"
-    assert (tmp_path / "out" / f"segmented_{name}.zarr").is_dir()
-    assert (tmp_path / "out" / f"in_focus_{name}_540mm.png").is_file()
-    capsys.readouterr()
-    for option in (["--without", "entropy"], ["--subpixel", "2"]):
-        assert f"{option[0]}: is for --method three-step" in refusal(
-            pcii_cli.app, [*command, *option], capsys
-        )
 
 
 def test_sections_in_the_papers_order_are_mosaics_and_their_picture_has_colours(
@@ -189,9 +149,8 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     small_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data, out = str(small_dataset), str(tmp_path / "out")
-    for text in ("1.5", "two"):
-        said = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", text, "-o", out], capsys)
-        assert f"--subpixel: expected a whole number, got '{text}'" in said
+    said = refusal(pcii_cli.app, ["reconstruct", data, "--subpixel", "1.5", "-o", out], capsys)
+    assert "--subpixel: expected a whole number, got '1.5'" in said
     for z in ("0", "-540", "nan", "inf"):
         said = refusal(pcii_cli.app, ["reconstruct", data, f"--z-mm={z}", "-o", out], capsys)
         assert "above 0 mm" in said
@@ -199,18 +158,13 @@ def test_bad_input_to_pcii_is_told_in_one_sentence(
     assert "z_mm: 0.62 mm is so near that no views overlap" in said
     assert "if metres are meant, it is 620" in said
     assert "no such dataset" in refusal(pcii_cli.app, ["run", str(tmp_path / "no"), "-o", out], capsys)
-    assert "this is the dataset itself" in refusal(pcii_cli.app, ["run", data, "-o", data], capsys)
     broken = tmp_path / "broken"
     shutil.copytree(small_dataset, broken)
     (broken / "counts.zarr" / "n" / "c" / "0").write_bytes(b"")
     assert "truncated" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
     (broken / "manifest.json").write_text("{")
     assert "manifest.json: damaged" in refusal(pcii_cli.app, ["run", str(broken), "-o", out], capsys)
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "notes.txt").touch()
-    assert "holds something else" in refusal(
-        pcii_cli.app, ["run", data, "-o", str(tmp_path / "full")], capsys
-    )
+    assert "holds something else" in refusal(pcii_cli.app, ["run", data, "-o", str(tmp_path)], capsys)
     assert not Path(out).exists()
 
 
@@ -230,46 +184,33 @@ def test_results_and_datasets_are_verified_by_one_command(
     assert "no such" in refusal(pcii_cli.app, ["verify", str(tmp_path / "nowhere")], capsys)
 
 
-def test_masks_whose_file_is_gone_are_not_scored_as_empty(
-    small_dataset: Path, results: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    broken = tmp_path / "broken"
-    shutil.copytree(results, broken)
-    (broken / "segmented_likelihood.zarr" / "in_focus" / "c" / "0" / "0" / "0").unlink()
-    assert "missing" in refusal(pcii_cli.app, ["score", str(small_dataset), str(broken)], capsys)
-
-
-def test_a_smaller_budget_is_asked_for_by_option(
+def test_results_are_of_one_light(
     nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     data, totals = str(nested_dataset), []
-    for budget in ("400", "120", "30"):
-        out = tmp_path / budget
-        command = ["reconstruct", data, "--z-mm", "580", "-o", str(out)]
-        assert command_line.run(pcii_cli.app, [*command, "--budget", budget]) == 0
+    for budget in ([], ["--budget", "400"], ["--budget", "120"], ["--budget", "30"]):
+        out = tmp_path / "-".join(["out", *budget[1:]])
+        command = ["reconstruct", data, "--z-mm", "580", "-o", str(out), *budget]
+        assert command_line.run(pcii_cli.app, command) == 0
         group = zarr.open_group(out / "sections.zarr", mode="r")
         totals.append(int(np.asarray(group["counts"]).sum()))
+    assert totals[0] == totals[1]
     # Of 6 views of 64 x 60 pixels with 0.01 dark counts each; at 580 mm some fall beside the section.
     full = [6 * budget + 6 * 64 * 60 * 0.01 for budget in (400, 120, 30)]
-    assert all(0.6 * expected < found < 1.1 * expected for found, expected in zip(totals, full, strict=True))
-    whole = tmp_path / "whole"
-    assert command_line.run(pcii_cli.app, ["reconstruct", data, "--z-mm", "580", "-o", str(whole)]) == 0
-    group = zarr.open_group(whole / "sections.zarr", mode="r")
-    assert int(np.asarray(group["counts"]).sum()) == totals[0]
-
-
-def test_every_command_takes_a_smaller_budget(
-    nested_dataset: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    data, out = str(nested_dataset), str(tmp_path / "out")
-    small = ["--budget", "120"]
-    assert command_line.run(pcii_cli.app, ["run", data, "--z-mm", "540", "-o", out, *small]) == 0
-    assert command_line.run(pcii_cli.app, ["segment", data, "--z-mm", "540", "-o", out, *small]) == 0
-    assert command_line.run(pcii_cli.app, ["depth", data, "-o", out, *small]) == 0
-    assert command_line.run(pcii_cli.app, ["score", data, out, *small]) == 0
+    assert all(0.6 * most < total < 1.1 * most for total, most in zip(totals[1:], full, strict=True))
+    out = str(tmp_path / "out-120")
+    small = ["-o", out, "--budget", "120"]
+    assert command_line.run(pcii_cli.app, ["segment", data, "--z-mm", "540", *small]) == 0
+    assert command_line.run(pcii_cli.app, ["depth", data, *small]) == 0
+    assert command_line.run(pcii_cli.app, ["score", data, out]) == 0
+    scores = [json.loads(Path(out, "score.json").read_text())]
+    methods = ["--method", "likelihood"]
+    assert command_line.run(pcii_cli.app, ["run", data, "--z-mm", "540", *methods, *small]) == 0
+    scores.append(json.loads(Path(out, "score.json").read_text()))
+    assert scores[0] == scores[1]
     capsys.readouterr()
-    for command in (["score", data, out], ["depth", data, "-o", out, "--budget", "30"]):
-        assert "of another dataset or photon budget" in refusal(pcii_cli.app, command, capsys)
+    command = ["depth", data, "-o", out, "--budget", "30"]
+    assert "of another dataset or light" in refusal(pcii_cli.app, command, capsys)
 
 
 def test_a_budget_that_is_not_there_is_refused(
@@ -289,7 +230,7 @@ def test_a_budget_that_is_not_there_is_refused(
         (pcii_cli.app, "evaluate somewhere --workers"),
     ],
 )
-@pytest.mark.parametrize("given", ["2.5", "1e3", "two"])
+@pytest.mark.parametrize("given", ["2.5", "two"])
 def test_a_number_that_is_not_whole_is_refused_where_one_is_due(
     app: object, command: str, given: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -306,18 +247,26 @@ def test_a_failure_is_one_line_and_exit_code_1(
     def full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pcii.app.results.Results.save_sections", full_disk)
+    monkeypatch.setattr("pcii.app.results.save_sections", full_disk)
     command = ["reconstruct", str(small_dataset), "-o", str(tmp_path / "x")]
     assert command_line.run(pcii_cli.app, command) == 1
     assert "No space left" in capsys.readouterr().err
 
 
-def test_help_of_every_command_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
-    for app in (simgen_cli.app, pcii_cli.app):
-        for command in app:
-            if not command.startswith("-"):
-                assert command_line.run(app, [command, "--help"]) == 0
-                assert "Example" in capsys.readouterr().out, command
+@pytest.mark.parametrize("app", [simgen_cli.app, pcii_cli.app])
+def test_help_of_every_command_has_examples_that_can_be_typed(
+    app: App, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    commands = [[name] for name in app if not name.startswith("-")]
+    commands += [[name, inner] for (name,) in commands for inner in app[name] if not inner.startswith("-")]
+    for command in commands:
+        assert command_line.run(app, [*command, "--help"]) == 0
+        page = re.sub(r" *\\ *\n *", " ", capsys.readouterr().out)
+        examples = re.findall(rf"^ *{app.name[0]} ({command[0]} .*?) *$", page, re.MULTILINE)
+        assert examples, command
+        for example in examples:
+            app.parse_args(shlex.split(example.split(" > ")[0]), exit_on_error=False, print_error=False)
 
 
 def test_doctor_scenes_and_schema_answer(capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,9 +29,12 @@ OWN, PLAIN = "ours", "plain script"
 ANALYSIS = """
 import json, sys
 from pathlib import Path
-from pcii.app.single_run import run
+from pcii.app.results import run
 from pcii.store.dataset import open_dataset
-print(json.dumps(run(open_dataset(Path(sys.argv[1])), Path(sys.argv[2]), None).timings_s))
+from pcii.store.suggested_depths import depth_range_of, planes_of
+dataset = open_dataset(Path(sys.argv[1]))
+outcome = run(dataset, Path(sys.argv[2]), planes_of(dataset, None), depth_range_of(dataset))
+print(json.dumps(outcome.timings_s))
 """
 """What `pcii run` does, but for the command line; it tells the seconds of its stages."""
 ASIDE = "everything else"

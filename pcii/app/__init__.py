@@ -1,11 +1,9 @@
 """The `pcii` command: order of the analysis, folder of results, report.
 
 benchmark_commands  The command `pcii benchmark`.
-command_options  Options that several commands take: folder of results, depths, a smaller photon budget.
+command_options  Options that several commands take: folders, depths, a light, methods.
 commands         The `pcii` command.
-import_commands  The command `pcii import`: images made by others become a dataset; and its options.
-long_steps       The long steps of an analysis; what an earlier run did is kept if nothing that it follows
-                 from has changed.
+import_commands  The command `pcii import`: images made by others become a dataset.
 pipeline         Analysis of a dataset, from sections to scores, in the order of the paper's sections 2
                  and 3.
 report           report.html: a slider through the depths, pictures of each plane, depth, scores, and how it
@@ -16,7 +14,5 @@ report_slider    Sections through the whole depth range, for the slider of a rep
 report_tables    Numbers of a report as text: key facts, entropies of the objects, scores of the masks and
                  of the depth map.
 results          The folder of results that commands write and later commands read.
-single_run       Analysis of one dataset with all its results written: sections, masks, depth, scores and
-                 report.
-step_commands    Commands for single steps of the analysis: sections, depth, removal.
+step_commands    Commands that analyse one dataset: all steps, sections, depth, removal, score.
 """

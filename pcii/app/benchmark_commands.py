@@ -9,10 +9,14 @@ from pcii.app.command_options import Out
 from pcii.base.command_output import say, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
+from pcii.evaluation.benchmark_collection import open_benchmark
+from pcii.evaluation.benchmark_page import write_page
+from pcii.evaluation.submission_scores import run_method, score_submission
 from pcii.store.collection_layout import IN_FRAMES, Half
 
 Data = Annotated[Path, Parameter(help="Folder of the benchmark, which `simgen benchmark make` makes.")]
 OfHalf = Annotated[Half, Parameter(help="Methods are tuned on the one and reported on the other.")]
+ScoresOut = Annotated[Out, Parameter(help="Folder for the scores: new, empty, or those of an earlier call.")]
 Workers = Annotated[Executor, Parameter(name="*")]
 
 benchmark = App(
@@ -32,7 +36,7 @@ def run(
     method: str,
     *,
     data: Data,
-    out: Out,
+    out: ScoresOut,
     half: OfHalf = "test",
     budget: tuple[str, ...] = (),
     executor: Workers = ALONE,
@@ -44,44 +48,31 @@ def run(
     Examples of use:
 
         pcii benchmark run three-step --data out/bench -o out/three-step
-        pcii benchmark run depth:variance-sweep --data out/bench -o out/variance-sweep
-        pcii benchmark run my_module:remove --data out/bench --half development -o out/mine
-        pcii benchmark run depth:my_module:estimate --data out/bench -o out/mine
+        pcii benchmark run depth:variance-sweep --data out/bench --half development -o out/variance-sweep
 
     Parameters
     ----------
     method
         A method of removal, or depth:NAME; or module:function, of the working directory or installed, and
         depth:module:function.
-    out
-        Folder for the scores: new, empty, or those of an earlier run, which is extended.
     budget
         Score at so many photons per view only, or at full-light; may be repeated. For a first look.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import run_method
-
     with Stages() as report:
-        result = run_method(
-            method,
-            open_benchmark(data),
-            out,
-            half=half,
-            budgets=budget,
-            executor=executor,
-            report=report,
-        )
-    _tell(out, result)
+        options = {"half": half, "budgets": budget, "executor": executor, "report": report}
+        _say_scores(out, run_method(method, open_benchmark(data), out, **options))
 
 
 @benchmark.command
-def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor: Workers = ALONE) -> None:
+def score(
+    folder: Path, *, data: Data, out: ScoresOut, half: OfHalf = "test", executor: Workers = ALONE
+) -> None:
     """Score maps of depth and masks that were made elsewhere, after checking all of them.
 
     FOLDER has submission.json, and for each dataset and light a folder such as ramp_photons_1/1000 with
     depth.npz, .pfm or .exr, or with masks.npz or mask_540.png and so on.
 
-    Examples of use:
+    Example of use:
 
         pcii benchmark score my-results --data out/bench -o out/mine
 
@@ -89,17 +80,10 @@ def score(folder: Path, *, data: Data, out: Out, half: OfHalf = "test", executor
     ----------
     folder
         Folder of the results.
-    out
-        Folder for the scores: new, empty, or those of an earlier call.
     """
-    from pcii.evaluation.benchmark_collection import open_benchmark
-    from pcii.evaluation.submission_scores import score_submission
-
     with Stages() as report:
-        result = score_submission(
-            folder, open_benchmark(data), out, half=half, executor=executor, report=report
-        )
-    _tell(out, result)
+        options = {"half": half, "executor": executor, "report": report}
+        _say_scores(out, score_submission(folder, open_benchmark(data), out, **options))
 
 
 @benchmark.command
@@ -117,14 +101,12 @@ def page(folder: Path, *, out: Out) -> None:
     out
         The page to write, in a folder that exists.
     """
-    from pcii.evaluation.benchmark_page import write_page
-
     count = write_page(folder, out)
     say(f"{out}: {count} submission{'' if count == 1 else 's'}")
     say_next_page(out)
 
 
-def _tell(out: Path, result: dict[str, Any]) -> None:
+def _say_scores(out: Path, result: dict[str, Any]) -> None:
     groups = result["groups"]
     scenes = {group["title"].removesuffix(IN_FRAMES) for group in groups}
     rows = sum(group["datasets"] for group in groups)

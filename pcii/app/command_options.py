@@ -1,17 +1,23 @@
-"""Options that several commands take: folder of results, depths, a smaller photon budget."""
+"""Options that several commands take: folders, depths, a light, methods."""
 
+import importlib
 import math
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import CoercionError, Parameter
 
+from pcii.base.errors import InputError
+from pcii.base.extensions import name_of
 from pcii.store.dataset import Dataset, budget_of, open_dataset
 from pcii.types.arrays import MOST_DEPTHS
 
 if TYPE_CHECKING:
     from cyclopts import Token
+
+Function = Callable[..., Any]
 
 
 def depths_mm(text: str) -> list[float]:
@@ -28,18 +34,15 @@ def depths_mm(text: str) -> list[float]:
         numbers = []
     if len(numbers) == 1:
         return numbers
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise ValueError(
-            f"expected a depth in mm such as 540, or start:stop:step such as 500:700:20, got {text!r}"
-        )
-    start, stop, step = numbers
-    if step <= 0 or stop < start:
-        raise ValueError(f"expected start:stop:step with start up to stop and a step above 0, got {text!r}")
-    steps = (stop - start) / step
-    if steps >= MOST_DEPTHS:
-        raise ValueError(f"{text!r} are more than {MOST_DEPTHS} depths; take a larger step")
-    # Steps such as 0.1 are not exact in binary; the stop counts as met within a millionth of a step.
-    return [start + number * step for number in range(math.floor(steps + 1e-6) + 1)]
+    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
+        start, stop, step = numbers
+        if step > 0 and start <= stop and (stop - start) / step < MOST_DEPTHS:
+            # Steps such as 0.1 are not exact in binary; the stop counts as met within a millionth of a step.
+            return [start + number * step for number in range(math.floor((stop - start) / step + 1e-6) + 1)]
+    raise ValueError(
+        "expected a depth in mm such as 540, or start:stop:step such as 500:700:20 of at most "
+        f"{MOST_DEPTHS} depths, got {text!r}"
+    )
 
 
 def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
@@ -52,10 +55,10 @@ def _all_depths_mm(kind: Any, tokens: "Sequence[Token]") -> tuple[float, ...]:
     return tuple(depths)
 
 
-def opened(dataset: Path, budget: str | None) -> Dataset:
+def dataset_at(folder: Path, budget: str | None) -> Dataset:
     """The dataset with the photons of this budget, None: of its recipe's; or its radiance, at full light."""
-    data = open_dataset(dataset)
-    return data if budget is None else data.at_budget(budget_of(budget))
+    dataset = open_dataset(folder)
+    return dataset if budget is None else dataset.at_budget(budget_of(budget))
 
 
 def budget_words(dataset: Dataset) -> list[str]:
@@ -64,8 +67,53 @@ def budget_words(dataset: Dataset) -> list[str]:
     return [] if budget is None else ["--budget", budget if isinstance(budget, str) else f"{budget:g}"]
 
 
+def method_of(text: str) -> str | Function:
+    """A method as it is typed: its name, or the function that module:function or file.py:function means.
+
+    Modules are those of the working directory or installed. Raises `InputError` if there is no such function.
+    """
+    place, colon, name = text.rpartition(":")
+    if not colon:
+        return text
+    file = Path(place)
+    is_file = file.suffix == ".py"
+    folder, module = (str(file.resolve().parent), file.stem) if is_file else ("", place)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    try:
+        function = getattr(importlib.import_module(module), name)
+    except Exception as fault:  # importing a module of others may raise anything
+        raise InputError(f"method: {text!r} cannot be loaded: {type(fault).__name__}: {fault}") from None
+    if not callable(function):
+        raise InputError(f"method: {text!r} is no function")
+    return function
+
+
+def evaluated_method(text: str) -> str | tuple[str, Function]:
+    """A method of an evaluation, where depth: stands before one of depth; a function with its name."""
+    prefix = "depth:" if text.startswith("depth:") else ""
+    method = method_of(text.removeprefix(prefix))
+    return text if isinstance(method, str) else (prefix + name_of(method), method)
+
+
 Out = Annotated[Path, Parameter(name=("--out", "-o"))]
+ResultsOut = Annotated[Out, Parameter(help="Folder for the results: new, or with results of this dataset.")]
+DatasetFolder = Annotated[Path, Parameter(help="A dataset folder.")]
 Depths = Annotated[tuple[float, ...], Parameter(name="--z-mm", converter=_all_depths_mm)]
+SectionDepths = Annotated[
+    Depths,
+    Parameter(
+        help="Depth of a section in mm, or start:stop:step; repeat for more. Default: those that the dataset "
+        "suggests."
+    ),
+]
+DepthRange = Annotated[
+    tuple[float, float] | None,
+    Parameter(
+        help="Nearest and farthest depth to search, in mm. Default: the range that the dataset suggests, or "
+        "4/5 of its nearest to 5/4 of its farthest depth."
+    ),
+]
 Budget = Annotated[
     str | None,
     Parameter(help="Use the photons of this smaller, nested budget, or full-light: the radiance alone."),

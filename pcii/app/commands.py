@@ -6,22 +6,25 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from pcii.app.benchmark_commands import benchmark
-from pcii.app.command_options import Budget, Depths, Json, Out, opened
+from pcii.app.command_options import Depths, Json, Out, evaluated_method
 from pcii.app.import_commands import import_dataset
-from pcii.app.results import Results
-from pcii.app.step_commands import depth, reconstruct, segment
+from pcii.app.results import other_software
+from pcii.app.step_commands import depth, reconstruct, run, score, segment
 from pcii.base import command_line
-from pcii.base.command_output import answer_json, results_folder, say, say_next, say_next_page
+from pcii.base.command_output import results_folder, say, say_next, say_next_page
 from pcii.base.executor import ALONE, Executor
 from pcii.base.progress import Stages
-from pcii.depth.methods import DEFAULT_METHOD
+from pcii.evaluation import comparison
+from pcii.store.results_list import RESULTS
+from pcii.store.sample_dataset import copy_sample
+from pcii.store.verification import verify_and_tell
 
 app = command_line.command_app(
     "pcii", "Reconstruct photon-counted integral images, remove defocused points, and score the result."
 )
 
 app.command(import_dataset, name="import")
-for command in (reconstruct, depth, segment, benchmark):
+for command in (run, reconstruct, depth, segment, score, benchmark):
     app.command(command)
 
 
@@ -38,112 +41,9 @@ def sample(*, out: Out) -> None:
     out
         Folder for the dataset: new or empty.
     """
-    from pcii.store.sample_dataset import copy_sample
-
     copy_sample(out)
     say(f"{out}")
     say_next("pcii", "run", out, "-o", results_folder(out))
-
-
-@app.command
-def run(
-    dataset: Path,
-    *,
-    out: Out,
-    z_mm: Depths = (),
-    method: tuple[str, ...] = (),
-    depth_method: str = DEFAULT_METHOD,
-    budget: Budget = None,
-) -> None:
-    """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
-
-    What earlier runs finished, interrupted ones too, is kept where dataset, options and software (with that
-    of methods of other packages) are the same: the command goes on from there.
-
-    Examples of use:
-
-        pcii run out/paper -o out/paper-results
-        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood
-        pcii run out/paper -o out/paper-300 --budget 300
-
-    Parameters
-    ----------
-    dataset
-        A dataset folder, as made by `simgen generate`.
-    out
-        Folder for the results: new, empty, or that of earlier results of the same dataset.
-    z_mm
-        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that the recipe
-        names.
-    method
-        A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
-    depth_method
-        A method of depth, as in `pcii depth`.
-    """
-    from pcii.app.single_run import run as run_all
-
-    with Stages() as report:
-        outcome = run_all(opened(dataset, budget), out, z_mm, report, method or None, depth_method)
-    if outcome.kept:
-        say(f"kept from an earlier run: {'; '.join(outcome.kept)}")
-    for row in outcome.score.planes:
-        if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
-            say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
-    if not outcome.focus:
-        say("sections and depth only: removal needs photon counts; import the images with --photons N")
-    say(f"report: {out / 'report.html'}")
-    say_next_page(out / "report.html")
-
-
-@app.command
-def score(dataset: Path, out: Path, *, budget: Budget = None, json: Json = False) -> None:
-    """Compare the results in a folder with the dataset's truth, and write score.json into it.
-
-    Examples of use:
-
-        pcii score out/paper out/paper-results
-        pcii score out/paper out/depth --json
-
-    Parameters
-    ----------
-    dataset
-        The dataset folder, with truth.
-    out
-        The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
-    json
-        Print the score too, as score.json has it.
-    """
-    from pcii.app.pipeline import full_light_sections
-    from pcii.base.errors import InputError
-    from pcii.metrics.scoring import score as compare
-    from pcii.types.focal_planes import FocalPlanes
-
-    data = opened(dataset, budget)
-    results = Results(out, data)
-    results.check()
-    focus, depth_map = results.load_segmented(), results.load_depth()
-    if not focus and depth_map is None:
-        steps = "`pcii segment`, `pcii depth` or `pcii run`"
-        raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with {steps}")
-    z_mm = data.analysis.get("z_mm")
-    planes = FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
-    if focus:
-        planes = focus[0].sections.planes
-    full_light = None
-    if data.truth is not None and planes is not None:
-        with Stages() as report:
-            full_light = full_light_sections(data, planes, report)
-    result = compare(focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name)
-    with results.writing():
-        path = results.save_score(result)
-    if json:
-        answer_json(result.to_dict())
-    else:
-        say(f"{path}")
-        if data.truth is None:
-            say("the dataset has no truth: what is compared with it is null")
-            return
-        say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
 
 
 @app.command
@@ -178,14 +78,13 @@ def evaluate(
     budget
         A photon budget that every dataset has, or full-light: its radiance; may be repeated. Default: all.
     z_mm
-        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that each recipe
-        names.
+        Depth of a section in mm, or start:stop:step; repeat for more. Default: those that each dataset
+        suggests.
     """
-    from pcii.evaluation.comparison import evaluate as compare
-
+    methods = [evaluated_method(text) for text in method]
     with Stages() as report:
-        evaluation = compare(
-            datasets, out, methods=method, budgets=budget, z_mm=z_mm, executor=executor, report=report
+        evaluation = comparison.evaluate(
+            datasets, out, methods=methods, budgets=budget, z_mm=z_mm, executor=executor, report=report
         )
     if evaluation["made"]["differing"]:
         differing = ", ".join(evaluation["made"]["differing"])
@@ -200,7 +99,8 @@ def evaluate(
 def verify(folder: Path, *, json: Json = False) -> None:
     """Compare every file of a dataset, a collection, results or an evaluation with its manifest.
 
-    Names what is missing, truncated or changed, and what the manifest does not list.
+    Names what is missing, truncated or changed, and what the manifest does not list, and says where other
+    software made results.
 
     Examples of use:
 
@@ -214,11 +114,11 @@ def verify(folder: Path, *, json: Json = False) -> None:
     json
         Print the number of files, or what is wrong, as JSON.
     """
-    from pcii.store.verification import verify_and_tell
-
     verify_and_tell(folder, as_json=json)
+    if (folder / RESULTS).is_file() and not json and (difference := other_software(folder)):
+        say(f"other software made these results: {difference}")
 
 
 def main() -> int:
     """Entry point of the `pcii` command."""
-    return command_line.run(app, resuming=("run", "evaluate", "benchmark"))
+    return command_line.run(app, resuming=("evaluate", "benchmark"))

@@ -1,6 +1,5 @@
 """The command `pcii import`: images made by others become a dataset."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,29 +21,13 @@ from pcii.exchange.import_requests import (
     read,
     values_of,
 )
-from pcii.store.dataset_writer import check_depth_range, held_dataset, save_dataset
-from pcii.types.arrays import check_z_mm
+from pcii.store.dataset_writer import held_dataset, save_dataset
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
-from pcii.types.photon_limit import Light, limit_photons
+from pcii.types.photon_limit import limit_photons
 
 FLAT = Parameter(name="*")
 CAMERAS, ORDER, LENSES, LIGHT = Cameras(), ViewOrder(), Lenses(), PictureLight()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Texts:
-    """What the dataset says of itself."""
-
-    title: str | None = None
-    """Title of reports."""
-    licence: str | None = None
-    """Licence of the images."""
-    citation: str | None = None
-    """Whom to cite for the images."""
-
-
-TEXTS = Texts()
 
 
 def import_dataset(
@@ -64,10 +47,12 @@ def import_dataset(
     light: Annotated[PictureLight, FLAT] = LIGHT,
     cfa: str | None = None,
     photons: float | None = None,
-    seed: int = 1,
+    seed: int | None = None,
     z_mm: Depths = (),
     z_range_mm: Pair = None,
-    texts: Annotated[Texts, FLAT] = TEXTS,
+    title: str | None = None,
+    licence: str | None = None,
+    citation: str | None = None,
 ) -> None:
     """Make a dataset of images that others made: pictures, arrays, lens arrays, photon counts.
 
@@ -116,28 +101,24 @@ def import_dataset(
     photons
         Draw photon counts with so many expected in each view.
     seed
-        Seed of these counts.
+        Seed of these counts; 1 by default.
     z_mm
         Depth to look at in mm, or start:stop:step, kept as a suggestion; repeat for more. Default: where
         things are sharpest.
     z_range_mm
         Nearest and farthest depth of the scene in mm, kept as a suggestion.
+    title
+        Title of reports. Default: the name of the source.
+    licence
+        Licence of the images.
+    citation
+        Whom to cite for the images.
     """
-    depths = check_z_mm(z_mm).tolist() if z_mm else None
-    if z_range_mm is not None:
-        check_depth_range(z_range_mm)
-    if photons is not None:
-        Light.per_view(photons)
-    options: dict[str, Any] = {
-        "pattern": pattern,
-        "grid": grid,
-        "array": array,
-        "counts": counts,
-        "bitpack": bitpack,
-        "width": width,
-        "frames": frames,
-        "cfa": None if cfa is not None and cfa.lower() == "none" else cfa,
-    }
+    if seed is not None and photons is None:
+        raise InputError("--seed: is for --photons N, which draws photon counts")
+    options: dict[str, Any] = {"pattern": pattern, "grid": grid, "array": array, "counts": counts}
+    options |= {"bitpack": bitpack, "width": width, "frames": frames}
+    options["cfa"] = None if cfa is not None and cfa.lower() == "none" else cfa
     for group in (cameras, order, lenses, light):
         options |= values_of(group)
     held_dataset(out, None, content=False)
@@ -145,12 +126,12 @@ def import_dataset(
     with Stages() as report:
         imported = read(Source(source, report, notes.append), options)
         images: list[Views | PhotonCounts] = [imported.images]
-        drawn = ""
+        origin = imported.origin
         if photons is not None:
             if isinstance(imported.images, PhotonCounts):
                 raise InputError(f"--photons: is for pictures, and {source} has photon counts already")
-            images.append(limit_photons(imported.images, photons, seed=seed))
-            drawn = f"; {photons:g} photons expected in each view, seed {seed}"
+            images.append(limit_photons(imported.images, photons, seed=seed or 1))
+            origin += f"; {photons:g} photons expected in each view, seed {seed or 1}"
         z_range = z_range_mm or imported.z_range_mm
         fit = check_grid(imported.images, z_range, order=order, counted=imported.counted)
         dataset = save_dataset(
@@ -158,47 +139,41 @@ def import_dataset(
             images,
             imported.truth,
             view_z_mm=imported.view_z_mm,
-            z_mm=depths or [float(f"{z:.3g}") for z in fit.z_mm] or None,
+            z_mm=z_mm or [float(f"{z:.3g}") for z in fit.z_mm] or None,
             z_range_mm=z_range,
             photon_budget=photons,
-            title=texts.title or source.resolve().name,
-            licence=texts.licence,
-            citation=texts.citation,
-            origin=imported.origin + drawn,
+            title=title or source.resolve().name,
+            licence=licence,
+            citation=citation,
+            origin=origin,
         )
     K, L, H, W = dataset.grid.shape_KLHW
-    bayer = dataset.cfa or "no"
-    say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {bayer} Bayer pattern; {imported.origin}{drawn}")
+    sensor = "mono" if dataset.cfa is None else f"{dataset.cfa} Bayer pattern"
+    say(f"{dataset.path}: {K} x {L} views of {H} x {W} px, {sensor}; {origin}")
     for note in notes:
         (answer if note.startswith("warning") else say)(note)
-    advice = None if imported.states_cameras else _advice(fit, imported.images, order, lenses)
+    advice = None if imported.states_cameras else _advice(fit, order, lenses)
     if advice is not None:
         answer(f"warning: {advice}; then delete {out} and import again")
         return
-    _say_depths(fit, imported.images)
+    _say_depths(fit)
     say_next("pcii", "run", out, "-o", results_folder(out))
 
 
-def _advice(fit: CameraFit, images: Views | PhotonCounts, order: ViewOrder, lenses: Lenses) -> str | None:
+def _advice(fit: CameraFit, order: ViewOrder, lenses: Lenses) -> str | None:
     """What would make the views fit the cameras, in words of options; None if they do."""
-    sentences = []
+    sentences: list[str] = []
     if fit.order is not None:
-        changed = {n: value for n, value in values_of(fit.order).items() if value != getattr(order, n)}
-        if (
-            lenses.lens_array is not None
-            and set(changed) == {"flip_rows", "flip_cols"}
-            and order == ViewOrder()
-        ):
-            changed = {"inverted": not lenses.inverted}
-        flags = {
-            value: [f"--{n.replace('_', '-')}" for n, v in changed.items() if v is value]
-            for value in (True, False)
-        }
-        words = [f"with {' '.join(flags[True])}"] * bool(flags[True])
-        words += [f"without {' '.join(flags[False])}"] * bool(flags[False])
+        changes = {n: value for n, value in values_of(fit.order).items() if value != getattr(order, n)}
+        if lenses.lens_array is not None and changes.keys() == {"flip_rows", "flip_cols"}:
+            changes = {"inverted": not lenses.inverted}  # each lens image is turned by 180 degrees
+        flags = {value: [n for n in changes if changes[n] is value] for value in (True, False)}
+        words = [
+            f"{word} --{' --'.join(names).replace('_', '-')}"
+            for word, names in (("with", flags[True]), ("without", flags[False]))
+            if names
+        ]
         sentences.append(f"the views fit together far better {' and '.join(words)}")
-        if set(changed) == {"flip_rows", "flip_cols"}:
-            sentences.append("or, if pictures were shifted so that something stands still, with --shear-px")
     if fit.shear_px is not None:
         x, y = fit.shear_px
         sentences.append(
@@ -213,20 +188,20 @@ def _advice(fit: CameraFit, images: Views | PhotonCounts, order: ViewOrder, lens
     return "; ".join(sentences) or None
 
 
-def _say_depths(fit: CameraFit, images: Views | PhotonCounts) -> None:
+def _say_depths(fit: CameraFit) -> None:
     """Say where things are sharp; where nothing is, what was looked at and the next step."""
-    is_counts = isinstance(images, PhotonCounts)
     if fit.z_mm:
         say(f"sharpest at {', '.join(map(_three_digits, fit.z_mm))} mm")
     elif fit.nearest_mm is None:
-        why = "photons are too few" if is_counts else "there is one view, or views are too small"
-        say(f"cannot judge whether views fit their cameras: {why}; name depths to `pcii run` by --z-mm")
-    else:
-        why = "if photons are not too few" if is_counts else "if there is texture"
         say(
-            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; {why}, correct "
-            "the order of views, --pitch-mm, --focal-mm or the size of pixels, else name depths to `pcii "
-            "run` by --z-mm"
+            "cannot judge whether views fit their cameras, of one view, of small views or of few photons; "
+            "name depths to `pcii run` by --z-mm"
+        )
+    else:
+        say(
+            f"nothing is clearly sharp from {_three_digits(fit.nearest_mm)} mm to infinity; if there are "
+            "photons and texture enough, correct the order of views, --pitch-mm, --focal-mm or the size of "
+            "pixels, else name depths to `pcii run` by --z-mm"
         )
 
 

@@ -1,279 +1,217 @@
 """The folder of results that commands write and later commands read.
 
-results.json             which dataset it belongs to, every file with size and SHA-256, its own checksum; of
-                         what `pcii run` made, by what (see `pcii.app.long_steps`) and how long it took;
-                         `due`, the parts that have to be made, or made again
+results.json             dataset, its identity and the light; versions of the software that made the results;
+                         every file with size and SHA-256
 sections.zarr/           z_mm, counts, coverage
 segmented_<method>.zarr/ z_mm, in_focus; photon_in_focus where the method decides about single photons
 depth.zarr/              z_mm, confidence
 score.json               as in `Score.to_dict`
 *.png, report.html       pictures and the report
 
-A replacement is written completely under a temporary name. Then the old entry is removed from results.json,
-the replacement renamed, and its entry added: a kill at any time leaves the old results, none, or the new
-ones. `due` lists the parts that are missing or older than the others and have to be made: after a run that
-was interrupted, those that it had not reached; after a command that replaced masks or depth, the scores and
-the report.
+New results are written completely into a folder beside, and renamed.
 """
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pcii.app.pipeline import Method, Outcome, analyse
+from pcii.app.report import write_report
 from pcii.base.errors import InputError
+from pcii.base.progress import Report, silent
 from pcii.base.safe_files import (
     locked,
     named_in_errors,
     replace_folder,
     sweep_temporaries,
-    sync_folder,
+    temporaries_of,
     temporary_folder,
     write_json_safely,
 )
+from pcii.depth.methods import DEFAULT_METHOD
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.file_list import list_files, lists_part
-from pcii.store.results_list import FINISH, LOCK, RESULTS, RESULTS_FOLDER, read_results
+from pcii.store.file_list import list_files, lists_part, strays
+from pcii.store.hashes import hash_json
+from pcii.store.results_list import REMEDY, RESULTS, read_results, write_results
+from pcii.store.software import differences, own_software
 from pcii.store.zarr_groups import read_array, write_arrays
-from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
+from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS
 from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.focal_planes import FocalPlanes
 from pcii.types.section_stack import Sections
 
-REMEDY = "make it again"
-DEPTH = "depth.zarr"
-SECTIONS = "sections.zarr"
-SCORE = "score.json"
-REPORT = "report.html"
+SECTIONS, DEPTH, SCORE, REPORT = "sections.zarr", "depth.zarr", "score.json", "report.html"
 
 
-def masks_name(method: str) -> str:
-    """Name of the folder of a method's masks."""
-    return f"segmented_{method}.zarr"
+def run(
+    dataset: Dataset,
+    out: Path,
+    planes: FocalPlanes,
+    z_range_mm: tuple[float, float],
+    methods: Sequence[Method] = (),
+    depth_method: Method = DEFAULT_METHOD,
+    report: Report = silent,
+) -> Outcome:
+    """Analyse `dataset`, and write all results with a report into `out`, in the place of earlier ones.
+
+    Raises `InputError` as `writing` and `analyse` do.
+    """
+    with writing(out, dataset, whole=True) as folder:
+        outcome = analyse(dataset, planes, z_range_mm, methods, depth_method, report)
+        save_sections(folder, outcome.sections)
+        for focus in outcome.focus:
+            save_segmented(folder, focus)
+        save_depth(folder, outcome.depth)
+        save_score(folder, outcome.score)
+        write_report(folder / REPORT, outcome, report)
+    return outcome
 
 
-@dataclass(frozen=True)
-class StepRecord:
-    """What a file or folder of results follows from, as a hash, and how long it took to make."""
+@contextmanager
+def writing(out: Path, dataset: Dataset, *, whole: bool = False) -> Iterator[Path]:
+    """An empty folder to write results into, which are moved into `out` when the block ends without an error.
 
-    key: str
-    seconds: float
+    They replace earlier results of the same names or, if they are `whole`, all earlier ones. Raises
+    `InputError` if another command is writing there, for the dataset itself, and for a folder that has
+    something else, or results of another dataset or light.
+    """
+    target = out.resolve()
+    if target == dataset.path.resolve():
+        raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
+    lock = target.with_name(f".{target.name}.lock")
+    with _only_writer(lock, out), named_in_errors(out):
+        for left in temporaries_of(target.parent, target.name):  # by a command that was killed
+            shutil.rmtree(left, ignore_errors=True)
+        before = _results_of(out, dataset)
+        whole = whole or not before["files"]
+        if whole and (extra := strays(target, [RESULTS, *before["files"]])):
+            raise InputError(f"{out}: holds {extra[0]}, which is no result; move it away")
+        with temporary_folder(target) as folder:
+            yield folder
+            files = list_files(folder, sorted(entry.name for entry in folder.iterdir()))
+            content = _origin(dataset) | {"versions": own_software(), "files": files}
+            if whole:
+                write_results(folder, content)
+                replace_folder(folder, target)
+                return
+            sweep_temporaries(target)
+            parts = sorted({name.split("/")[0] for name in files})
+            for part in parts:
+                if (folder / part).is_dir():
+                    replace_folder(folder / part, target / part)
+                else:
+                    (folder / part).replace(target / part)
+            remaining = {n: entry for n, entry in before["files"].items() if n.split("/")[0] not in parts}
+            content["files"] = dict(sorted((remaining | files).items()))
+            content["versions"] = _all_versions(before["versions"], own_software())
+            write_results(target, content)
 
 
-@dataclass(frozen=True)
-class Results:
-    """A folder of results of one dataset and photon budget."""
-
-    path: Path
-    dataset: Dataset
-
-    @property
-    def _origin(self) -> dict[str, Any]:
-        """Dataset and budget that the results belong to, as in results.json."""
-        data = self.dataset
-        return {"dataset": data.name, "identity": data.manifest.get("identity"), "budget": data.budget}
-
-    def check(self) -> None:
-        """Raise `InputError` unless the folder is new, empty, or has results of this dataset and budget."""
-        out = self.path
-        if out.resolve() == self.dataset.path.resolve():
-            raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-        if RESULTS_FOLDER.guard(out) and not self._origin.items() <= read_results(out).items():
-            raise InputError(
-                f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
-            )
-
-    @contextmanager
-    def writing(self) -> Iterator["Results"]:
-        """Make the folder and lock it against other writers until the end of the block."""
-        self.check()
-        self.path.mkdir(parents=True, exist_ok=True)
-        with named_in_errors(self.path), locked(self.path / LOCK, wait=True):
+@contextmanager
+def _only_writer(lock: Path, out: Path) -> Iterator[None]:
+    try:
+        with locked(lock, wait=False):
             try:
-                self.check()
-                sweep_temporaries(self.path)
-                if not (self.path / RESULTS).exists():
-                    self._list({}, {}, ())
-                yield self
+                yield
             finally:
-                (self.path / LOCK).unlink(missing_ok=True)
-
-    @contextmanager
-    def replacing(self, name: str, record: StepRecord | None = None) -> Iterator[Path]:
-        """Path at which to write the new file or folder `name`; it is renamed at the end of the block."""
-        target = self.path / name
-        with temporary_folder(target) as temporary:
-            new = temporary / name
-            yield new
-            held = read_results(self.path)
-            files, made, due = held["files"], held["made"], set(held["due"])
-            remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
-            made = {part: how for part, how in made.items() if part != name}
-            listed = list_files(temporary, [name])
-            if remaining | listed != files:
-                due |= {part for part in _made_from(name) if part in files}
-            if len(remaining) < len(files):
-                self._list(remaining, made, due | {name})
-            if new.is_dir():
-                replace_folder(new, target)
-            else:
-                new.replace(target)
-                sync_folder(self.path)
-            if record is not None:
-                made[name] = asdict(record)
-            self._list(remaining | listed, made, due - {name})
-
-    def begin(self, parts: Iterable[str]) -> None:
-        """List parts as due before the first of them is made; each is until it is made."""
-        held = read_results(self.path)
-        self._list(held["files"], held["made"], {*held["due"], *parts})
-
-    def keep(self, name: str) -> None:
-        """Say that the part that is there already is the one to be made."""
-        held = read_results(self.path)
-        self._list(held["files"], held["made"], {*held["due"]} - {name})
-
-    def _list(self, files: Mapping[str, Any], made: Mapping[str, Any], due: Collection[str]) -> None:
-        """Write results.json, the same whatever order the files were made in."""
-        in_order = {"files": dict(sorted(files.items())), "made": dict(sorted(made.items()))}
-        RESULTS_FOLDER.write(self.path, self._origin | in_order | ({"due": sorted(due)} if due else {}))
-
-    def save_sections(self, sections: Sections) -> Path:
-        """Write the counts and the coverage, whose quotient is the estimate."""
-        arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
-        pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
-        labels = SECTIONS_LABELS
-        if sections.counts.dtype.kind == "f":
-            labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
-        return self._save(SECTIONS, arrays, labels, pattern)
-
-    def save_segmented(self, focus: Segmented, record: StepRecord | None = None) -> Path:
-        """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
-        arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
-        if focus.photon_in_focus is not None:
-            arrays["photon_in_focus"] = focus.photon_in_focus
-        attributes = {"method": focus.method}
-        return self._save(masks_name(focus.method), arrays, SEGMENTED_LABELS, attributes, record)
-
-    def save_depth(self, depth: DepthMap, record: StepRecord | None = None) -> Path:
-        """Write the depth map and its confidence."""
-        arrays = {"z_mm": depth.z_mm, "confidence": depth.confidence}
-        return self._save(DEPTH, arrays, DEPTH_LABELS, record=record)
-
-    def save_score(self, result: Score) -> Path:
-        """Write score.json."""
-        with self.replacing(SCORE) as path:
-            write_json_safely(path, result.to_dict())
-        return self.path / SCORE
-
-    def _save(
-        self,
-        name: str,
-        arrays: Mapping[str, np.ndarray],
-        labels: Mapping[str, Label],
-        attributes: Mapping[str, Any] | None = None,
-        record: StepRecord | None = None,
-    ) -> Path:
-        with self.replacing(name, record) as path:
-            write_arrays(path, arrays, labels, attributes)
-        return self.path / name
-
-    def load_segmented(self) -> list[Segmented]:
-        """The in-focus masks of every method in the folder; their sections are reconstructed again.
-
-        Raises `InputError` if those of a method are older than a run that was not finished.
-        """
-        files = self._current_files()
-        groups = {name.split("/")[0] for name in files}
-        segmented: list[Segmented] = []
-        sections: dict[bytes, Sections] = {}
-        for group in sorted(
-            name for name in groups if name.startswith("segmented_") and name.endswith(".zarr")
-        ):
-            arrays = self._masks(group, files)
-            method = group.removeprefix("segmented_").removesuffix(".zarr")
-            try:
-                depths = arrays.pop("z_mm")
-                if depths.tobytes() not in sections:
-                    sections[depths.tobytes()] = reconstruct(self.dataset.counts, depths)
-                segmented.append(_segmented(arrays, method, sections[depths.tobytes()]))
-            except InputError as fault:
-                raise InputError(f"{self.path / group}: {fault}; {REMEDY}") from None
-        return segmented
-
-    def _masks(self, group: str, files: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """`z_mm`, `in_focus` and, if the method decides it, `photon_in_focus` of a method."""
-        has_photons = lists_part(files, f"{group}/photon_in_focus")
-        names = ("z_mm", "in_focus", *(["photon_in_focus"] if has_photons else []))
-        arrays = {name: self._read(f"{group}/{name}", files, SEGMENTED_LABELS[name]) for name in names}
-        if has_photons and arrays["photon_in_focus"].shape[-1] != self.dataset.counts.events.n.size:
-            raise InputError(f"{self.path / group}: its photon_in_focus is of other counts; {REMEDY}")
-        return arrays
-
-    def kept_masks(self, method: str, sections: Sections, key: str) -> tuple[Segmented, float] | None:
-        """The masks of a method and how long they took, if they were made by `key` and are undamaged."""
-        seconds = self._made_by(masks_name(method), key)
-        if seconds is None:
-            return None
-        try:
-            arrays = self._masks(masks_name(method), read_results(self.path)["files"])
-            depths = arrays.pop("z_mm")
-            same = np.array_equal(depths, sections.z_mm)
-            return (_segmented(arrays, method, sections), seconds) if same else None
-        except InputError:
-            return None
-
-    def kept_depth(self, key: str) -> tuple[DepthMap, float] | None:
-        """The depth map and how long it took, if it was made by `key` and is undamaged."""
-        seconds = self._made_by(DEPTH, key)
-        try:
-            depth = None if seconds is None else self._depth(read_results(self.path)["files"])
-        except InputError:
-            return None
-        return None if depth is None or seconds is None else (depth, seconds)
-
-    def _made_by(self, name: str, key: str) -> float | None:
-        """How long it took to make a part, in s; None if it was not made by `key`, or is not there."""
-        if not (self.path / RESULTS).is_file():
-            return None
-        made = read_results(self.path)["made"].get(name)
-        return made["seconds"] if made is not None and made["key"] == key else None
-
-    def load_depth(self) -> DepthMap | None:
-        """The depth map in the folder, or None; raises `InputError` as `load_segmented` does."""
-        return self._depth(self._current_files())
-
-    def _current_files(self) -> Mapping[str, Any]:
-        """Listed files; raises `InputError` if masks or a depth map are older than an unfinished run."""
-        held = read_results(self.path)
-        estimates = (part for part in held["due"] if SCORE in _made_from(part))
-        older = [part for part in estimates if lists_part(held["files"], part)]
-        if older:
-            raise InputError(
-                f"{self.path}: {', '.join(older)}: older than the last run, which was not finished; {FINISH}"
-            )
-        return held["files"]
-
-    def _depth(self, files: Mapping[str, Any]) -> DepthMap | None:
-        if not lists_part(files, DEPTH):
-            return None
-        return DepthMap(**{n: self._read(f"{DEPTH}/{n}", files, DEPTH_LABELS[n]) for n in DEPTH_LABELS})
-
-    def _read(self, name: str, files: Mapping[str, Any], label: Label) -> np.ndarray:
-        grid = self.dataset.grid
-        sizes = {"row": grid.height, "col": grid.width}
-        return read_array(self.path, name, files, label, sizes, REMEDY)
+                lock.unlink(missing_ok=True)
+    except BlockingIOError:
+        raise InputError(f"{out}: another command is writing results there; wait for its end") from None
 
 
-def _made_from(name: str) -> tuple[str, ...]:
-    """Parts that are made from `name`: of masks and depth the scores, of all these the report."""
-    if name == DEPTH or name.startswith("segmented_"):
-        return SCORE, REPORT
-    return (REPORT,) if name in (SECTIONS, SCORE) else ()
+def _origin(dataset: Dataset) -> dict[str, Any]:
+    """Dataset and light that results belong to, as in results.json."""
+    manifest = dataset.manifest
+    identity = manifest.get("identity") or hash_json(manifest["files"])
+    return {"dataset": dataset.name, "identity": identity, "light": dataset.budget}
 
 
-def _segmented(arrays: Mapping[str, np.ndarray], method: str, sections: Sections) -> Segmented:
-    return Segmented(arrays["in_focus"], method, sections, photon_in_focus=arrays.get("photon_in_focus"))
+def _results_of(out: Path, dataset: Dataset) -> dict[str, Any]:
+    """The list of the results in `out`, without files if none are there; `InputError` if of other data."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out}: this is a file; name a folder for the results")
+    if not out.exists() or not any(out.iterdir()):
+        return {"versions": {}, "files": {}}
+    if not (out / RESULTS).is_file():
+        raise InputError(f"{out}: holds something else; name a new or empty folder")
+    results, origin = read_results(out), _origin(dataset)
+    if (results["identity"], results["light"]) != (origin["identity"], origin["light"]):
+        raise InputError(f"{out}: holds the results of another dataset or light; name a new or empty folder")
+    return results
+
+
+def _all_versions(before: Mapping[str, str], now: Mapping[str, str]) -> dict[str, str]:
+    """Versions of software that made one part or another: of some packages several, with commas between."""
+    versions = {name: [*before.get(name, "").split(", "), now.get(name, "")] for name in {**before, **now}}
+    return {name: ", ".join(filter(None, dict.fromkeys(each))) for name, each in versions.items()}
+
+
+def save_sections(folder: Path, sections: Sections) -> None:
+    """Write the counts and the coverage, whose quotient is the estimate."""
+    arrays = {"z_mm": sections.z_mm, "counts": sections.counts, "coverage": sections.coverage}
+    pattern = {} if sections.cfa is None else {"cfa": sections.cfa}
+    labels = SECTIONS_LABELS
+    if sections.counts.dtype.kind == "f":
+        labels = labels | {"counts": replace(labels["counts"], unit="radiance")}
+    write_arrays(folder / SECTIONS, arrays, labels, pattern)
+
+
+def save_segmented(folder: Path, focus: Segmented) -> None:
+    """Write the in-focus masks of one method, and `photon_in_focus` if the method decides it."""
+    arrays = {"z_mm": focus.z_mm, "in_focus": focus.in_focus}
+    if focus.photon_in_focus is not None:
+        arrays["photon_in_focus"] = focus.photon_in_focus
+    path = folder / f"segmented_{focus.method}.zarr"
+    if path.parent != folder or path.exists():
+        raise InputError(f"method: {focus.method!r} is no file name, or the name of two methods")
+    write_arrays(path, arrays, SEGMENTED_LABELS, {"method": focus.method})
+
+
+def save_depth(folder: Path, depth: DepthMap) -> None:
+    """Write the depth map and its confidence."""
+    write_arrays(folder / DEPTH, {"z_mm": depth.z_mm, "confidence": depth.confidence}, DEPTH_LABELS)
+
+
+def save_score(folder: Path, result: Score) -> None:
+    """Write score.json."""
+    write_json_safely(folder / SCORE, result.to_dict())
+
+
+def load_estimates(out: Path, dataset: Dataset) -> tuple[list[Segmented], DepthMap | None]:
+    """The masks of every method in a folder of results, and the depth map or None.
+
+    The sections of the masks are reconstructed again. Raises `InputError` for a folder without either, for
+    results of another dataset or light, and for files that are missing or were changed.
+    """
+    files = _results_of(out, dataset)["files"]
+    sizes = {"row": dataset.grid.height, "col": dataset.grid.width}
+
+    def read(part: str, labels: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        names = [name for name in labels if lists_part(files, f"{part}/{name}")]
+        return {n: read_array(out, f"{part}/{n}", files, labels[n], sizes, REMEDY) for n in names}
+
+    segmented: list[Segmented] = []
+    sections: dict[bytes, Sections] = {}
+    for part in sorted({name.split("/")[0] for name in files if name.startswith("segmented_")}):
+        arrays = read(part, SEGMENTED_LABELS)
+        planes = arrays["z_mm"].tobytes()
+        if planes not in sections:
+            sections[planes] = reconstruct(dataset.counts, arrays["z_mm"])
+        method, photons = part.removeprefix("segmented_").removesuffix(".zarr"), arrays.get("photon_in_focus")
+        segmented.append(Segmented(arrays["in_focus"], method, sections[planes], photon_in_focus=photons))
+    depth = DepthMap(**read(DEPTH, DEPTH_LABELS)) if lists_part(files, DEPTH) else None
+    if not segmented and depth is None:
+        steps = "`pcii segment`, `pcii depth` or `pcii run`"
+        raise InputError(f"{out}: has neither in-focus masks nor a depth map; make them with {steps}")
+    return segmented, depth
+
+
+def other_software(out: Path) -> str:
+    """How the software that made the results in a folder differs from that of now; empty if it does not."""
+    return differences(read_results(out)["versions"], own_software())

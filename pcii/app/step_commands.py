@@ -1,24 +1,89 @@
-"""Commands for single steps of the analysis: sections, depth, removal."""
+"""Commands that analyse one dataset: all steps, sections, depth, removal, score."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import numpy as np
-from cyclopts import Parameter
 
-from pcii.app.command_options import Budget, Depths, Out, budget_words, opened
-from pcii.app.results import Results
-from pcii.base.command_output import say, say_next
-from pcii.store.dataset import Dataset
+from pcii.app import results
+from pcii.app.command_options import (
+    Budget,
+    DatasetFolder,
+    DepthRange,
+    Json,
+    ResultsOut,
+    SectionDepths,
+    budget_words,
+    dataset_at,
+    method_of,
+)
+from pcii.app.pipeline import full_light_sections
+from pcii.base.command_output import answer, answer_json, say, say_next, say_next_page
+from pcii.base.progress import Stages
+from pcii.depth.methods import DEFAULT_METHOD, estimate_depth
+from pcii.figures.pictures import depth_image, mask_image, to_srgb8, white_level, write_png
+from pcii.metrics import scoring
+from pcii.removal import methods as removal
+from pcii.sections import reconstruction
+from pcii.sections.demosaicing import demosaic
+from pcii.store.dataset import Dataset, open_dataset
+from pcii.store.results_list import read_results
+from pcii.store.suggested_depths import depth_range_of, planes_of
+from pcii.types.estimates import DepthMap
+from pcii.types.focal_planes import FocalPlanes
 
-Steps = Annotated[tuple[Literal["threshold", "boundary", "entropy"], ...], Parameter(name="--without")]
+LOW_DEPTH_SHARE = 0.05
+"""A depth map that answers for a smaller share of the pixels is warned of."""
+
+
+def run(
+    dataset: DatasetFolder,
+    *,
+    out: ResultsOut,
+    z_mm: SectionDepths = (),
+    z_range_mm: DepthRange = None,
+    method: tuple[str, ...] = (),
+    depth_method: str = DEFAULT_METHOD,
+    budget: Budget = None,
+) -> None:
+    """Analyse a dataset completely: sections, removal by each method, depth, scores, report.html.
+
+    Everything is computed anew, and takes the place of earlier results of the dataset in OUT.
+
+    Examples of use:
+
+        pcii run out/paper -o out/paper-results
+        pcii run out/paper -o out/stack --z-mm 500:700:20 --method likelihood
+        pcii run out/paper -o out/full-light --budget full-light --z-range-mm 450 750
+
+    Parameters
+    ----------
+    method
+        A method of removal, as in `pcii segment`; repeat for more. Default: three-step and likelihood.
+    depth_method
+        A method of depth, as in `pcii depth`.
+    """
+    data = dataset_at(dataset, budget)
+    planes = planes_of(data, z_mm)
+    z_range_mm = z_range_mm or depth_range_of(data, planes)
+    methods, estimator = [method_of(text) for text in method], method_of(depth_method)
+    with Stages() as report:
+        outcome = results.run(data, out, planes, z_range_mm, methods, estimator, report)
+    for row in outcome.score.planes:
+        if row["truth"] == "object" and row["object"] is not None and row["iou"] is not None:
+            say(f"{row['z_mm']:g} mm, {row['method']}: IoU {row['iou']:.3f} ({row['object']})")
+    if not outcome.focus:
+        say("sections and depth only: removal needs photon counts; import the images with --photons N")
+    _warn_of_few_depths(outcome.depth, data)
+    say(f"report: {out / results.REPORT}")
+    say_next_page(out / results.REPORT)
 
 
 def reconstruct(
-    dataset: Path,
+    dataset: DatasetFolder,
     *,
-    out: Out,
-    z_mm: Depths = (),
+    out: ResultsOut,
+    z_mm: SectionDepths = (),
     subpixel: int = 1,
     shifts: Literal["nearest", "even"] = "nearest",
     budget: Budget = None,
@@ -32,137 +97,151 @@ def reconstruct(
 
     Parameters
     ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    z_mm
-        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that the recipe
-        names.
     subpixel
         Divide each pixel into this many voxels per axis.
     shifts
         `even` adds raw Bayer samples, as the paper does, and demosaics the picture afterwards.
     """
-    from pcii.figures.pictures import to_srgb8, white_level, write_png
-    from pcii.sections.demosaicing import demosaic
-    from pcii.sections.reconstruction import reconstruct as make
-    from pcii.store.suggested_depths import planes_of
-
-    data = opened(dataset, budget)
-    sections = make(data.counts_or_views, planes_of(data, z_mm), subpixel=subpixel, shifts=shifts)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_sections(sections)}")
-        full = int(np.count_nonzero(sections.saturated))
-        if full:
-            say(f"{full} of {sections.counts.size} voxels are saturated: their estimate is infinite")
+    data = dataset_at(dataset, budget)
+    planes = planes_of(data, z_mm)
+    with results.writing(out, data) as folder:
+        sections = reconstruction.reconstruct(data.counts_or_views, planes, subpixel=subpixel, shifts=shifts)
+        results.save_sections(folder, sections)
         for z, estimate in zip(sections.z_mm, sections.estimate, strict=True):
             estimate = np.minimum(estimate, estimate.max(initial=0, where=np.isfinite(estimate)))
             if sections.cfa is not None:
                 estimate = demosaic(estimate[..., 0], cfa=sections.cfa)
             picture = to_srgb8(estimate, white_level(estimate))
-            with results.replacing(f"section_{z:g}mm.png") as path:
-                write_png(path, picture)
-            say(f"{out / path.name}")
+            write_png(folder / f"section_{z:g}mm.png", picture)
+    say(f"{out / results.SECTIONS}, with a picture of each, such as section_{planes.z_mm[0]:g}mm.png")
+    saturated = int(np.count_nonzero(sections.saturated))
+    if saturated:
+        say(f"{saturated} of {sections.counts.size} voxels are saturated: their estimate is infinite")
     if data.has_counts:
-        say_next("pcii", "segment", dataset, *(f"--z-mm={z:g}" for z in z_mm), "-o", out, *budget_words(data))
+        depths = (f"--z-mm={z:g}" for z in z_mm)
+        say_next("pcii", "segment", dataset, *depths, "-o", out, *budget_words(data))
 
 
 def depth(
-    dataset: Path, *, out: Out, z_mm: Depths = (), method: str | None = None, budget: Budget = None
+    dataset: DatasetFolder,
+    *,
+    out: ResultsOut,
+    z_range_mm: DepthRange = None,
+    method: str = DEFAULT_METHOD,
+    budget: Budget = None,
 ) -> None:
     """Map the depth of every pixel of the virtual centre, from photon counts or else radiance.
 
-    Example of use:
+    Examples of use:
 
-        pcii depth out/paper --method focus -o out/depth
+        pcii depth out/paper -o out/depth
+        pcii depth out/paper --method focus --z-range-mm 450 750 -o out/depth
 
     Parameters
     ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    z_mm
-        Depths of things in mm, as in `pcii segment`: where the recipe names no range, depth is searched from
-        4/5 of the nearest to 5/4 of the farthest. Default: the depths that the recipe names.
     method
-        posterior (default) or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
-        structure-tensor; or one that a package registers.
+        posterior or variance-sweep; of counts also focus or likelihood-sweep, of radiance also
+        structure-tensor; or one that a package registers, module:function, or file.py:function.
     """
-    from pcii.depth.methods import estimate_depth
-    from pcii.figures.pictures import depth_image, write_png
-    from pcii.store.suggested_depths import depth_range_of
-
-    data = opened(dataset, budget)
-    z_range = depth_range_of(data, z_mm)
-    depth_map = estimate_depth(data.counts_or_views, z_range, method=method)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_depth(depth_map)}")
-        with results.replacing("depth.png") as path:
-            write_png(path, depth_image(depth_map.z_mm, *z_range, depth_map.confidence))
-    say(f"{out / 'depth.png'}: {z_range[0]:g} mm is yellow, {z_range[1]:g} mm violet, paler where less sure")
+    data, estimator = dataset_at(dataset, budget), method_of(method)
+    near, far = z_range_mm or depth_range_of(data)
+    with results.writing(out, data) as folder:
+        depth_map = estimate_depth(data.counts_or_views, (near, far), method=estimator)
+        results.save_depth(folder, depth_map)
+        picture = depth_image(depth_map.z_mm, near, far, depth_map.confidence)
+        write_png(folder / "depth.png", picture)
+    say(f"{out / 'depth.png'}: {near:g} mm is yellow, {far:g} mm violet, paler where less sure")
+    _warn_of_few_depths(depth_map, data)
     _say_next_score(data, out)
 
 
 def segment(
-    dataset: Path,
+    dataset: DatasetFolder,
     *,
-    out: Out,
-    z_mm: Depths = (),
+    out: ResultsOut,
+    z_mm: SectionDepths = (),
     method: str = "likelihood",
-    without: Steps = (),
-    subpixel: int = 1,
     budget: Budget = None,
 ) -> None:
     """Remove defocused points from sections, with a picture of each mask.
 
     Examples of use:
 
+        pcii segment out/paper --z-mm 540 -o out/removed
         pcii segment out/paper --z-mm 540 --method three-step -o out/removed
-        pcii segment out/paper --method three-step --without entropy --subpixel 2 -o out/removed
 
     Parameters
     ----------
-    dataset
-        A dataset folder.
-    out
-        Folder for the results.
-    z_mm
-        Depth of a section in mm, or start:stop:step; repeat for more. Default: the depths that the recipe
-        names.
     method
         three-step (of the paper), likelihood (Poisson), posterior (of depth), brightness, variance or
-        shape-from-focus (for comparison), or a method that an installed package registers.
-    without
-        Leave out one of the three steps; repeat for more.
-    subpixel
-        Find the outlines of the three steps on this many voxels per pixel and axis.
+        shape-from-focus (for comparison); or one that a package registers, module:function, or
+        file.py:function.
     """
-    from pcii.base.errors import InputError
-    from pcii.figures.pictures import mask_image, write_png
-    from pcii.removal.methods import find_method
-    from pcii.removal.methods import segment as remove
-    from pcii.removal.three_step.three_step_method import ThreeStep
-    from pcii.store.suggested_depths import planes_of
-
-    if method != "three-step" and (without or subpixel != 1):
-        option = "--without" if without else "--subpixel"
-        raise InputError(f"{option}: is for --method three-step, not {method}")
-    chosen = find_method(method)
-    if method == "three-step":
-        chosen = ThreeStep(subpixel, **dict.fromkeys(without, False))
-    data = opened(dataset, budget)
-    focus = remove(data.counts, planes_of(data, z_mm), method=chosen)
-    with Results(out, data).writing() as results:
-        say(f"{results.save_segmented(focus)}")
-        for z, mask in zip(focus.z_mm, focus.in_focus, strict=True):
-            with results.replacing(f"in_focus_{focus.method}_{z:g}mm.png") as path:
-                write_png(path, mask_image(mask))
-            say(f"{out / path.name}: {mask.mean():.2%} of the section in focus")
+    data, remove = dataset_at(dataset, budget), method_of(method)
+    planes = planes_of(data, z_mm)
+    with results.writing(out, data) as folder:
+        focus = removal.segment(data.counts, planes, method=remove)
+        results.save_segmented(folder, focus)
+        names = [f"in_focus_{focus.method}_{z:g}mm.png" for z in focus.z_mm]
+        for name, mask in zip(names, focus.in_focus, strict=True):
+            write_png(folder / name, mask_image(mask))
+    for name, mask in zip(names, focus.in_focus, strict=True):
+        say(f"{out / name}: {mask.mean():.2%} of the section in focus")
     _say_next_score(data, out)
 
 
-def _say_next_score(dataset: Dataset, out: Path) -> None:
-    if dataset.has_truth_array("z_mm"):
-        say_next("pcii", "score", dataset.path, out, *budget_words(dataset))
+def score(dataset: DatasetFolder, out: Path, *, json: Json = False) -> None:
+    """Compare the results in a folder with the dataset's truth, and write score.json into it.
+
+    Examples of use:
+
+        pcii score out/paper out/paper-results
+        pcii score out/paper out/depth --json
+
+    Parameters
+    ----------
+    out
+        The folder of results of `pcii run`, `pcii segment` or `pcii depth`.
+    json
+        Print the score too, as score.json has it.
+    """
+    data, light = open_dataset(dataset), read_results(out)["light"]
+    data = data if light is None else data.at_budget(light)
+    focus, depth_map = results.load_estimates(out, data)
+    if difference := results.other_software(out):
+        say(f"{out}: other software made these results: {difference}")
+    z_mm = data.analysis.get("z_mm")
+    planes = focus[0].sections.planes if focus else FocalPlanes.at_depths(data.grid, z_mm) if z_mm else None
+    with results.writing(out, data) as folder:
+        full_light = full_light_sections(data, planes) if data.truth and planes else None
+        result = scoring.score(
+            focus, depth_map, data.truth, grid=data.grid, full_light=full_light, dataset=data.name
+        )
+        results.save_score(folder, result)
+    if json:
+        answer_json(result.to_dict())
+        return
+    say(f"{out / results.SCORE}")
+    if data.truth is None:
+        say("the dataset has no truth: what is compared with it is null")
+    else:
+        say_next("pcii", "evaluate", dataset, "-o", out.parent / f"{dataset.name}-compared")
+
+
+def _warn_of_few_depths(depth_map: DepthMap, data: Dataset) -> None:
+    """Say how little of a depth map has an answer, and what is the most likely reason."""
+    share, grid = float(np.isfinite(depth_map.z_mm).mean()), data.grid
+    if share >= LOW_DEPTH_SHARE:
+        return
+    if min(grid.rows, grid.cols) == 1:
+        reason = f"the {grid.rows} x {grid.cols} cameras stand in a line, and see depth at few edges"
+    elif data.has_counts:
+        reason = f"{data.counts.total / grid.view_count:.4g} photons in a view are too few"
+    else:
+        reason = "the views show too little texture"
+    answer(f"warning: {share:.1%} of the pixels have a depth, most likely since {reason}")
+
+
+def _say_next_score(data: Dataset, out: Path) -> None:
+    if data.has_truth_array("z_mm"):
+        say_next("pcii", "score", data.path, out)

@@ -1,7 +1,6 @@
 """What made a figure: the source and the weights of what computes, versions, and the machine.
 
-`software_of` decides for the results of `pcii run` and for the rows of an evaluation alike: what other
-software made is made again.
+`software_of` decides for the rows of an evaluation: what other software made is made again.
 """
 
 import os

@@ -19,8 +19,8 @@ given_truth        What a dataset that is written is given of truth and words: c
 hashes             SHA-256 of bytes, of files and of what JSON can say.
 manifest_schema    Pydantic models of the manifests; members that they do not name are allowed and
                    ignored.
-results_list       The file results.json: the dataset of the results in a folder, and their files with
-                   size and SHA-256.
+results_list       The file results.json: dataset, light and software of the results in a folder, and their
+                   files.
 sample_dataset     The sample dataset that comes with the package, for trying things without a renderer.
 sealed_json        JSON documents that end in a checksum of themselves, and JSON of strangers.
 software           The software that a result follows from: versions, hashes of sources, and how those

@@ -167,21 +167,14 @@ class FileList(_Model):
     files: dict[FileName, FileEntry]
 
 
-class StepRecord(_Model):
-    """What a part of results follows from, as a hash, and how long it took to make."""
-
-    key: str
-    seconds: Seconds
-
-
 class ResultsManifest(FileList):
-    """The manifest of a folder of results."""
+    """The list of a folder of results."""
 
+    format_version: Literal[3]
     dataset: Text
-    identity: str | None
-    budget: Photons | Literal["full-light"] | None
-    made: dict[FileName, StepRecord] = {}
-    due: list[FileName] = []
+    identity: str
+    light: Photons | Literal["full-light"] | None
+    versions: dict[str, Text]
 
 
 def validate(model: type[BaseModel], document: Mapping[str, Any], path: Path, remedy: str) -> None:

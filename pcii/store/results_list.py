@@ -1,31 +1,31 @@
-"""The file results.json: the dataset of the results in a folder, and their files with size and SHA-256."""
+"""The file results.json: dataset, light and software of the results in a folder, and their files."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pcii.store.folder_kind import FolderKind
+from pcii.base.safe_files import write_json_safely
+from pcii.store.sealed_json import LARGEST_DOCUMENT_BYTES, parse_json, read_small
 
 RESULTS = "results.json"
-LOCK = ".results.lock"
-FINISH = "`pcii run` with the same options makes them, and keeps what is done"
-RESULTS_FOLDER = FolderKind(
-    "results",
-    RESULTS,
-    version=2,
-    absent=f"not a folder of results (no {RESULTS}); name one that `pcii run` made",
-    remedy="delete the folder and make the results again",
-    marks=frozenset({RESULTS}),
-    passing=frozenset({LOCK}),
-)
+REMEDY = "make the results again in a new folder"
+_HEAD = {"format": "photon-integral-imaging results", "format_version": 3}
 
 
-def read_results(out: Path) -> dict[str, Any]:
-    """The list of a folder of results: `dataset`, `identity`, `budget`, `files`, `made` and `due`.
+def read_results(folder: Path) -> dict[str, Any]:
+    """The list of a folder of results: `dataset`, `identity`, `light`, `versions` and `files`.
 
-    Raises `InputError` if it is missing or was changed.
+    `versions` are those of the software that made the results, `files` the size and SHA-256 of each file.
+    Raises `InputError` if the list is missing, damaged or of another release.
     """
     from pcii.store.manifest_schema import ResultsManifest, validate
 
-    content = RESULTS_FOLDER.read(out)
-    validate(ResultsManifest, content, out / RESULTS, RESULTS_FOLDER.remedy)
-    return {"made": {}, "due": [], **content}
+    path = folder / RESULTS
+    content = parse_json(read_small(path, LARGEST_DOCUMENT_BYTES, REMEDY), path, REMEDY)
+    validate(ResultsManifest, content, path, REMEDY)
+    return content
+
+
+def write_results(folder: Path, content: Mapping[str, Any]) -> None:
+    """Write the list, atomically."""
+    write_json_safely(folder / RESULTS, {**_HEAD, **content})

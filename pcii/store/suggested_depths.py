@@ -18,7 +18,7 @@ def planes_of(dataset: Dataset, z_mm: Sequence[float] | None) -> FocalPlanes:
     """
     depths = z_mm or dataset.analysis.get("z_mm") or ()
     if not len(depths):
-        raise InputError(f"{dataset.path}: its recipe names no depths; give them with --z-mm")
+        raise InputError(f"{dataset.path}: suggests no depths; name depths with --z-mm")
     planes = FocalPlanes.at_depths(dataset.grid, depths)
     _check_overlap(dataset.grid, planes.z_mm, "z_mm")
     return planes
@@ -58,5 +58,7 @@ def depth_range_of(
         near, far = float(suggested[0]), float(suggested[1])
         _check_overlap(dataset.grid, np.array([far]), "z_range_mm")
         return near, far
+    if z_mm is None and not dataset.analysis.get("z_mm"):
+        raise InputError(f"{dataset.path}: suggests no range of depths; name one with --z-range-mm NEAR FAR")
     z = (z_mm if isinstance(z_mm, FocalPlanes) else planes_of(dataset, z_mm)).z_mm
     return 0.8 * float(z.min()), 1.25 * float(z.max())

@@ -18,8 +18,7 @@ from pcii.store.collection_layout import (
 from pcii.store.dataset_layout import CARD, DATASET_FOLDER, MANIFEST, MARKER, read_manifest
 from pcii.store.evaluation_layout import EVALUATION_FOLDER, is_evaluation, read_evaluation
 from pcii.store.file_list import check_file, strays
-from pcii.store.folder_kind import FolderKind
-from pcii.store.results_list import FINISH, RESULTS, RESULTS_FOLDER, read_results
+from pcii.store.results_list import REMEDY, RESULTS, read_results
 
 Item = TypeVar("Item")
 MOST_NAMED = 5
@@ -72,30 +71,24 @@ def _verify_collection(path: Path, report: Report) -> int:
 
 
 def _verify_folder(path: Path, report: Report) -> int:
-    kind, held = _kind_and_document(path)
-    files = held["files"]
+    document, remedy, files = _document_of(path)
 
     def check(listed: tuple[str, Mapping[str, Any]]) -> int:
-        check_file(path, *listed, kind.remedy, content=True)
+        check_file(path, *listed, remedy, content=True)
         return 1
 
     number = _all_of(list(files.items()), check, "files", report)
-    _refuse(path, strays(path, [kind.document, *files, CARD]), kind.document)
-    if kind is RESULTS_FOLDER and (due := held["due"]):
-        raise InputError(
-            f"{path}: not finished: {_named(due)} are missing, or older than the other results here; {FINISH}"
-        )
+    _refuse(path, strays(path, [document, *files, CARD]), document)
     return number
 
 
-def _kind_and_document(path: Path) -> tuple[FolderKind, dict[str, Any]]:
-    """What a folder that is no collection is taken for, and the document that lists its files."""
-    if not (path / MANIFEST).exists():
-        if (path / RESULTS).exists():
-            return RESULTS_FOLDER, read_results(path)
-        if is_evaluation(path):
-            return EVALUATION_FOLDER, read_evaluation(path)
-    return DATASET_FOLDER, read_manifest(path)
+def _document_of(path: Path) -> tuple[str, str, dict[str, Any]]:
+    """The document that lists the files of a folder, what to do if one is wrong, and the files."""
+    if not (path / MANIFEST).exists() and (path / RESULTS).exists():
+        return RESULTS, REMEDY, read_results(path)["files"]
+    if not (path / MANIFEST).exists() and is_evaluation(path):
+        return EVALUATION_FOLDER.document, EVALUATION_FOLDER.remedy, read_evaluation(path)["files"]
+    return MANIFEST, DATASET_FOLDER.remedy, read_manifest(path)["files"]
 
 
 def _all_of(items: Sequence[Item], check: Callable[[Item], int], what: str, report: Report) -> int:

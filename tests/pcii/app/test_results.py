@@ -1,5 +1,7 @@
 """The folder of results: what comes back, through kills, damage and other writers."""
 
+import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,23 +12,30 @@ import xarray
 from stored_datasets import flip_a_bit, largest_file, one_sentence
 from twins import unit_grid
 
-from pcii.app.results import LOCK, Results
+from pcii.app.results import (
+    load_estimates,
+    other_software,
+    save_depth,
+    save_sections,
+    save_segmented,
+    writing,
+)
 from pcii.base.errors import InputError
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
 from pcii.store.results_list import RESULTS, read_results
 from pcii.store.verification import verify
-from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_counts import PhotonCounts
 
 GRID = unit_grid(2, 2, 6, 7)
 Z = np.array([0.5, 1.0])
 
 
-def dataset_of(tmp_path: Path, rate: float, identity: str = "a") -> Dataset:
-    counts = PhotonCounts.from_dense(np.random.default_rng(3).poisson(rate, GRID.shape_KLHW), GRID)
-    dataset = Dataset(tmp_path, {"identity": identity}, GRID, None)
-    vars(dataset)["counts"] = counts  # the place where the property keeps what it has read
+def dataset_of(tmp_path: Path, identity: str = "a") -> Dataset:
+    dense = np.random.default_rng(3).poisson(0.3, GRID.shape_KLHW)
+    dataset = Dataset(tmp_path / "data", {"identity": identity}, GRID, None)
+    vars(dataset)["counts"] = PhotonCounts.from_dense(dense, GRID)  # where the property has what it has read
     return dataset
 
 
@@ -35,119 +44,136 @@ def masks_of(dataset: Dataset, photons: np.ndarray | None = None) -> Segmented:
     return Segmented(masks, "by-hand", reconstruct(dataset.counts, Z), photon_in_focus=photons)
 
 
+def depth_of(z_mm: float) -> DepthMap:
+    return DepthMap(np.full((6, 7), z_mm), np.full((6, 7), 0.5))
+
+
+def save(out: Path, dataset: Dataset, z_mm: float, *, whole: bool = False) -> None:
+    with writing(out, dataset, whole=whole) as folder:
+        save_depth(folder, depth_of(z_mm))
+
+
+def z_of(out: Path, dataset: Dataset) -> float:
+    _, depth = load_estimates(out, dataset)
+    assert depth is not None
+    return float(depth.z_mm[0, 0])
+
+
 @pytest.fixture
-def saved(tmp_path: Path) -> Results:
-    """Masks, a depth map and a file in tmp_path / "out"."""
-    results = Results(tmp_path / "out", dataset_of(tmp_path, 0.3))
-    with results.writing():
-        results.save_segmented(masks_of(results.dataset))
-        results.save_depth(DepthMap(np.full((6, 7), 0.7), np.full((6, 7), 0.5)))
-        with results.replacing("note.txt") as path:
-            path.write_text("looked at")
-    return results
+def saved(tmp_path: Path) -> Path:
+    """Masks, a depth map and a file, which were written one after the other."""
+    out, dataset = tmp_path / "out", dataset_of(tmp_path)
+    save(out, dataset, 0.7)
+    with writing(out, dataset) as folder:
+        save_segmented(folder, masks_of(dataset))
+        (folder / "note.txt").write_text("looked at")
+    return out
 
 
 @pytest.mark.parametrize("has_photons", [True, False])
 def test_masks_and_photons_come_back_as_they_were(tmp_path: Path, has_photons: bool) -> None:
-    dataset = dataset_of(tmp_path, 0.3)
-    rng = np.random.default_rng(4)
-    kept = rng.random((2, dataset.counts.events.n.size)) < 0.5 if has_photons else None
-    with Results(tmp_path / "out", dataset).writing() as results:
-        results.save_segmented(masks_of(dataset, kept))
-    (found,) = results.load_segmented()
-    assert found.method == "by-hand"
-    np.testing.assert_array_equal(found.in_focus, masks_of(dataset).in_focus)
-    if kept is None:
-        assert found.photon_in_focus is None
-    else:
-        assert found.photon_in_focus is not None
-        np.testing.assert_array_equal(found.photon_in_focus, kept)
+    dataset = dataset_of(tmp_path)
+    events = dataset.counts.events.n.size
+    photons = np.random.default_rng(4).random((2, events)) < 0.5 if has_photons else None
+    with writing(tmp_path / "out", dataset) as folder:
+        save_segmented(folder, masks_of(dataset, photons))
+    (focus,), depth = load_estimates(tmp_path / "out", dataset)
+    assert depth is None
+    assert focus.method == "by-hand"
+    np.testing.assert_array_equal(focus.in_focus, masks_of(dataset).in_focus)
+    np.testing.assert_array_equal(focus.photon_in_focus, photons)
 
 
-def test_photons_of_other_counts_are_refused(tmp_path: Path) -> None:
-    dataset = dataset_of(tmp_path, 0.3)
-    kept = np.ones((2, dataset.counts.events.n.size), dtype=bool)
-    with Results(tmp_path / "out", dataset).writing() as results:
-        results.save_segmented(masks_of(dataset, kept))
-    with pytest.raises(InputError, match=r"photon_in_focus is of other counts"):
-        Results(tmp_path / "out", dataset_of(tmp_path, 0.6)).load_segmented()
+def test_folders_of_other_things_are_refused(saved: Path, tmp_path: Path) -> None:
+    dataset, other = dataset_of(tmp_path), dataset_of(tmp_path, "b")
+    assert "of another dataset or light" in one_sentence(lambda: save(saved, other, 1), saved)
+    assert "of another dataset or light" in one_sentence(lambda: load_estimates(saved, other), saved)
+    assert "dataset itself" in one_sentence(lambda: save(dataset.path, dataset, 1), dataset.path)
+    thesis = tmp_path / "thesis.tex"
+    thesis.write_text("years of work")
+    assert "this is a file" in one_sentence(lambda: save(thesis, dataset, 1), thesis)
+    assert "holds something else" in one_sentence(lambda: save(tmp_path, dataset, 1), tmp_path)
+    thesis.rename(saved / "thesis.tex")
+    assert "holds thesis.tex" in one_sentence(lambda: save(saved, dataset, 1, whole=True), saved)
+    assert (saved / "thesis.tex").read_text() == "years of work"
 
 
-def test_results_of_another_dataset_or_of_nothing_are_refused(saved: Results, tmp_path: Path) -> None:
-    other = Results(saved.path, dataset_of(tmp_path, 0.3, identity="b"))
-    assert "of another dataset" in one_sentence(other.check, saved.path)
-    with pytest.raises(InputError, match="of another dataset"), other.writing():
-        pytest.fail("written to")
-    assert "dataset itself" in one_sentence(Results(tmp_path, saved.dataset).check, tmp_path)
+def test_new_results_replace_those_of_their_name_or_all(saved: Path, tmp_path: Path) -> None:
+    dataset = dataset_of(tmp_path)
+    save(saved, dataset, 0.9)
+    assert z_of(saved, dataset) == 0.9
+    assert (saved / "note.txt").read_text() == "looked at"
+    assert len(load_estimates(saved, dataset)[0]) == 1
+    files = {path.relative_to(saved).as_posix() for path in saved.rglob("*") if path.is_file()}
+    assert set(read_results(saved)["files"]) == files - {RESULTS}
+    assert verify(saved) == len(files) - 1
+    save(saved, dataset, 1.1, whole=True)
+    assert [path.name for path in sorted(saved.iterdir())] == ["depth.zarr", RESULTS]
+    assert z_of(saved, dataset) == 1.1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]  # no lock, nothing temporary
 
 
-def test_every_file_is_listed_and_verified(saved: Results) -> None:
-    files = {path.relative_to(saved.path).as_posix() for path in saved.path.rglob("*") if path.is_file()}
-    assert set(read_results(saved.path)["files"]) == files - {RESULTS}
-    assert verify(saved.path) == len(files) - 1
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_failure_leaves_what_was_there(saved: Path, tmp_path: Path, whole: bool) -> None:
+    def fail() -> None:
+        with writing(saved, dataset_of(tmp_path), whole=whole) as folder:
+            save_depth(folder, depth_of(0.9))
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert verify(saved) > 0
+    assert z_of(saved, dataset_of(tmp_path)) == 0.7
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
 
 
-def test_what_is_written_anew_takes_the_place_of_the_old(saved: Results) -> None:
-    with saved.writing():
-        saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.1)))
-        with saved.replacing("note.txt") as path:
-            path.write_text("again")
-    found = saved.load_depth()
-    assert found is not None
-    assert (found.z_mm == 0.9).all()
-    assert (saved.path / "note.txt").read_text() == "again"
-    assert verify(saved.path) > 0
-    assert not [path.name for path in saved.path.iterdir() if path.name.startswith(".")]
-
-
-def test_scores_and_report_of_an_older_depth_map_are_named(saved: Results) -> None:
-    with saved.writing():
-        saved.save_score(Score((), (), {}))
-        with saved.replacing("report.html") as path:
-            path.touch()
-        saved.save_depth(DepthMap(np.full((6, 7), 0.7), np.full((6, 7), 0.5)))  # the same again
-    assert verify(saved.path) > 0
-    with saved.writing():
-        saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.5)))
-    assert "report.html, score.json are" in one_sentence(lambda: verify(saved.path), saved.path)
-    with saved.writing():
-        saved.save_score(Score((), (), {}))
-    assert "finished: report.html are" in one_sentence(lambda: verify(saved.path), saved.path)
+def test_a_second_writer_is_refused_and_a_lock_that_was_left_is_no_obstacle(tmp_path: Path) -> None:
+    out, dataset = tmp_path / "out", dataset_of(tmp_path)
+    (tmp_path / ".out.lock").touch()
+    with writing(out, dataset) as folder:
+        assert "another command is writing" in one_sentence(lambda: save(out, dataset, 2), out)
+        save_depth(folder, depth_of(1))
+    assert z_of(out, dataset) == 1
 
 
 @pytest.mark.parametrize("part", ["segmented_by-hand.zarr", "depth.zarr"])
-def test_damage_is_found_on_reading(saved: Results, part: str) -> None:
-    file = largest_file(saved.path, part)
-    read = saved.load_depth if part == "depth.zarr" else saved.load_segmented
+def test_damage_is_found_on_reading(saved: Path, tmp_path: Path, part: str) -> None:
+    file = largest_file(saved, part)
     flip_a_bit(file, 99)
-    assert "SHA-256" in one_sentence(read, file)
+    assert "SHA-256" in one_sentence(lambda: load_estimates(saved, dataset_of(tmp_path)), file)
     file.unlink()  # a missing chunk is no empty mask
-    assert "missing" in one_sentence(read, file)
+    assert "missing" in one_sentence(lambda: load_estimates(saved, dataset_of(tmp_path)), file)
 
 
-def test_masks_that_no_list_names_are_not_read(saved: Results) -> None:
-    with Results(saved.path.with_name("other"), saved.dataset).writing() as other:
-        other.save_segmented(masks_of(saved.dataset))
-    stray = saved.path / "segmented_stray.zarr"
-    (other.path / "segmented_by-hand.zarr").rename(stray)
-    assert [found.method for found in saved.load_segmented()] == ["by-hand"]
-    assert "segmented_stray.zarr/" in one_sentence(lambda: verify(saved.path), saved.path)
+def test_masks_that_no_list_names_are_not_read(saved: Path, tmp_path: Path) -> None:
+    (saved / "segmented_by-hand.zarr").rename(saved / "segmented_stray.zarr")
+    with pytest.raises(InputError, match=r"by-hand.zarr.*missing"):
+        load_estimates(saved, dataset_of(tmp_path))
+
+
+def test_other_software_is_named_until_all_is_made_anew(saved: Path, tmp_path: Path) -> None:
+    assert other_software(saved) == ""
+    content = json.loads((saved / RESULTS).read_text())
+    now, content["versions"]["numpy"] = content["versions"]["numpy"], "1.0"
+    (saved / RESULTS).write_text(json.dumps(content))
+    assert other_software(saved) == f"numpy 1.0 is now {now}"
+    save(saved, dataset_of(tmp_path), 0.9)
+    assert other_software(saved) == f"numpy 1.0, {now} is now {now}"
+    save(saved, dataset_of(tmp_path), 0.9, whole=True)
+    assert other_software(saved) == ""
 
 
 # Writes a depth map of 2, where one of 1 is, and dies at the n-th change that it makes to a folder.
 KILLED = """
 import os, shutil, sys
 from pathlib import Path
-import numpy as np
-sys.path[:0] = sys.argv[2:]
-from test_results import GRID, dataset_of
-from pcii.app.results import Results
-from pcii.types.estimates import DepthMap
+sys.path[:0] = sys.argv[3:]
+from test_results import dataset_of, save
 import zarr, zarr.codecs
 
-root = Path(sys.argv[1])
+root, whole = Path(sys.argv[1]), sys.argv[2] == "True"
 def write(out, value, steps):
-    results, done = Results(out, dataset_of(root, 0.3)), 0
+    dataset, done = dataset_of(root), 0
     def count(event, arguments):
         nonlocal done
         if event in ("os.rename", "os.remove", "os.rmdir", "os.mkdir"):
@@ -155,8 +181,7 @@ def write(out, value, steps):
             if done == steps:
                 os._exit(9)
     sys.addaudithook(count)
-    with results.writing():
-        results.save_depth(DepthMap(np.full((6, 7), value), np.full((6, 7), 0.5)))
+    save(out, dataset, value, whole=whole)
     os._exit(0)
 
 def forked(*arguments):
@@ -174,45 +199,41 @@ for steps in range(1, 1000):
 """
 
 
-def test_a_kill_at_any_moment_leaves_the_old_map_none_or_the_new_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("whole", [True, False])
+def test_after_a_kill_at_any_moment_no_wrong_map_is_read_and_the_next_command_works(
+    tmp_path: Path, whole: bool
+) -> None:
     here = Path(__file__).resolve().parent
     paths = [str(here), str(here.parent), str(here.parents[2])]
-    subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), *paths], check=True, timeout=300)
-    outs = sorted(tmp_path.glob("killed-*"))
-    assert len(outs) > 15
+    subprocess.run([sys.executable, "-c", KILLED, str(tmp_path), str(whole), *paths], check=True, timeout=300)
+    dataset, names = dataset_of(tmp_path), {path.name for path in tmp_path.iterdir()} - {"first"}
+    outs = [tmp_path / f"killed-{number}" for number in {re.findall(r"[0-9]+", name)[0] for name in names}]
+    assert len(outs) > 10
     values: list[float | None] = []
     for out in outs:
-        results = Results(out, dataset_of(tmp_path, 0.3))
-        found = results.load_depth()
-        values.append(None if found is None else float(found.z_mm[0, 0]))
-        with results.writing():  # the next command goes on from there
-            results.save_depth(DepthMap(np.full((6, 7), 3.0), np.full((6, 7), 0.5)))
+        try:
+            values.append(z_of(out, dataset))
+        except InputError:
+            values.append(None)
+        save(out, dataset, 3)
         assert [path.name for path in sorted(out.iterdir())] == ["depth.zarr", RESULTS]
         assert verify(out) > 0
     assert {1.0, 2.0} <= set(values) <= {None, 1.0, 2.0}
+    assert not list(tmp_path.glob(".killed*"))
 
 
-def test_a_lock_that_a_kill_left_is_no_obstacle(saved: Results) -> None:
-    (saved.path / LOCK).touch()
-    with saved.writing():
-        saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.1)))
-    assert verify(saved.path) > 0
-
-
-def test_xarray_opens_results_with_named_axes_and_units(tmp_path):
-    dataset = dataset_of(tmp_path, 0.3)
+def test_xarray_opens_results_with_named_axes_and_units(tmp_path: Path) -> None:
+    dataset, out = dataset_of(tmp_path), tmp_path / "out"
     focus = masks_of(dataset, np.ones((2, dataset.counts.events.n.size), bool))
-    with Results(tmp_path / "out", dataset).writing() as results:
-        folders = [
-            results.save_sections(focus.sections),
-            results.save_segmented(focus),
-            results.save_depth(DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7)))),
-        ]
-    for folder in folders:
-        opened = xarray.open_zarr(folder, consolidated=False)
-        assert all({"units", "long_name"} <= set(array.attrs) for array in opened.values())
-        assert {"row", "col"} <= set(opened.sizes)
-    sections = xarray.open_zarr(folders[0], consolidated=False)
+    with writing(out, dataset) as folder:
+        save_sections(folder, focus.sections)
+        save_segmented(folder, focus)
+        save_depth(folder, DepthMap(np.full((6, 7), np.nan), np.zeros((6, 7))))
+    for path in out.glob("*.zarr"):
+        arrays = xarray.open_zarr(path, consolidated=False)
+        assert all({"units", "long_name"} <= set(array.attrs) for array in arrays.values())
+        assert {"row", "col"} <= set(arrays.sizes)
+    sections = xarray.open_zarr(out / "sections.zarr", consolidated=False)
     assert (sections.z_mm.dims, sections.z_mm.attrs["units"]) == (("plane",), "mm")
     np.testing.assert_array_equal(sections.counts, focus.sections.counts)
     assert int((sections.counts == 0).sum()) > 0  # zeros stay zeros, and are not taken for missing values

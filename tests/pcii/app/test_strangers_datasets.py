@@ -1,17 +1,17 @@
 """`pcii run` on datasets that no recipe made: with and without truth, counts only, radiance only."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from pcii.app import single_run
 from pcii.app.commands import app
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.removal.methods import segment
-from pcii.store.dataset import open_dataset
 from pcii.store.dataset_writer import save_dataset
 from pcii.store.verification import verify
 from pcii.types.camera_grid import CameraGrid
@@ -39,8 +39,7 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
     images = (COUNTS, Views(LIGHT, GRID)) if "views" in has else COUNTS
     texts: dict[str, Any] = {"title": "Mine", "licence": "CC-BY", "origin": "a lab"}
     dataset = save_dataset(tmp_path / "d", images, truth, z_mm=[500, 700], **texts)
-    outcome = single_run.run(dataset, tmp_path / "out", None, methods=["brightness"])
-    assert outcome.z_range_mm == (0.8 * 500, 1.25 * 700)
+    assert run("run", tmp_path / "d", "-o", tmp_path / "out", "--method", "brightness") == 0
     page = (tmp_path / "out" / "report.html").read_text()
     assert all(
         text in page for text in ("<h1>Mine</h1>", "CC-BY", "a lab", dataset.manifest["identity"][:16])
@@ -50,7 +49,8 @@ def test_photon_counts_of_a_stranger_are_analysed(tmp_path: Path, capsys, has: s
     assert ("has no truth" in capsys.readouterr().out) == (truth is None)
     assert verify(tmp_path / "out") > 5
     if "depth" in has:
-        assert outcome.score.depth["hci"]["answered"] is not None
+        score = json.loads((tmp_path / "out" / "score.json").read_text())
+        assert score["depth"]["hci"]["answered"] is not None
 
 
 def test_radiance_alone_gives_sections_depth_and_a_report(tmp_path: Path, capsys) -> None:
@@ -81,9 +81,70 @@ def test_methods_for_photon_counts_say_what_to_do_with_images() -> None:
         segment(views, 500)  # type: ignore[arg-type]
 
 
-def test_results_of_one_strangers_dataset_are_not_taken_for_anothers(tmp_path: Path) -> None:
+def test_results_of_one_strangers_dataset_are_not_taken_for_anothers(tmp_path: Path, capsys) -> None:
     save_dataset(tmp_path / "a", Views(LIGHT, GRID), z_mm=500)
     save_dataset(tmp_path / "b" / "a", Views(2 * LIGHT, GRID), z_mm=500)
-    single_run.run(open_dataset(tmp_path / "a"), tmp_path / "out", None)
-    with pytest.raises(InputError, match="the results of another dataset"):
-        single_run.run(open_dataset(tmp_path / "b" / "a"), tmp_path / "out", None)
+    assert run("depth", tmp_path / "a", "-o", tmp_path / "out") == 0
+    for command in (["run", tmp_path / "b" / "a", "-o"], ["score", tmp_path / "b" / "a"]):
+        assert run(*command, tmp_path / "out") == 2
+        assert "the results of another dataset" in capsys.readouterr().err
+
+
+def test_depths_that_nothing_suggests_are_named_by_options(tmp_path: Path, capsys) -> None:
+    save_dataset(tmp_path / "d", COUNTS)
+    out = tmp_path / "out"
+    assert run("segment", tmp_path / "d", "-o", out) == 2
+    assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
+    assert run("depth", tmp_path / "d", "-o", out) == 2
+    assert "name one with --z-range-mm" in capsys.readouterr().err
+    assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 450, 700) == 0
+    assert "depth.png: 450 mm is yellow, 700 mm violet" in capsys.readouterr().out
+    command = ["run", tmp_path / "d", "-o", out, "--z-range-mm", 400, 900, "--z-mm", 600]
+    assert run(*command, "--method", "brightness", "--depth-method", "variance-sweep") == 0
+    assert run("depth", tmp_path / "d", "-o", out, "--z-range-mm", 700, 400) == 2
+    assert "near must be less than far" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("cols", [2, 1])
+def test_a_depth_map_without_answers_says_why(tmp_path: Path, capsys, cols: int) -> None:
+    grid = replace(GRID, cols=cols)
+    dark = PhotonCounts.from_dense(np.zeros(grid.shape_KLHW, int), grid)
+    save_dataset(tmp_path / "d", dark, z_mm=500)
+    assert run("depth", tmp_path / "d", "-o", tmp_path / "out") == 0
+    reason = "0 photons in a view are too few" if cols == 2 else "the 2 x 1 cameras stand in a line"
+    assert f"warning: 0.0% of the pixels have a depth, most likely since {reason}" in capsys.readouterr().out
+
+
+METHODS = """
+import numpy as np
+import pcii
+
+def remove(counts, sections):
+    return pcii.Segmented(sections.counts.sum(axis=-1) > 1, "mine", sections)
+
+def depth(data, z_range_mm):
+    return pcii.DepthMap(np.full(data.grid.shape_HW, 500.0), np.ones(data.grid.shape_HW))
+"""
+
+
+@pytest.mark.parametrize("place", ["own_methods_1:", "{}/own_methods_2.py:"])
+def test_methods_are_functions_of_modules_and_files(tmp_path: Path, monkeypatch, capsys, place: str) -> None:
+    place = place.format(tmp_path / "methods")
+    for folder, number in ((tmp_path, 1), (tmp_path / "methods", 2)):
+        folder.mkdir(exist_ok=True)
+        (folder / f"own_methods_{number}.py").write_text(METHODS)
+    monkeypatch.chdir(tmp_path)
+    save_dataset("d", COUNTS, Truth(Z_MM, IDS, {1: "ball"}), z_mm=500)
+    methods = ["--method", f"{place}remove", "--depth-method", f"{place}depth"]
+    assert run("run", "d", "-o", "all", *methods) == 0
+    assert run("segment", "d", "-o", "steps", *methods[:2]) == 0
+    assert run("depth", "d", "-o", "steps", "--method", f"{place}depth") == 0
+    assert run("score", "d", "steps") == 0
+    scores = [json.loads(Path(out, "score.json").read_text()) for out in ("all", "steps")]
+    assert scores[0] == scores[1]
+    assert {row["method"] for row in scores[0]["planes"]} == {"mine"}
+    assert (
+        run("evaluate", "d", "-o", "e", "--method", f"{place}remove", "--method", f"depth:{place}depth") == 0
+    )
+    assert run("segment", "d", "-o", "no", "--method", f"{place}nothing") == 2
+    assert "nothing' cannot be loaded" in capsys.readouterr().err

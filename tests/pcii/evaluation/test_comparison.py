@@ -445,7 +445,7 @@ def test_depths_are_given_where_the_recipe_names_none(
         write_manifest(path, {**read_manifest(path), "analysis": {}})
     command = ["evaluate", str(series), "-o", str(out), "--method", "by count"]
     assert command_line.run(cli.app, command) == 2
-    assert "names no depths; give them with --z-mm" in capsys.readouterr().err
+    assert "suggests no depths; name depths with --z-mm" in capsys.readouterr().err
     assert command_line.run(cli.app, [*command, "--z-mm", "1", "--z-mm", "2"]) == 0
     assert {plane["z_mm"] for row in rows_of(out) for plane in row["planes"]} == {1, 2}
     calls.clear()

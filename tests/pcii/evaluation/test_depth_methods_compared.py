@@ -10,7 +10,7 @@ import pytest
 from tiny_datasets import NESTED, OWN, write_dataset
 
 from pcii.app import commands as cli
-from pcii.app.results import Results
+from pcii.app.results import load_estimates
 from pcii.base import command_line
 from pcii.base.errors import InputError
 from pcii.depth.methods import FOR_COUNTS, estimate_depth
@@ -113,7 +113,7 @@ def test_single_commands_look_at_full_light_and_run_takes_a_method_of_depth(
         out = tmp_path / str(number)
         asked = [command, *at_light, option, "structure-tensor", "-o", str(out)]
         assert command_line.run(cli.app, asked) == 0
-        depth = Results(out, both.at_budget(FULL_LIGHT)).load_depth()
+        _, depth = load_estimates(out, both.at_budget(FULL_LIGHT))
         assert depth is not None
         np.testing.assert_array_equal(depth.z_mm, expected.z_mm)
     assert (
@@ -150,7 +150,7 @@ def test_what_a_method_cannot_take_is_refused_before_any_work(
 def test_without_depths_of_planes_removal_is_left_out(tmp_path: Path) -> None:
     ranged = saved(tmp_path / "ranged", COUNTS, z_range_mm=(450, 800))
     assert chosen([ranged]) == [("ranged", None, name) for name in OF_COUNTS]
-    with pytest.raises(InputError, match="names no depths"):
+    with pytest.raises(InputError, match="suggests no depths"):
         chosen([ranged], "variance")
 
 

@@ -27,6 +27,7 @@ from pcii.evaluation.summary import summarise
 from pcii.removal.methods import METHODS
 from pcii.store.dataset import open_dataset
 from pcii.store.dataset_layout import read_manifest, write_manifest
+from pcii.store.suggested_depths import depth_range_of, planes_of
 from pcii.types.estimates import Segmented
 
 FOLDER = f'<img src=x onerror={DO}> "\u202e.d'
@@ -84,7 +85,7 @@ def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
     with pytest.MonkeyPatch.context() as patch:
         for name in NAMES:
             patch.setitem(METHODS, name, named(name))
-        return analyse(dataset, None, methods=NAMES)
+        return analyse(dataset, planes_of(dataset, None), depth_range_of(dataset), NAMES)
 
 
 @pytest.fixture(scope="module")

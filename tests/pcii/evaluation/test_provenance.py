@@ -1,4 +1,4 @@
-"""What other software made is made again, in evaluations and in results alike, and it is said why."""
+"""What other software made is measured again by an evaluation, and it is said why."""
 
 import ast
 import re
@@ -11,7 +11,6 @@ from other_packages import install_package
 from tiny_datasets import OWN, write_dataset
 
 import pcii
-from pcii.app import long_steps, single_run
 from pcii.evaluation.comparison import evaluate
 from pcii.evaluation.provenance import software_of
 from pcii.evaluation.rows import all_rows, append_row, claim_rows
@@ -109,20 +108,3 @@ def test_rows_of_which_the_software_is_not_known_are_measured_again(tmp_path: Pa
     append_row(tmp_path / "earlier", {name: row[name] for name in row if name != "software"})
     (made,) = evaluate([data], tmp_path / "earlier", methods=["brightness"])["again"]
     assert made["why"] == "what makes them is not known"
-
-
-def test_results_of_other_software_are_made_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    package, out = tmp_path / "package", tmp_path / "out"
-    package.mkdir()
-    dataset = pcii.open_dataset(write_dataset(tmp_path / "data", 1, {OWN: 5}))
-
-    def kept() -> tuple[str, ...]:
-        methods = ["brightness", "learned"]
-        return single_run.run(dataset, out, None, methods=methods, depth_method="near").kept
-
-    own, strangers = map(long_steps.removal_step, ("brightness", "learned"))
-    strange(package, monkeypatch)
-    assert kept() == ()
-    assert set(kept()) == {own, strangers, long_steps.DEPTH_STEP}
-    strange(package, monkeypatch, "weights")
-    assert kept() == (own,)

@@ -9,10 +9,9 @@ from pcii.store.collection_layout import COLLECTION_FOLDER
 from pcii.store.dataset_layout import DATASET_FOLDER, MARKER
 from pcii.store.evaluation_layout import EVALUATION_FOLDER, ROWS
 from pcii.store.folder_kind import FolderKind, check_free
-from pcii.store.results_list import LOCK, RESULTS_FOLDER
 from pcii.store.sealed_json import write_sealed
 
-KINDS = {kind.what: kind for kind in (DATASET_FOLDER, COLLECTION_FOLDER, RESULTS_FOLDER, EVALUATION_FOLDER)}
+KINDS = {kind.what: kind for kind in (DATASET_FOLDER, COLLECTION_FOLDER, EVALUATION_FOLDER)}
 
 
 @pytest.fixture(params=KINDS)
@@ -49,7 +48,6 @@ def test_a_kill_while_a_folder_is_begun_leaves_it_new(kind: FolderKind, tmp_path
 def test_marks_of_unfinished_work_are_known() -> None:
     assert MARKER in DATASET_FOLDER.marks
     assert ROWS in EVALUATION_FOLDER.marks
-    assert LOCK in RESULTS_FOLDER.passing
 
 
 def test_a_document_comes_back_after_its_format(kind: FolderKind, tmp_path: Path) -> None:
