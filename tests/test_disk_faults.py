@@ -18,8 +18,7 @@ from pcii.app import commands as pcii_commands
 from pcii.base import command_line
 from pcii.evaluation.rows import all_rows, key_of
 from pcii.store.dataset_layout import MANIFEST
-from pcii.store.hashes import hash_file
-from pcii.store.results_list import read_results
+from pcii.store.folders import hash_file, read_results
 from pcii.store.verification import verify
 from simgen.app import commands as simgen_commands
 

@@ -38,7 +38,7 @@ def sample(*, out: Out) -> None:
     out
         Folder for the dataset: new or empty.
     """
-    from pcii.store.sample_dataset import copy_sample
+    from pcii.store.dataset import copy_sample
 
     copy_sample(out)
     say(f"{out}")

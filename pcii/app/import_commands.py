@@ -22,7 +22,8 @@ from pcii.exchange.import_requests import (
     read,
     values_of,
 )
-from pcii.store.dataset_writer import check_depth_range, held_dataset, save_dataset
+from pcii.store.dataset_writer import check_depth_range, save_dataset
+from pcii.store.folders import check_free
 from pcii.types.arrays import check_z_mm
 from pcii.types.images import Views
 from pcii.types.photon_counts import PhotonCounts
@@ -140,7 +141,7 @@ def import_dataset(
     }
     for group in (cameras, order, lenses, light):
         options |= values_of(group)
-    held_dataset(out, None, content=False)
+    check_free(out, "dataset")
     notes: list[str] = []
     with Stages() as report:
         imported = read(Source(source, report, notes.append), options)

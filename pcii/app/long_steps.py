@@ -6,13 +6,14 @@ its method (see `pcii.evaluation.provenance`).
 
 import time
 from collections.abc import Callable, Collection
+from dataclasses import asdict
 from threading import Lock
 from typing import Any, TypeVar
 
 from pcii.app.results import DEPTH, REPORT, SCORE, SECTIONS, Results, StepRecord, masks_name
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.provenance import software_of
-from pcii.store.hashes import hash_json
+from pcii.store.folders import hash_json
 from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.section_stack import Sections
 
@@ -118,6 +119,6 @@ class KeptSteps(Steps):
     def _key(self, method: str, step: dict[str, Any]) -> str:
         """Hash of all that the result of a method's step follows from."""
         data = self._results.dataset
-        seen = {name: data.manifest[name] for name in ("files", "grid", "cfa")}
+        seen = {"files": data.manifest.files, "grid": asdict(data.grid), "cfa": data.cfa}
         content = {"dataset": seen, "budget": data.budget, "software": software_of(method), **step}
         return hash_json(content)

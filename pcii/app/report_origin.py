@@ -12,6 +12,7 @@ from pcii.depth.methods import DEFAULT_METHOD
 from pcii.evaluation.method_names import depth_name
 from pcii.evaluation.provenance import machine, software_of
 from pcii.evaluation.tables import Table
+from pcii.store.manifests import DatasetManifest
 
 
 def origin(outcome: Outcome, smoothing_px: float | None) -> dict[str, Any]:
@@ -29,7 +30,7 @@ def origin(outcome: Outcome, smoothing_px: float | None) -> dict[str, Any]:
     }
 
 
-def _of_dataset(manifest: Mapping[str, Any], name: str) -> list[tuple[str, str]]:
+def _of_dataset(manifest: DatasetManifest, name: str) -> list[tuple[str, str]]:
     """Rows (name, value) on how the dataset was made."""
     recipe, backend, photons = (manifest.get(key) or {} for key in ("recipe", "backend", "photons"))
     rows = [("folder", name)]
@@ -97,13 +98,11 @@ def _command(outcome: Outcome, smoothing_px: float | None) -> str:
     return shlex.join([*words, *budget_words(outcome.dataset)])
 
 
-def _skipped(manifest: Mapping[str, Any]) -> Table:
+def _skipped(manifest: DatasetManifest) -> Table:
     """What the simulation did not do, why it could leave it out, and what that saved."""
     rows: list[tuple[str, str, str]] = []
-    for skip in manifest.get("skipped") or ():
-        if isinstance(skip, str):  # a sentence, in older manifests
-            rows.append((skip, "", ""))
-        elif skip["unit"].startswith("bytes"):
+    for skip in manifest.skipped:
+        if skip["unit"].startswith("bytes"):
             rows.append((skip["what"], skip["why"], f"{skip['saved'] / 1e6:,.1f} MB{skip['unit'][5:]}"))
         else:
             rows.append((skip["what"], skip["why"], f"{skip['saved']:,.0f} {skip['unit']}"))

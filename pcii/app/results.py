@@ -36,14 +36,14 @@ from pcii.base.safe_files import (
 )
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.file_list import list_files, lists_part
-from pcii.store.results_list import FINISH, LOCK, RESULTS, RESULTS_FOLDER, read_results
+from pcii.store.folders import LOCK, RESULTS, RESULTS_FOLDER, list_files, lists_part, read_results
 from pcii.store.zarr_groups import read_array, write_arrays
 from pcii.types.array_labels import DEPTH_LABELS, SECTIONS_LABELS, SEGMENTED_LABELS, Label
 from pcii.types.estimates import DepthMap, Score, Segmented
 from pcii.types.section_stack import Sections
 
 REMEDY = "make it again"
+FINISH = "`pcii run` with the same options makes them, and keeps what is done"
 DEPTH = "depth.zarr"
 SECTIONS = "sections.zarr"
 SCORE = "score.json"
@@ -74,14 +74,16 @@ class Results:
     def _origin(self) -> dict[str, Any]:
         """Dataset and budget that the results belong to, as in results.json."""
         data = self.dataset
-        return {"dataset": data.name, "identity": data.manifest.get("identity"), "budget": data.budget}
+        return {"dataset": data.name, "identity": data.manifest.identity, "budget": data.budget}
 
     def check(self) -> None:
         """Raise `InputError` unless the folder is new, empty, or has results of this dataset and budget."""
         out = self.path
         if out.resolve() == self.dataset.path.resolve():
             raise InputError(f"{out}: this is the dataset itself; name another folder for the results")
-        if RESULTS_FOLDER.guard(out) and not self._origin.items() <= read_results(out).items():
+        if RESULTS_FOLDER.guard(out) and any(
+            read_results(out).get(name) != value for name, value in self._origin.items()
+        ):
             raise InputError(
                 f"{out}: holds the results of another dataset or photon budget; name a new or empty folder"
             )
@@ -109,7 +111,7 @@ class Results:
             new = temporary / name
             yield new
             held = read_results(self.path)
-            files, made, due = held["files"], held["made"], set(held["due"])
+            files, made, due = held["files"], held["made"], set(held.get("due", []))
             remaining = {path: entry for path, entry in files.items() if not lists_part([path], name)}
             made = {part: how for part, how in made.items() if part != name}
             listed = list_files(temporary, [name])
@@ -129,12 +131,12 @@ class Results:
     def begin(self, parts: Iterable[str]) -> None:
         """List parts as due before the first of them is made; each is until it is made."""
         held = read_results(self.path)
-        self._list(held["files"], held["made"], {*held["due"], *parts})
+        self._list(held["files"], held["made"], {*held.get("due", []), *parts})
 
     def keep(self, name: str) -> None:
         """Say that the part that is there already is the one to be made."""
         held = read_results(self.path)
-        self._list(held["files"], held["made"], {*held["due"]} - {name})
+        self._list(held["files"], held["made"], {*held.get("due", [])} - {name})
 
     def _list(self, files: Mapping[str, Any], made: Mapping[str, Any], due: Collection[str]) -> None:
         """Write results.json, the same whatever order the files were made in."""
@@ -249,7 +251,7 @@ class Results:
     def _current_files(self) -> Mapping[str, Any]:
         """Listed files; raises `InputError` if masks or a depth map are older than an unfinished run."""
         held = read_results(self.path)
-        estimates = (part for part in held["due"] if SCORE in _made_from(part))
+        estimates = (part for part in held.get("due", []) if SCORE in _made_from(part))
         older = [part for part in estimates if lists_part(held["files"], part)]
         if older:
             raise InputError(

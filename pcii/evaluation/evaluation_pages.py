@@ -17,8 +17,7 @@ from pcii.evaluation.tables import (
     tables_of,
     with_interval,
 )
-from pcii.store.evaluation_layout import ROWS, seal_evaluation
-from pcii.store.hashes import hash_file
+from pcii.store.folders import ROWS, hash_file, seal_evaluation
 
 
 def write_evaluation(out: Path, evaluation: Mapping[str, Any], others: Sequence[str] = ()) -> None:

@@ -1,9 +1,6 @@
 """An analysis that was interrupted goes on: what is finished and valid is kept, with the same bytes."""
 
-import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from threading import Event
 
 import pytest
 
@@ -11,9 +8,8 @@ import pcii
 from pcii.app import long_steps, pipeline, single_run
 from pcii.app.results import masks_name
 from pcii.base.errors import InputError
-from pcii.store import folder_kind
 from pcii.store.dataset import Dataset
-from pcii.store.results_list import read_results
+from pcii.store.folders import read_results
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap, Segmented
 
@@ -132,32 +128,3 @@ def test_masks_of_a_single_step_are_not_taken_for_those_of_a_run(dataset: Datase
     with single_run.Results(out, dataset).writing() as results:
         results.save_segmented(Segmented(~other.in_focus, "brightness", other.sections))
     assert run(dataset, out) == (REMOVALS[1], long_steps.DEPTH_STEP)
-
-
-def test_steps_that_end_together_do_not_take_each_other_for_strangers(
-    dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    begun, write = Event(), folder_kind.write_sealed
-
-    def slowly(path: Path, content: dict[str, object]) -> None:
-        """As `write_sealed`, with its temporary file there for long enough to be met."""
-        temporary = path.with_name("temporary")
-        temporary.touch()
-        begun.set()
-        time.sleep(0.3)
-        temporary.unlink()
-        write(path, content)
-
-    def once_the_other_writes() -> DepthMap:
-        begun.wait(10)
-        return depth
-
-    focus = pcii.segment(dataset.counts, z_mm=[540, 620], method="brightness")
-    depth = pcii.estimate_depth(dataset.counts, z_range_mm=(450, 750), method="variance-sweep")
-    monkeypatch.setattr(folder_kind, "write_sealed", slowly)
-    steps = long_steps.KeptSteps(single_run.Results(tmp_path / "out", dataset))
-    with ThreadPoolExecutor(1) as beside:
-        mapped = beside.submit(steps.depth, "variance-sweep", (450, 750), once_the_other_writes)
-        steps.removal("brightness", focus.sections, lambda: focus)
-        mapped.result()
-    assert set(read_results(tmp_path / "out")["made"]) == {"depth.zarr", masks_name("brightness")}

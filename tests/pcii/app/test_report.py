@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from report_outcomes import COUNTS, FOUND, GRID, IDS, LIGHT, TRUTH, Written, decoded, outcome_of, page_of
+from stored_datasets import rewrite_manifest
 
 from pcii.app import report_origin
 from pcii.app.pipeline import Outcome
@@ -16,7 +17,7 @@ from pcii.app.report_slider import MOST_PLANES, slider, slider_planes
 from pcii.base.progress import silent
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import open_dataset
-from pcii.store.dataset_layout import read_manifest, write_manifest
+from pcii.store.dataset_layout import MANIFEST
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.focal_planes import FocalPlanes
 from pcii.types.geometry import total_disparity_px
@@ -179,19 +180,17 @@ def test_how_it_was_made(full: Outcome, tmp_path: Path, monkeypatch: pytest.Monk
     skipped = [
         {"what": "a <b>", "why": "no need", "saved": 2_500_000, "unit": "bytes before compression"},
         {"what": "rays", "why": "none asked", "saved": 1200.0, "unit": "rays"},
-        "an older sentence",
     ]
-    manifest = read_manifest(full.dataset.path)
-    write_manifest(tmp_path, manifest | {"skipped": skipped, "versions": {"mitsuba": "3.9.1"}, "files": {}})
+    (tmp_path / MANIFEST).write_bytes((full.dataset.path / MANIFEST).read_bytes())
+    rewrite_manifest(tmp_path, skipped=skipped, versions={"mitsuba": "3.9.1"}, files={})
     monkeypatch.setattr(report_origin, "_of_analysis", lambda *_: [])
     rows = report_origin.origin(replace(full, dataset=open_dataset(tmp_path)), None)
     assert rows["skipped"].rows == (
         ("a <b>", "no need", "2.5 MB before compression"),
         ("rays", "none asked", "1,200 rays"),
-        ("an older sentence", "", ""),
     )
     assert ("software", "mitsuba 3.9.1") in rows["data"]
-    assert ("identity", manifest["identity"]) in rows["data"]
+    assert ("identity", full.dataset.manifest.identity) in rows["data"]
 
 
 def test_smoothing_is_said_and_can_be_left_out(full: Outcome, page: str, tmp_path: Path) -> None:

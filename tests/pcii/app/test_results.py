@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from pcii.app.results import LOCK, Results
 from pcii.base.errors import InputError
 from pcii.sections.reconstruction import reconstruct
 from pcii.store.dataset import Dataset
-from pcii.store.results_list import RESULTS, read_results
+from pcii.store.folders import RESULTS, read_results
+from pcii.store.manifests import DatasetManifest
 from pcii.store.verification import verify
 from pcii.types.estimates import DepthMap, Score, Segmented
 from pcii.types.photon_counts import PhotonCounts
@@ -25,7 +27,8 @@ Z = np.array([0.5, 1.0])
 
 def dataset_of(tmp_path: Path, rate: float, identity: str = "a") -> Dataset:
     counts = PhotonCounts.from_dense(np.random.default_rng(3).poisson(rate, GRID.shape_KLHW), GRID)
-    dataset = Dataset(tmp_path, {"identity": identity}, GRID, None)
+    manifest = DatasetManifest(identity=identity, grid=asdict(GRID), cfa=None, files={})
+    dataset = Dataset(tmp_path, manifest)
     vars(dataset)["counts"] = counts  # the place where the property keeps what it has read
     return dataset
 
