@@ -10,7 +10,7 @@ all the manifests, and the hash of each.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -82,9 +82,6 @@ class Collection(ShortForm, Sequence[Dataset]):
         if isinstance(number, slice):
             return replace(self, rows=self.rows[number])
         return open_dataset(check_manifest(self.path, self.rows[number]))
-
-    def __iter__(self) -> Iterator[Dataset]:
-        return (self[number] for number in range(len(self)))
 
     def where(
         self, condition: Callable[[Mapping[str, Any]], bool] | None = None, /, **values: Any

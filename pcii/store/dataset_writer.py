@@ -15,13 +15,12 @@ from pcii.store.dataset_layout import (
     FRAME,
     PHOTON_TRUTH,
     RADIANCE,
-    REMEDY,
     TRUTH,
     radiance_name,
     write_exr_safely,
     write_manifest,
 )
-from pcii.store.folders import Files, check_files, check_free, hash_json, list_files
+from pcii.store.folders import check_free, hash_json, list_files
 from pcii.store.software import PACKAGE, versions
 from pcii.store.zarr_groups import DTYPES, write_arrays_safely
 from pcii.types.array_labels import COUNTS_LABELS, PHOTON_TRUTH_LABELS, TRUTH_LABELS
@@ -127,14 +126,6 @@ def write_counts(folder: Path, counts: PhotonCounts) -> None:
 def write_photon_truth(folder: Path, object_id: np.ndarray, z_mm: np.ndarray) -> None:
     """Write the origins (N,) of all photons, in the order of the events of their counts."""
     write_arrays_safely(folder, {"object_id": object_id, "z_mm": z_mm}, PHOTON_TRUTH_LABELS)
-
-
-def check_held(out: Path, files: Files, *, content: bool) -> None:
-    """Raise `InputError` for a listed file that is missing or has another size, or, if `content`, hash.
-
-    The folder has to be deleted, since what is in it is kept as long as it is there.
-    """
-    check_files(out, files, f"{REMEDY}, after deleting {out}", content=content)
 
 
 def _counts_and_views(images: object) -> tuple[PhotonCounts | None, Views | None]:

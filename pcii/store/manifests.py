@@ -26,7 +26,6 @@ from pcii.types.bayer import check_cfa
 from pcii.types.camera_grid import CameraGrid
 from pcii.types.photon_events import MOST_BITS, MOST_FRAMES
 
-LARGEST_ID = 10**9 - 1
 OPEN = ConfigDict(extra="allow", strict=True, frozen=True, allow_inf_nan=False)
 
 
@@ -69,7 +68,7 @@ Text = Annotated[Any, AfterValidator(_text)]
 Seconds = Annotated[Real, Field(ge=0)]
 Photons = Annotated[Real, Field(ge=0, le=1 << 62)]  # sums of more may not fit in 64 bits
 Depth = Annotated[Real, Field(gt=0)]
-ObjectId = Annotated[int, Field(strict=False, ge=-LARGEST_ID, le=LARGEST_ID)]
+ObjectId = Annotated[int, Field(strict=False, gt=-(10**9), lt=10**9)]
 
 
 class FileEntry(TypedDict):
@@ -107,27 +106,6 @@ class Recipe(TypedDict, total=False):
     photons: RecipePhotons
 
 
-class PhotonLog(TypedDict, total=False):
-    """How the photons were drawn."""
-
-    __pydantic_config__ = OPEN  # type: ignore[misc]
-    method: str | None
-    total: int | None
-    paths: int | None
-    dense_paths_instead: int | None
-    samples_per_pixel: int | None
-    rendering_noise: Real | None
-
-
-class SkippedWork(TypedDict):
-    """Work that was skipped: what, why, and how much of `unit` that saved."""
-
-    what: Text
-    why: Text
-    saved: Real
-    unit: Text
-
-
 class DatasetManifest(Manifest):
     """The manifest of a dataset."""
 
@@ -147,8 +125,8 @@ class DatasetManifest(Manifest):
     photon_budget: Photons | None = None
     recipe: Recipe = {}
     backend: dict[str, Any] | None = None
-    photons: PhotonLog | None = None
-    skipped: list[SkippedWork] = []
+    photons: dict[str, Any] | None = None
+    skipped: list[dict[str, Any]] = []
     timings_s: dict[str, Seconds] = {}
     versions: dict[str, Text] = {}
     files: Files

@@ -35,10 +35,7 @@ def own_software() -> dict[str, str]:
 
 
 def software_of_entry_point(point: "EntryPoint") -> dict[str, str]:
-    """Version and source of the package that an entry point is of, and versions of what it requires.
-
-    It is found anew by each call, since the source may change while Python runs.
-    """
+    """Version and source, as it is now, of the package that an entry point is of."""
     package = point.dist
     modules = {point.module.partition(".")[0]}
     if package is None:

@@ -10,8 +10,8 @@ from typing import Any
 from pcii.base.errors import BusyError, InputError
 from pcii.base.safe_files import locked
 from pcii.store import software
-from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, read_written_manifest
-from pcii.store.dataset_writer import check_held
+from pcii.store.dataset_layout import DATASET_FOLDER, MARKER, REMEDY, read_written_manifest
+from pcii.store.folders import check_files
 from pcii.store.manifests import DatasetManifest
 from pcii.store.software import PACKAGE
 
@@ -52,7 +52,8 @@ def read_whole(out: Path, identity: str, *, content: bool) -> DatasetManifest:
     manifest = read_written_manifest(out)
     if manifest.identity != identity:
         raise other_dataset(out, "dataset", manifest.versions)
-    check_held(out, manifest.files, content=content)
+    # The folder has to be deleted, since what is in it is kept as long as it is there.
+    check_files(out, manifest.files, f"{REMEDY}, after deleting {out}", content=content)
     return manifest
 
 

@@ -141,7 +141,7 @@ def test_only_the_papers_scene_has_the_papers_numbers(full: Outcome, page: str, 
     assert not any(title in words for title in titles)
     assert "In the paper" not in words
     assert "Entropy of the objects" in words
-    manifest = {**full.dataset.manifest, "recipe": {"scene": "two_objects", "seed": 1}}
+    manifest = full.dataset.manifest.model_copy(update={"recipe": {"scene": "two_objects", "seed": 1}})
     paper = replace(
         full, dataset=replace(full.dataset, manifest=manifest), sections=reconstruct(COUNTS, (540, 620))
     )

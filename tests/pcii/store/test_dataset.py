@@ -60,7 +60,6 @@ def test_what_a_dataset_does_not_have_is_none_or_refused(tmp_path):
     assert dataset.truth is None
     assert dataset.views is None
     assert "no photon counts" in one_sentence(lambda: dataset.counts, root)
-    assert "lists no other.bin" in one_sentence(lambda: dataset.check("other.bin"), root)
     assert "no photons of budget 3" in one_sentence(lambda: dataset.at_budget(3), root)
 
 
