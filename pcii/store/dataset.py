@@ -173,9 +173,10 @@ class Dataset(ShortForm):
         """The photon counts; raises `InputError` if the dataset has none."""
         part = self._counts_name
         if part is None or not self.has(part):
+            what = f"{FULL_LIGHT} is the radiance, and this needs" if part is None else "this dataset has no"
             raise InputError(
-                f"{self.path}: has no photon counts at this budget, and this needs photon counts; import the "
-                "images with --photons N, or generate it with products.counts = true"
+                f"{self.path}: {what} photon counts; import the images with --photons N, or generate it with "
+                "products.counts = true"
             )
         names = ("dense",) if self.has(f"{part}/dense") else tuple("klijn")
         if self.has(f"{part}/{FRAME}"):
@@ -186,7 +187,9 @@ class Dataset(ShortForm):
             if "dense" in arrays:
                 return PhotonCounts.from_dense(arrays["dense"], self.grid, cfa=self.cfa, **readout)
             k, l, i, j, n = (arrays[name] for name in "klijn")
-            return PhotonCounts.from_events(k, l, i, j, n, self.grid, cfa=self.cfa, frame=arrays.get(FRAME), **readout)
+            return PhotonCounts.from_events(
+                k, l, i, j, n, self.grid, cfa=self.cfa, frame=arrays.get(FRAME), **readout
+            )
         except InputError as fault:
             raise InputError(f"{self.path / part}: {fault}") from None
 

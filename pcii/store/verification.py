@@ -125,7 +125,9 @@ def _sum_over(items: Sequence[Item], check: Callable[[Item], int], what: str, re
 def _refuse_unlisted(path: Path, unlisted: list[str], document: str) -> None:
     """Raise `InputError` if there are files or folders that the document does not list."""
     if unlisted:
-        raise InputError(f"{path}: not listed in {document}: {_first(unlisted)}; move it away")
+        raise InputError(
+            f"{path}: not listed in {document}, and read by nothing: {_first(unlisted)}; move it away"
+        )
 
 
 def _first(names: list[str]) -> str:

@@ -18,7 +18,7 @@ from pcii.store.dataset import Dataset
 from pcii.store.folders import RESULTS, read_results
 from pcii.store.manifests import DatasetManifest
 from pcii.store.verification import verify
-from pcii.types.estimates import DepthMap, Score, Segmented
+from pcii.types.estimates import DepthMap, Segmented
 from pcii.types.photon_counts import PhotonCounts
 
 GRID = unit_grid(2, 2, 6, 7)
@@ -101,21 +101,6 @@ def test_what_is_written_anew_takes_the_place_of_the_old(saved: Results) -> None
     assert (saved.path / "note.txt").read_text() == "again"
     assert verify(saved.path) > 0
     assert not [path.name for path in saved.path.iterdir() if path.name.startswith(".")]
-
-
-def test_scores_and_report_of_an_older_depth_map_are_named(saved: Results) -> None:
-    with saved.writing():
-        saved.save_score(Score((), (), {}))
-        with saved.replacing("report.html") as path:
-            path.touch()
-        saved.save_depth(DepthMap(np.full((6, 7), 0.7), np.full((6, 7), 0.5)))  # the same again
-    assert verify(saved.path) > 0
-    with saved.writing():
-        saved.save_depth(DepthMap(np.full((6, 7), 0.9), np.full((6, 7), 0.5)))
-    assert "report.html, score.json are" in one_sentence(lambda: verify(saved.path), saved.path)
-    with saved.writing():
-        saved.save_score(Score((), (), {}))
-    assert "finished: report.html are" in one_sentence(lambda: verify(saved.path), saved.path)
 
 
 @pytest.mark.parametrize("part", ["segmented_by-hand.zarr", "depth.zarr"])
