@@ -70,7 +70,7 @@ def write_card(root: Path, terms: Terms) -> None:
 def _of_dataset(root: Path) -> list[str]:
     manifest = read_manifest(root)
     grid, recipe = manifest.grid, manifest.recipe
-    scene = f" of the scene {recipe['scene']}" if recipe.get("scene") else ""
+    scene = f" of the scene {name}" if (name := recipe.get("scene")) else ""
     pattern = f"Bayer pattern {manifest.cfa}" if manifest.cfa else "no colour filters"
     photons = (manifest.photons or {}).get("total")
     total = "" if photons is None else f" {photons} photons were counted in all."

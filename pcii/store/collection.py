@@ -158,9 +158,9 @@ def index_row(
     return {
         "path": name,
         "values": dict(values),
-        "scene": recipe["scene"],
+        "scene": recipe.get("scene"),
         "scene_number": number,
-        "seed": recipe["seed"],
+        "seed": recipe.get("seed"),
         "split": None if number is None else split_of(number),
         "photons": None if photons is None else photons["total"],
         "identity": manifest.identity,

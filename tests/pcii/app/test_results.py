@@ -27,8 +27,8 @@ Z = np.array([0.5, 1.0])
 
 def dataset_of(tmp_path: Path, rate: float, identity: str = "a") -> Dataset:
     counts = PhotonCounts.from_dense(np.random.default_rng(3).poisson(rate, GRID.shape_KLHW), GRID)
-    manifest = DatasetManifest(identity=identity, grid=asdict(GRID), cfa=None, files={})
-    dataset = Dataset(tmp_path, manifest)
+    members = {"identity": identity, "grid": asdict(GRID), "cfa": None, "files": {}}
+    dataset = Dataset(tmp_path, DatasetManifest.model_validate(members))
     vars(dataset)["counts"] = counts  # the place where the property keeps what it has read
     return dataset
 

@@ -118,21 +118,15 @@ def test_a_flipped_bit_is_found_on_reading_and_leaves_other_parts_readable(tmp_p
 ENTRY = {"bytes": 1, "sha256": "0" * 64}
 WRONG = [
     ({"cfa": "GRGB"}, "cfa: "),
-    ({"cfa": ...}, "cfa: "),
     ({"grid": {"rows": 1}}, "grid: "),
-    ({"grid": 3}, "grid: "),
-    ({"objects": {"one": "ball"}}, "objects.one: "),
     ({"objects": {"1": 3}}, "objects.1: "),
     ({"analysis": {"z_mm": [-5.0]}}, "analysis.z_mm.0: "),
     ({"recipe": {"photons": {"nested": ["few"]}}}, "recipe.photons.nested.0: "),
     ({"radiance_channels": 2}, "radiance_channels: "),
     ({"title": ["a"]}, "title: "),
-    ({"files": []}, "files: "),
     ({"files": ...}, "files: "),
     ({"files": {"../secret": ENTRY}}, "a path inside the folder"),
-    ({"files": {"/etc/passwd": ENTRY}}, "a path inside the folder"),
     ({"files": {"a": ENTRY | {"sha256": "no"}}}, "files.a.sha256: "),
-    ({"files": {"a": {}}}, "files.a.bytes: "),
 ]
 
 
